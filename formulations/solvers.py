@@ -5,59 +5,18 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
-import clarabel
 import cvxpy as cp
 import highspy
 import numpy as np
-from scipy import sparse
 
 from seqopt.arrays import Floats
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.plan.calling.formulation import Watch
-from seqopt.stability.limit_analysis import Claim
-
-CONE_OPTIONS: tuple[dict[str, object], ...] = (
-    {"equilibrate_enable": False, "static_regularization_constant": 1e-7},
-    {},
-)  # by attempt. A program scaled by its author stalls less without the solver's own scaling: on the
-# 98 steps of the two-robot methods with epoxy 0 of 1,174 cases, else 23 of 1,142
-SECONDS = 300.0  # a cone program that takes longer has stalled
-ENDS = {
-    "Solved": Claim.SOLVED,
-    "AlmostSolved": Claim.ALMOST,
-    "PrimalInfeasible": Claim.INFEASIBLE,
-}  # any other end, a limit reached among them, is a stall
-
-
-def solve_cones(
-    cost: Floats, matrix: sparse.csc_array, right: Floats, cones: Sequence[Any], attempt: int
-) -> tuple[Claim, Floats, Floats]:
-    """Minimize a cost (n,) where right (m,) - matrix (m, n) x is in cones, by Clarabel.
-
-    The attempt is an index into `CONE_OPTIONS`. Returns how it ended, x (n,) and the multipliers
-    (m,); a solver that fails has stalled.
-    """
-    settings = clarabel.DefaultSettings()
-    settings.verbose, settings.max_threads, settings.time_limit = False, 1, SECONDS
-    for name, value in CONE_OPTIONS[attempt].items():
-        setattr(settings, name, value)
-    none = sparse.csc_matrix((len(cost), len(cost)))
-    try:
-        solver = clarabel.DefaultSolver(
-            none, cost, sparse.csc_matrix(matrix), right, cones, settings
-        )
-        found = solver.solve()
-    except BaseException as error:  # a panic of its kernel is none of Exception
-        if isinstance(error, KeyboardInterrupt | SystemExit | MemoryError):
-            raise
-        return Claim.STALLED, np.full(len(cost), np.nan), np.zeros(len(right))
-    return ENDS.get(str(found.status), Claim.STALLED), np.array(found.x), np.array(found.z)
-
 
 GAPS = {"mip_rel_gap": 1e-9, "mip_abs_gap": 1e-9}  # of integer programs
 HIGHS_ENDS = {"kOptimal": cp.OPTIMAL, "kInfeasible": cp.INFEASIBLE}
@@ -67,12 +26,10 @@ STOPS = ("kTimeLimit", "kInterrupt")
 
 @dataclass(frozen=True)
 class Optimum:
-    """What a solver found.
+    """What a solver found: a value, infinite where it was stopped before any, and its own bound.
 
-    ``value``: of the objective; infinite where it was stopped before it had any solution;
-    ``compile_seconds``: what cvxpy took to write the program down for the solver, s; ``bound``: on
-    the objective, as the solver says; ``nodes``: of its search tree; ``stopped``: whether its time
-    was over, or it was interrupted.
+    ``compile_seconds``: what cvxpy took to write the program down for the solver, s; ``nodes``: of
+    its search tree; ``stopped``: whether its time was over, or it was interrupted.
     """
 
     value: float
@@ -93,13 +50,12 @@ class Size:
 
 
 def minimize(program: cp.Problem, *, feasible: bool, time_limit: float = math.inf) -> Optimum:
-    """Solve a linear program by Clarabel.
+    """Solve a linear program by Clarabel; its variables take the values of the optimum.
 
-    ``program``: its variables take the values of the optimum; ``feasible``: whether the program is
-    known to have a solution; ``time_limit``: after which it stops with nothing, s. Raises
-    `InfeasibleError` if the solver proves that nothing is within all budgets; `SolverError` if it
-    ends in any other way than with an optimum or at its limit, or calls a program infeasible that
-    is not.
+    ``feasible``: whether it is known to have a solution; ``time_limit``: after which it stops with
+    nothing, s. Raises `InfeasibleError` if the solver proves that nothing is within all budgets;
+    `SolverError` if it ends otherwise than with an optimum or at its limit, or calls a program
+    infeasible that is not.
     """
     limit = {"time_limit": time_limit} if math.isfinite(time_limit) else {}
     try:
@@ -123,12 +79,11 @@ def minimize_whole(
     watch: Watch | None = None,
     told: Callable[[float], float] = float,
 ) -> Optimum:
-    """Solve an integer program by HiGHS.
+    """Solve an integer program by HiGHS; its variables take the values of the best solution.
 
-    ``program``: its variables take the values of the best solution, if there is one; ``feasible``:
-    whether the program is known to have a solution; ``watch``: says when to stop, and is told
-    values and bounds as they are found; ``told``: turns a value of the program into the unit that
-    the watch is told. Raises `InfeasibleError`, `SolverError` as `minimize`.
+    ``feasible``: whether it is known to have one; ``watch``: says when to stop, and is told values
+    and bounds as they are found, in the unit that ``told`` turns them into. Raises
+    `InfeasibleError`, `SolverError` as `minimize`.
     """
     watch = watch or Watch()
     start = time.perf_counter()
@@ -195,10 +150,7 @@ def minimize_rows(
 
 
 def anatomy(program: cp.Problem) -> tuple[Size, float]:
-    """Return how large an integer program is, and the bound of its linear relaxation.
-
-    Raises `SolverError` if the relaxation is not solved.
-    """
+    """Return how large an integer program is, and its relaxation's bound, or a `SolverError`."""
     data, _, inverse = program.get_problem_data(cp.HIGHS)
     solver = _loaded(data, whole=False)
     _require_optimum(HIGHS_ENDS.get(_end(solver, math.inf), ""), cp.HIGHS, feasible=True)
@@ -221,28 +173,24 @@ def _require_optimum(status: str, solver: str, *, feasible: bool) -> None:
 
 def _loaded(data: dict[str, Any], *, whole: bool) -> highspy.Highs:
     """Return HiGHS with a program: equations first, then inequalities, as cvxpy writes them."""
-    model = highspy.HighsModel()
-    lp, matrix, right = model.lp_, data["A"].tocsc(), data["b"]
-    lp.num_row_, lp.num_col_ = matrix.shape
-    lp.col_cost_, lp.row_upper_ = data["c"], right
-    lp.row_lower_ = np.where(np.arange(len(right)) < data["dims"].zero, right, -highspy.kHighsInf)
-    lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
-    lp.a_matrix_.start_, lp.a_matrix_.index_ = matrix.indptr, matrix.indices
-    lp.a_matrix_.value_ = matrix.data
-    binary = np.zeros(lp.num_col_, dtype=bool)
-    binary[list(data["bool_vars_idx"])] = True
+    matrix, right = data["A"].tocsc(), data["b"]
+    rows, columns = matrix.shape
+    binary = np.isin(np.arange(columns), data["bool_vars_idx"])
     low, high = data.get("lower_bounds"), data.get("upper_bounds")
-    low = np.full(len(binary), -highspy.kHighsInf) if low is None else low
-    high = np.full(len(binary), highspy.kHighsInf) if high is None else high
-    lp.col_lower_ = np.where(binary, np.maximum(low, 0.0), low)
-    lp.col_upper_ = np.where(binary, np.minimum(high, 1.0), high)
-    kinds = (highspy.HighsVarType.kContinuous, highspy.HighsVarType.kInteger)
-    if whole:
-        lp.integrality_ = [kinds[int(is_binary)] for is_binary in binary]
+    low = np.full(columns, -highspy.kHighsInf) if low is None else low
+    high = np.full(columns, highspy.kHighsInf) if high is None else high
+    low = np.where(binary, np.maximum(low, 0.0), low)
+    high = np.where(binary, np.minimum(high, 1.0), high)
     solver = highspy.Highs()
     for name, value in {"log_to_console": False, **GAPS}.items():
         solver.setOptionValue(name, value)
-    solver.passModel(model)
+    least = np.where(np.arange(rows) < data["dims"].zero, right, -highspy.kHighsInf)
+    solver.addRows(rows, least, right, 0, [], [], [])
+    starts, which = matrix.indptr[:-1].astype(np.int32), matrix.indices.astype(np.int32)
+    solver.addCols(columns, data["c"], low, high, matrix.nnz, starts, which, matrix.data)
+    if whole:
+        every, kinds = np.arange(columns, dtype=np.int32), binary.astype(np.uint8)  # whole: 1
+        solver.changeColsIntegrality(columns, every, kinds)
     return solver
 
 

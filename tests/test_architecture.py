@@ -37,12 +37,9 @@ ROOMS = (
 SOLVERS = {"cvxpy", "clarabel", "highspy"}
 SOLVER_HOME = "formulations"
 SHARED = {  # what formulations may import
-    *(
-        "formulations.solvers",
-        "formulations.states.on_graph",
-        "formulations.scenarios.scenario_weights",
-    ),
-    *("formulations.solvers", "formulations.whole_program"),
+    "formulations.solvers",
+    "formulations.states.on_graph",
+    "formulations.whole_program",
 }
 MECHANICS = {"network.mechanics", "engines.rigid"}  # not for the frame
 LINES, LINES_OF_A_FUNCTION = 300, 50  # of code; imports, docstrings and comments aside

@@ -50,7 +50,6 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from functools import partial
-from importlib import import_module
 
 import numpy as np
 import pandas as pd
@@ -244,7 +243,7 @@ def written(problem: Layers, name: str, limit: float) -> tuple[dict[str, object]
     """Return size, bound, nodes and time of a program, and what was found at which time."""
     formulation = find_formulation(name)
     costs = formulation.aim.costs(problem)
-    written = import_module(f"formulations.layers.{name}").write(problem)
+    written = formulation.solve.write(problem)
     size, relaxed = anatomy(written.program)
     watch, start = Watch(limit), time.perf_counter()
     found = minimize_whole(written.program, feasible=True, watch=watch, told=written.bound)

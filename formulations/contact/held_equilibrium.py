@@ -53,11 +53,8 @@ OPTIONS: dict[str, Any] = {
 }
 
 
-class HeldEquilibrium:
-    """The program of one assembly and case; call it with payloads.
-
-    ``assembly``: its grips are all that may ever be held; ``case``: what is asked.
-    """
+class _HeldEquilibrium:
+    """The program of one assembly, whose grips are all that may ever be held, and case."""
 
     def __init__(self, assembly: Assembly, case: Case) -> None:
         self._assembly, self._case = assembly, case
@@ -83,20 +80,20 @@ class HeldEquilibrium:
         for name, value in OPTIONS.items():
             self._solver.setOptionValue(name, value)
         right = self._right()
-        program = highspy.HighsLp()
-        program.num_row_, program.num_col_ = len(right), 1
-        program.row_lower_ = np.where(np.arange(len(right)) < self._lines, right, -FREE)
-        program.row_upper_ = right
+        least = np.where(np.arange(len(right)) < self._lines, right, -FREE)
+        self._solver.addRows(len(right), least, right, 0, [], [], [])
         case = self._case
         grows = any((case.tension[1], case.cohesion[1], case.payload[1], *case.pull))
-        program.col_cost_ = np.array([case.sense.value if grows else 0.0])
-        program.col_lower_, program.col_upper_ = np.zeros(1), np.array([CAP if grows else 0.0])
-        z = sparse.csc_array(self._growth()[:, None])
-        program.a_matrix_.start_ = z.indptr
-        program.a_matrix_.index_, program.a_matrix_.value_ = z.indices, z.data
-        self._solver.passModel(program)
+        cost, most = (case.sense.value, CAP) if grows else (0.0, 0.0)
+        self._add(np.array([cost]), np.array([most]), sparse.csc_array(self._growth()[:, None]))
         self._join(first_directions(self._corners, self._grips))
         self._first = len(self._owner)
+
+    def _add(self, cost: Floats, most: Floats, matrix: sparse.csc_array) -> None:
+        """Add columns from 0 on."""
+        starts, rows = matrix.indptr[:-1].astype(np.int32), matrix.indices.astype(np.int32)
+        least, count = np.zeros(len(cost)), len(cost)
+        self._solver.addCols(count, cost, least, most, matrix.nnz, starts, rows, matrix.data)
 
     def _pressed(self, cut: Floats) -> Floats:
         """Return the wrenches of all corners that press by an amount (K,)."""
@@ -129,17 +126,7 @@ class HeldEquilibrium:
         limited.append(new.owner[~corner] - self._corners + self._disc.shape[1])
         owner, force = (np.concatenate(part) for part in zip(*parts, strict=True))
         matrix = self._matrix(owner, force, np.concatenate(limited))
-        count = len(owner)
-        self._solver.addCols(
-            count,
-            np.zeros(count),
-            np.zeros(count),
-            self._most(owner),
-            matrix.nnz,
-            matrix.indptr[:-1].astype(np.int32),
-            matrix.indices.astype(np.int32),
-            matrix.data,
-        )
+        self._add(np.zeros(len(owner)), self._most(owner), matrix)
         self._directions = self._directions.joined(new)
         self._owner = np.concatenate([self._owner, owner])
         self._force = np.concatenate([self._force, force])
@@ -161,10 +148,9 @@ class HeldEquilibrium:
         return np.where(held[owner], FREE, 0.0)
 
     def __call__(self, payload: Floats, enough: Enough) -> Answer:
-        """Return the solver's answer for payloads.
+        """Return the solver's answer for payloads (G,), zero where nobody holds: a claim.
 
-        ``payload`` (G,): n; zero where nobody holds; ``enough``: says of an answer whether the
-        program need not be refined. Result: claimed, not proven.
+        ``enough``: says of an answer whether the program need not be refined.
         """
         if len(self._owner) > GROWN * self._first:
             self._start()
@@ -242,9 +228,5 @@ class HeldEquilibrium:
 
 
 def compile_held(assembly: Assembly, case: Case) -> HeldProgram:
-    """Return the program of an assembly and a case.
-
-    ``assembly``: its grips are all that may ever be held; ``case``: what is asked. Result: to be
-    called with payloads.
-    """
-    return HeldEquilibrium(assembly, case)
+    """Return the program of an assembly, whose grips are all that may ever be held, and a case."""
+    return _HeldEquilibrium(assembly, case)

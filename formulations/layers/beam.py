@@ -27,9 +27,8 @@ from seqopt.problem.problem import Aim
 def solve(problem: PlacementProblem, *, watch: Watch | None = None, width: int = 5) -> Selection:
     """Return the best choice found with a beam.
 
-    ``problem``: its sums are used; ``watch``: says when to stop, and is told what is found;
-    ``width``: how many partial choices are kept, from 1. Result: without a bound. Raises
-    `InfeasibleError` if no choice is allowed; `ProblemError` if the width is below 1.
+    ``width``: how many partial choices are kept, from 1. Raises `InfeasibleError` if no choice is
+    allowed; `ProblemError` if the width is below 1.
     """
     if width < 1:
         raise ProblemError(f"beam: width is {width}; give a whole number from 1")
@@ -45,10 +44,7 @@ def solve(problem: PlacementProblem, *, watch: Watch | None = None, width: int =
 
 
 def _beam(problem: PlacementProblem, width: int, watch: Watch) -> tuple[int, ...] | None:
-    """Return the best choice of the beam; the greedy one if no kept one leads on.
-
-    None if time is over.
-    """
+    """Return the best choice of the beam, the greedy one if none leads on; None if time is over."""
     costs = problem.sums
     good = costs.continuable()
     paths: list[tuple[int, ...]] = [()]
@@ -70,10 +66,7 @@ def _beam(problem: PlacementProblem, width: int, watch: Watch) -> tuple[int, ...
 
 
 def _greedy(problem: PlacementProblem, watch: Watch) -> tuple[int, ...] | None:
-    """Return the choice that takes, move by move, the candidate that is cheapest now.
-
-    None if time is over.
-    """
+    """Return the choice that takes the candidate that is cheapest now; None if time is over."""
     costs = problem.sums
     good = costs.continuable()
     choice: list[int] = []

@@ -39,10 +39,8 @@ def solve(
 ) -> Selection:
     """Return the choices of the cascade.
 
-    ``problem``: its sums are used; ``watch``: says when to stop, and is told what is found;
     ``charge``: which of two moves answers for the step that they share: ``later`` or ``earlier``.
-    Result: without a bound. Raises `InfeasibleError` if no choice is allowed; `ProblemError` if the
-    charge is neither.
+    Raises `InfeasibleError` if no choice is allowed; `ProblemError` if the charge is neither.
     """
     if charge not in CHARGES:
         raise ProblemError(f"cascade: charge is {charge!r}; give one of {', '.join(CHARGES)}")

@@ -27,7 +27,7 @@ candidate is left, and this is dynamic programming.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -51,8 +51,7 @@ AT_ONCE = 2_000_000  # pairs of a label and a candidate that are looked at toget
 LOOK_BACK = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)  # earlier labels that one is compared with
 
 
-@dataclass(frozen=True, eq=False)
-class _Labels:
+class _Labels(NamedTuple):
     """Choices of the first moves.
 
     ``at`` is their last candidate, ``priced`` what they cost with prices, ``cost`` without,
@@ -65,12 +64,11 @@ class _Labels:
     taken: Floats
     back: Ints
 
-    def __getitem__(self, rows: Ints | Bools) -> _Labels:
-        return _Labels(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+    def of(self, rows: Ints | Bools | slice) -> _Labels:
+        return _Labels._make(each[rows] for each in self)
 
 
-@dataclass(frozen=True, eq=False)
-class _Ground:
+class _Ground(NamedTuple):
     """What a pass needs: priced arcs, and the least cost and amounts to the end."""
 
     paths: PricedPaths
@@ -85,11 +83,10 @@ def solve(
 ) -> Selection:
     """Return the exact optimum within the budgets, or the best choice that was met.
 
-    ``problem``: its sums and budgets are used; ``watch``: says when to stop, and is told what is
-    found; ``most``: how many labels are kept at a move, from 1. Result: with bound and prices. It
-    has stopped early if more labels than ``most`` were needed. Raises `InfeasibleError` if no
-    choice is allowed, or none is within all budgets; `ProblemError` if ``most`` is below 1;
-    `SolverError` if it had to stop before it met any choice within the budgets.
+    ``most``: how many labels are kept at a move, from 1; it has stopped early if more were needed.
+    Result: with bound and prices. Raises `InfeasibleError` if no choice is allowed, or none is
+    within all budgets; `ProblemError`, `SolverError` if ``most`` is below 1, or it had to stop
+    before it met any choice within the budgets.
     """
     if most < 1:
         raise ProblemError(f"labels: most is {most}; give a whole number from 1")
@@ -116,15 +113,15 @@ def _search(
     """Return the best choice within the budgets, and a bound: infinite where there is none."""
     ground = _ground(paths, priced.prices)
     best, bound = priced.best, priced.bound
+    cost = best.cost if best else np.inf
     width = min(NARROW, most)
     while not watch.over:
-        limit = best.cost if best else np.inf
-        met, left = _pass(ground, limit, width, watch)
-        if met is not None and met.cost < limit:
-            best = met
-        bound = max(bound, min(left, best.cost if best else np.inf))
-        watch.tell(best.cost * paths.scale if best else np.inf, bound * paths.scale)
-        if width >= most or bound >= (best.cost if best else np.inf):
+        met, left = _pass(ground, cost, width, watch)
+        if met is not None and met.cost < cost:
+            best, cost = met, met.cost
+        bound = max(bound, min(left, cost))
+        watch.tell(cost * paths.scale, bound * paths.scale)
+        if width >= most or bound >= cost:
             break
         width = min(width * WIDER, most)
     return best, bound
@@ -165,13 +162,8 @@ def _pass(ground: _Ground, limit: float, width: int, watch: Watch) -> tuple[Path
 
 def _extended(ground: _Ground, k: int, now: _Labels, limit: float) -> _Labels:
     """Return the labels of the next move that may lead to less than a limit, within the budgets."""
-    parts = list(_extensions(ground, k, now, limit))
-    return _Labels(
-        *(
-            np.concatenate([getattr(part, name) for part in parts])
-            for name in _Labels.__dataclass_fields__
-        )
-    )
+    parts = zip(*_extensions(ground, k, now, limit), strict=True)
+    return _Labels._make(map(np.concatenate, parts))
 
 
 def _extensions(ground: _Ground, k: int, now: _Labels, limit: float) -> Iterator[_Labels]:
@@ -180,7 +172,7 @@ def _extensions(ground: _Ground, k: int, now: _Labels, limit: float) -> Iterator
     tight = limit - ROUNDING * max(abs(limit), 1.0) if np.isfinite(limit) else limit
     size = max(1, AT_ONCE // arc.shape[1])
     for start in range(0, len(now.at), size):
-        part = now[np.arange(start, min(start + size, len(now.at)))]
+        part = now.of(slice(start, start + size))
         whole = part.priced[:, None] + priced[part.at]
         row, to = np.nonzero(whole + ground.rest[k + 1] < tight)
         at = part.at[row]
@@ -196,7 +188,7 @@ def _narrowed(ground: _Ground, k: int, labels: _Labels, width: int) -> tuple[_La
         return labels, np.inf
     bounds = labels.priced + ground.rest[k + 1][labels.at]
     order = np.argpartition(bounds, width)
-    return labels[np.sort(order[:width])], float(bounds[order[width]])
+    return labels.of(np.sort(order[:width])), float(bounds[order[width]])
 
 
 def _undominated(labels: _Labels) -> _Labels:
@@ -204,15 +196,14 @@ def _undominated(labels: _Labels) -> _Labels:
 
     Not every such label is found; with one budget all are.
     """
-    order = np.lexsort((*labels.taken.T[::-1], labels.cost, labels.at))
-    at, taken = labels.at[order], labels.taken[order]
-    beaten = np.zeros(len(order), dtype=bool)
+    ordered = labels.of(np.lexsort((*labels.taken.T[::-1], labels.cost, labels.at)))
+    at, taken = ordered.at, ordered.taken
     if taken.shape[1] == 1:
-        beaten = _beaten(at, taken[:, 0])
+        return ordered.of(~_beaten(at, taken[:, 0]))
+    beaten = np.zeros(len(at), dtype=bool)
     for back in LOOK_BACK:
-        if taken.shape[1] != 1 and back < len(order):
-            beaten[back:] |= (at[back:] == at[:-back]) & (taken[:-back] <= taken[back:]).all(axis=1)
-    return labels[order[~beaten]]
+        beaten[back:] |= (at[back:] == at[:-back]) & (taken[:-back] <= taken[back:]).all(axis=1)
+    return ordered.of(~beaten)
 
 
 def _beaten(at: Ints, taken: Floats) -> Bools:

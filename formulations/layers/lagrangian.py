@@ -42,8 +42,7 @@ ROUNDS = 3  # of doing so
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
     """Return the best choice that was met, with bound and prices.
 
-    ``problem``: its sums and budgets are used; ``watch``: says when to stop, and is told what is
-    found. Raises `InfeasibleError` if no choice is allowed, or prices prove that none is within all
+    Raises `InfeasibleError` if no choice is allowed, or prices prove that none is within all
     budgets; `SolverError` if no choice within the budgets was met; there may be one.
     """
     watch = watch or Watch()

@@ -23,11 +23,7 @@ from seqopt.problem.problem import Aim
 
 
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
-    """Return a choice whose worst cost is least.
-
-    ``problem``: its peaks are used; ``watch``: says when to stop, and is told what is found.
-    Result: its bound is its value. Raises `InfeasibleError` if no choice is allowed.
-    """
+    """Return a choice of least peak; an `InfeasibleError` says that no choice is allowed."""
     costs = problem.peaks
     costs.continuable()
     if (watch or Watch()).over:

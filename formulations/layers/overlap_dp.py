@@ -25,11 +25,7 @@ from seqopt.problem.problem import Aim
 
 
 def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
-    """Return the exact optimum of the sum over the build.
-
-    ``problem``: its sums are used; ``watch``: says when to stop, and is told what is found. Result:
-    its bound is its value. Raises `InfeasibleError` if no choice is allowed.
-    """
+    """Return the exact optimum of the sum; an `InfeasibleError` says that no choice is allowed."""
     watch = watch or Watch()
     costs = problem.sums
     costs.continuable()

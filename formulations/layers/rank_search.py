@@ -36,10 +36,8 @@ MOST = 20_000_000  # combinations in one enumeration: 160 MB
 def solve(problem: PlacementProblem, *, watch: Watch | None = None, horizon: int = 2) -> Selection:
     """Return the committed choices.
 
-    ``problem``: its sums are used; ``watch``: says when to stop, and is told what is found;
-    ``horizon``: how many moves are enumerated at once, from 1. Result: without a bound. Raises
-    `InfeasibleError` if no choice is allowed; `ProblemError` if the horizon is below 1, or there
-    are more combinations than `MOST`.
+    ``horizon``: how many moves are enumerated at once, from 1. Raises `InfeasibleError` if no
+    choice is allowed; `ProblemError` if it is below 1, or combinations are more than `MOST`.
     """
     watch = watch or Watch()
     costs = problem.sums

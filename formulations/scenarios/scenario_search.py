@@ -5,9 +5,17 @@ r"""The least worst or tail total over scenarios: weights of scenarios, then all
    \min_{o_1, \dots, o_K} \; \max_{w \in W} \sum_s w_s \, c_s(o), \qquad
    W = \Bigl\{ w \ge 0 : \sum_s w_s = 1, \; w_s \le \bar w \Bigr\}
 
-with the totals :math:`c_s` of a choice in every scenario. The best weights
-(`formulations.scenarios.scenario_weights`) leave a gap, which is closed here. They prove a bound
-for every beginning of a choice: what it costs so far, weighed, and the least from there on.
+with the totals :math:`c_s` of a choice in every scenario: the worst total for :math:`\bar w = 1`,
+the mean of the worst for less. Weights come first,
+
+.. math::
+
+   \max_{w \in W} \; \min_{o_1, \dots, o_K} \; \sum_s w_s \, c_s(o) .
+
+At fixed weights the cheapest choice is a shortest path, which dynamic programming finds; its value
+is a bound on the value of any choice. Every choice is a plane over the weights, and the highest
+point below all planes met so far is asked for next. The best weights leave a gap. They prove a
+bound for every beginning of a choice: what it costs so far, weighed, and the least from there on.
 Beginnings whose bound is not below the best choice are left out; where too many remain, those with
 the highest bounds are, and the least of these bounds stays a bound on what was not looked at.
 """
@@ -16,36 +24,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
+from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import linprog
 
-from formulations.scenarios.scenario_weights import Weighed, best_weights
 from seqopt.arrays import Floats, Ints
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, SolverError
 from seqopt.graph.scenarios import Choice, ScenarioArcs, ScenarioLayers, largest_of, scenario_arcs
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, On, Selection, Watch
 from seqopt.problem.problem import Aim
 
+STEPS = 400  # weights that are tried at most
 WIDTH = 20_000  # beginnings that are kept after every move
-CLOSE = 1e-9  # differences that are none, over the size of the values
+CLOSE = 1e-9  # differences that are none, and of bound and roof, over the size of the values
 NUMBERS = 2e7  # that beginnings with all candidates of the next move may be
 IMPROVED = 50  # choices met that are improved move by move first
 
 
 @dataclass(frozen=True)
 class Searched:
-    """The best choice, and a bound on all.
-
-    ``value``: what the aim makes of its totals; ``bound``: on the value of any choice.
-    """
+    """The best choice, what the aim makes of its totals, and a bound on that of any choice."""
 
     choice: Choice
     value: float
     bound: float
 
 
-@dataclass(frozen=True, eq=False)
-class _Layer:
+class _Layer(NamedTuple):
     """Beginnings of choices: totals so far (n, S), last candidates (n,), whose follower each is."""
 
     totals: Floats
@@ -71,11 +78,10 @@ def solve(problem: ScenarioLayers, *, watch: Watch, width: int = WIDTH) -> Selec
     return Selection(found.choice, found.value, found.bound, weights, end=end)
 
 
-def close_gap(arcs: ScenarioArcs, weighed: Weighed, watch: Watch, width: int = WIDTH) -> Searched:
+def close_gap(arcs: ScenarioArcs, weighed: _Weighed, watch: Watch, width: int = WIDTH) -> Searched:
     """Return the best choice as far as it can be found, with a bound.
 
-    ``weighed``: of `best_weights`; ``watch``: says when to stop, and is told what is found;
-    ``width``: how many beginnings are kept after every move.
+    ``weighed``: of `best_weights`; ``width``: how many beginnings are kept after every move.
     """
     choice, value = weighed.choice, weighed.value
     for start in sorted(weighed.met, key=lambda c: arcs.aim.value(arcs.totals(c)))[:IMPROVED]:
@@ -95,12 +101,11 @@ def close_gap(arcs: ScenarioArcs, weighed: Weighed, watch: Watch, width: int = W
         if values[best] < value:
             choice = _traced(layers, best)
             value = arcs.aim.value(arcs.totals(choice))
-        bound = max(min(bound, value), weighed.bound)
     watch.tell(value, min(bound, value))
     return Searched(choice, value, min(bound, value))
 
 
-def _provers(arcs: ScenarioArcs, weighed: Weighed) -> Floats:
+def _provers(arcs: ScenarioArcs, weighed: _Weighed) -> Floats:
     """Return weights that prove bounds of beginnings, (J, S): the best, and single scenarios."""
     if arcs.aim.most(arcs.scenarios) < 1:
         return weighed.weights[None]
@@ -127,7 +132,7 @@ def _grown(
         if len(kept) > most:
             order = kept[np.argsort(lowest[kept], kind="stable")]
             kept, bound = order[:most], min(bound, float(lowest[order[most]]))
-        layers.append(_Layer(grown.totals[kept], grown.node[kept], grown.parent[kept]))
+        layers.append(_Layer._make(each[kept] for each in grown))
     return layers, bound
 
 
@@ -145,20 +150,73 @@ def _followed(
     provers, to_go = proofs
     parent, node = np.nonzero(~arcs.shut[k][layer.node])
     totals = layer.totals[parent] + arcs.arcs[k][:, layer.node[parent], node].T
-    lowest = np.full(len(node), -np.inf)
-    for weights, rest in zip(provers, to_go, strict=True):
-        lowest = np.maximum(lowest, totals @ weights + rest[node])
-    return _Layer(totals, node, parent), lowest
+    bounds = (totals @ w + rest[node] for w, rest in zip(provers, to_go, strict=True))
+    return _Layer(totals, node, parent), reduce(np.maximum, bounds)
 
 
 def _traced(layers: Sequence[_Layer], last: int) -> Choice:
     """Return the choice that ends with one of the last beginnings."""
     choice: list[int] = []
-    at = last
     for layer in reversed(layers[1:]):
-        choice.append(int(layer.node[at]))
-        at = int(layer.parent[at])
-    return tuple(reversed(choice))
+        choice.insert(0, int(layer.node[last]))
+        last = int(layer.parent[last])
+    return tuple(choice)
+
+
+@dataclass(frozen=True, eq=False)
+class _Weighed:
+    """The weights (S,) with the highest bound, and the best choice that was met, with its value."""
+
+    weights: Floats
+    bound: float
+    choice: Choice
+    value: float
+    met: tuple[Choice, ...]
+
+
+def best_weights(arcs: ScenarioArcs, watch: Watch) -> _Weighed:
+    """Return the weights whose bound is highest, and the best choice met on the way.
+
+    ``arcs``: some choice is allowed. Raises `SolverError` if the highest point below the planes is
+    not found.
+    """
+    count = arcs.scenarios
+    ask = best = np.full(count, 1.0 / count)
+    bound = -np.inf
+    met: dict[Choice, Floats] = {}
+    for step in range(STEPS):
+        choice, value = arcs.cheapest(ask)
+        met[choice] = arcs.totals(choice)
+        if value > bound:
+            best, bound = ask, value
+        watch.tell(arcs.aim.value(met[choice]), bound)
+        if watch.over:
+            break
+        highest, roof = _highest(np.array([*met.values()]), arcs.aim.most(count))
+        if roof - bound <= CLOSE * max(abs(roof), abs(bound)):
+            break
+        ask = highest if step % 2 == 0 else 0.5 * (highest + best)
+    values = {choice: arcs.aim.value(totals) for choice, totals in met.items()}
+    chosen = min(values, key=values.__getitem__)
+    return _Weighed(best, bound, chosen, values[chosen], tuple(met))
+
+
+def _highest(totals: Floats, most: float) -> tuple[Floats, float]:
+    """Return the weights at which the lowest plane of totals (n, S) is highest, and its height."""
+    planes, count = totals.shape
+    size = float(np.abs(totals).max()) or 1.0
+    found = linprog(
+        [*[0.0] * count, -1.0],
+        np.hstack([-totals / size, np.ones((planes, 1))]),
+        np.zeros(planes),
+        [[*[1.0] * count, 0.0]],
+        [1.0],
+        bounds=[*[(0.0, most)] * count, (None, None)],
+    )
+    if found.x is None or found.fun is None or not found.success:
+        raise SolverError(f"weights of scenarios: {found.message}; rescale the costs")
+    weights = np.clip(found.x[:count], 0.0, most)
+    return np.asarray(weights / weights.sum()), float(-found.fun) * size
 
 
 FORMULATION = Formulation(

@@ -7,19 +7,18 @@ what no path stays below; see `on_graph`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from heapq import heappop, heappush
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from operator import le
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, TimeUpError
 from seqopt.graph.budgets import Within, within_budgets
-from seqopt.graph.explore import Explorer, Key, Visited
+from seqopt.graph.explore import Explorer, Visited
 from seqopt.graph.graph import Graph
 from seqopt.graph.orders import AllOrders, OrderSelection, OrderStates, TooManySetsError, Trial
 from seqopt.graph.orders import worth as worth_of
@@ -38,17 +37,15 @@ WIDTH = 50  # new states of a brick count from which the narrow search goes on
 MOST_PARTS = 5000  # sets of bricks with a newest one, of all orders
 COPIES = 2.0  # of what is kept, that are needed at once while it grows
 
-_Values = tuple[float, ...]
 Watching = Callable[[Explorer], None]
 Search = Callable[[States], StatePath]
 
 
 class Choice(NamedTuple):
-    """A path through a graph, and what its formulation claims of it.
+    """A path through a graph, its start left out and empty where none was found in time.
 
-    ``path``: its states, the start left out; none where no path was found in time; ``bounds``: what
-    no path stays below in the first goals, those before each being at their values; ``stopped``:
-    whether time was over before all was found.
+    ``bounds``: what no path stays below in the first goals, those before each being at their
+    values; ``stopped``: whether time was over before all was found.
     """
 
     path: tuple[int, ...]
@@ -60,6 +57,38 @@ class StopError(Exception):
     """Time or memory that was given is used up; says which."""
 
 
+@dataclass(frozen=True)
+class _OnGraph:
+    """The ``solve`` of a formulation that chooses a path through the graph of states."""
+
+    name: str
+    choose: Callable[[Graph, Watch], Choice]
+
+    def __call__(
+        self,
+        problem: States | AllOrders,
+        *,
+        seconds: float = np.inf,
+        max_memory: float = np.inf,
+        progress: Tell = lambda _: None,
+        resources: Resources = HERE,
+    ) -> StatePath | OrderSelection:
+        """Return the plan of the chosen path; where time or memory ends early, a first plan.
+
+        Raises a `ProblemError` if there are budgets.
+        """
+        watch, told = Watch(seconds), resources.progress or progress
+        if isinstance(problem, AllOrders):
+            asked = watched(problem.states, watch, max_memory, told)
+            return best_order(problem, self.choose, watch, asked)
+        if problem.budgets:
+            raise ProblemError(
+                f"formulation {self.name}: it takes no budgets; take schedule_search or path_beam"
+            )
+        tell = watched(problem, watch, max_memory, told)
+        return after_margins(problem, lambda rest: _chosen(rest, self.choose, watch, tell), tell)
+
+
 def on_graph(
     name: str,
     summary: str,
@@ -68,33 +97,11 @@ def on_graph(
 ) -> Formulation:
     """Return the formulation of states that chooses a path through the graph of states.
 
-    ``name``, ``summary``: what it is called, and what it does in a few words; ``choose``: returns a
-    `Choice` of a graph whose moves are all on paths from the start to an end; stops when a
-    `seqopt.plan.calling.formulation.Watch` says so; ``kind``: what it promises. Result: it takes no
-    budgets; its options are ``seconds`` and ``max_memory``. If its first goal is a peak, the graph
-    has the states below that of a first plan, by a narrow search. Where time or memory ends early,
-    that plan is returned.
+    ``choose``: returns a `Choice` of a graph whose moves are all on paths from the start to an end;
+    stops when a `Watch` says so. If its first goal is a peak, the graph has the states below that
+    of a first plan, by a narrow search.
     """
-
-    def solve(
-        problem: States | AllOrders,
-        *,
-        seconds: float = np.inf,
-        max_memory: float = np.inf,
-        progress: Tell = lambda _: None,
-        resources: Resources = HERE,
-    ) -> StatePath | OrderSelection:
-        watch, told = Watch(seconds), resources.progress or progress
-        if isinstance(problem, AllOrders):
-            asked = watched(problem.states, watch, max_memory, told)
-            return best_order(problem, choose, watch, asked)
-        if problem.budgets:
-            raise ProblemError(
-                f"formulation {name}: it takes no budgets; take schedule_search or path_beam"
-            )
-        tell = watched(problem, watch, max_memory, told)
-        return after_margins(problem, lambda rest: _chosen(rest, choose, watch, tell), tell)
-
+    solve = _OnGraph(name, choose)
     return Formulation(name, summary, kind, None, solve, on=On.STATES, also=(On.ORDERS,))
 
 
@@ -157,7 +164,7 @@ def _chosen(
     stopped = ("interrupt" if watch.interrupted else "time") * choice.stopped
     if choice.path:
         values = worth(graph, choice.path)
-        found = selection(Visited(graph, states), Best(choice.path, values))
+        found = _selection(Visited(graph, states), Best(choice.path, values))
     if not choice.path or (first and choice.stopped and first.objective < values):
         found = plan_by_then(first, KeyboardInterrupt() if watch.interrupted else StopError("time"))
     bounds = (*choice.bounds, *[-np.inf] * len(graph.peaks))
@@ -176,87 +183,6 @@ def worth(graph: Graph, path: Sequence[int]) -> tuple[float, ...]:
     moves = [a * graph.states + b for a, b in pairwise((0, *path))]
     kept = np.isin(graph.source.astype(np.int64) * graph.states + graph.target, moves)
     return lexicographic(graph.only(kept)).values
-
-
-def unit_flow(graph: Graph) -> tuple[sparse.csc_array, Floats]:
-    """Return what leaves states (n,) by a flow, and what does: one from the start, at an end.
-
-    Results: ``matrix`` (n, m + e): by move, then by state in which a build may end; ``right`` (n,).
-    """
-    ends, moves = np.flatnonzero(graph.ends), np.arange(len(graph.source))
-    ones = np.ones(len(moves) + len(ends))
-    rows = np.concatenate([graph.source, ends, graph.target])
-    columns = np.concatenate([np.arange(len(ones)), moves])
-    values = np.concatenate([ones, -np.ones(len(moves))])
-    matrix = sparse.csc_array((values, (rows, columns)), shape=(graph.states, len(ones)))
-    return matrix, np.eye(1, graph.states)[0]
-
-
-def best_label(graph: Graph, to_go: Floats, watch: Watch) -> Choice:
-    """Return the best path by labels: of every state the vectors of goals that none other beats.
-
-    ``to_go`` (n, g): what every goal takes at least from a state to an end, and no move makes less.
-
-    Notes
-    -----
-    A label says what goals take of a path to its state and at least of all its continuations. The
-    least one, goal by goal, is continued first. Labels that one of their state or a path to an end
-    is nowhere above are dropped; up to `seqopt.graph.paths.TIED` counts as one.
-    """
-    starts = np.searchsorted(graph.source, np.arange(graph.states + 1)).tolist()
-    targets, amounts = graph.target.tolist(), graph.amounts.tolist()
-    ends, ahead, peaks = graph.ends.tolist(), to_go.tolist(), graph.peaks
-    least = tuple(ahead[0])
-    heap = [(least, 0, (0.0,) * len(peaks), 0, -1)]
-    kept: list[list[_Values]] = [[] for _ in ends]
-    popped: list[tuple[int, int]] = []  # state, and which label it continues
-    best, last = (np.inf,) * len(peaks), -1
-    while heap:
-        if len(popped) % 1000 == 0 and watch.over:
-            return Choice(_back(popped, last), heap[0][0][:1], stopped=True)
-        least, _, taken, state, before = heappop(heap)
-        if not _improves(least, best) or _beaten(least, kept[state]):
-            continue
-        kept[state].append(least)
-        popped.append((state, before))
-        if ends[state]:
-            best, last = taken, len(popped) - 1
-        for move in range(starts[state], starts[state + 1]):
-            to, more = targets[move], _and(peaks, taken, amounts[move])
-            bound = _and(peaks, more, ahead[to])
-            if _improves(bound, best) and not _beaten(bound, kept[to]):
-                heappush(heap, (bound, move, more, to, len(popped) - 1))
-    return Choice(_back(popped, last), best)
-
-
-def _and(peaks: Sequence[bool], first: Sequence[float], then: Sequence[float]) -> _Values:
-    """Return what goals take of two parts of a path together."""
-    pairs = zip(peaks, first, then, strict=True)
-    return tuple([max(a, b) if peak else a + b for peak, a, b in pairs])
-
-
-def _improves(bound: _Values, best: _Values) -> bool:
-    """Return whether values are below the best in a goal, and not above it in those before."""
-    for value, least in zip(bound, best, strict=True):
-        if tied(value) < least:
-            return True
-        if value > tied(least):
-            return False
-    return False
-
-
-def _beaten(bound: _Values, others: list[_Values]) -> bool:
-    """Return whether one of others is nowhere above."""
-    return any(all(map(le, other, bound)) for other in others)
-
-
-def _back(popped: list[tuple[int, int]], last: int) -> tuple[int, ...]:
-    """Return the states of a path by where each label comes from, the start left out."""
-    path = []
-    while last > 0:
-        state, last = popped[last]
-        path.append(state)
-    return tuple(reversed(path))
 
 
 def watched(problem: States, watch: Watch, most: float, progress: Tell) -> Watching:
@@ -325,38 +251,44 @@ def narrow(
         space = FreeStates(problem, regrips=False, standing=standing)
         found = Explorer(space, width, tell, enough)
         if found.rise():
-            if most is not None and not all(map(le, _exact(problem, found)[1].values, most)):
+            best = exact_best(found, problem.budgets)[1]
+            if most is not None and not all(map(le, best.values, most)):
                 return None
-            try:
+            with suppress(InfeasibleError):
                 return best_standing(problem, found)
-            except InfeasibleError:
-                continue
     return None
 
 
 def best_standing(problem: States, found: Explorer) -> StatePath:
-    """Return the best path through visited states that stand as is demanded."""
+    """Return the best path through visited states that stand as is demanded.
+
+    Those on the best path are asked, once; where one falls, it is left out.
+    """
     known: set[tuple[int, ...]] = set()
     while True:
-        visited, best = _exact(problem, found)
-        states = visited.of(best.path)
-        if not problem.demands or not _leave_out(problem, found, states, known):
-            return selection(visited, best)
+        visited, best = exact_best(found, problem.budgets)
+        fallen = False
+        for level, part, state in visited.of(best.path) if problem.demands else ():
+            row = (level, *state.tolist())
+            if row not in known and not problem.stand(level, state[None])[0]:
+                found.close((level, part), state[None])
+                fallen = True
+            known.add(row)
+        if not fallen:
+            return _selection(visited, best)
 
 
-def _exact(problem: States, found: Explorer) -> tuple[Visited, Best | Within]:
+def exact_best(found: Explorer, budgets: Sequence[float] = ()) -> tuple[Visited, Best | Within]:
     """Return the best path through visited states, values close to its own being exact."""
     while True:
         visited = found.graph()
-        if problem.budgets:
-            best: Best | Within = within_budgets(visited.graph, problem.budgets)
-        else:
-            best = lexicographic(visited.graph)
+        graph = visited.graph
+        best = within_budgets(graph, budgets) if budgets else lexicographic(graph)
         if not found.refine(best.values):
             return visited, best
 
 
-def selection(visited: Visited, best: Best | Within) -> StatePath:
+def _selection(visited: Visited, best: Best | Within) -> StatePath:
     """Return a path as a plan, and with it the states that a better one could pass."""
     rows = tuple((level, *state.tolist()) for level, _, state in visited.of(best.path))
     hint = _passable(visited, best.values[0])
@@ -369,31 +301,6 @@ def _passable(visited: Visited, value: float) -> tuple[Ints, ...]:
     """Return the states that paths within a value of the first goal can pass, by brick count."""
     graph, states = visited
     kept = graph.amounts[:, 0] <= tied(value) if graph.peaks[0] else None
-    inside = reached(graph, kept)
-    ends = np.cumsum([len(rows) for _, _, rows in states])
-    return tuple(
-        rows[inside[end - len(rows) : end]] for end, (_, _, rows) in zip(ends, states, strict=True)
-    )
-
-
-def _leave_out(
-    problem: States,
-    found: Explorer,
-    states: list[tuple[int, Key, Ints]],
-    known: set[tuple[int, ...]],
-) -> bool:
-    """Leave out states of a path that do not stand; return whether there were any.
-
-    Those that are known to stand are not asked again; what stands joins them.
-    """
-    fallen = False
-    for level, part, state in states:
-        row = (level, *state.tolist())
-        if row in known:
-            continue
-        if problem.stand(level, state[None])[0]:
-            known.add(row)
-        else:
-            found.close((level, part), state[None])
-            fallen = True
-    return fallen
+    ends = np.cumsum([len(rows) for *_, rows in states])
+    parts = np.split(reached(graph, kept), ends[:-1])
+    return tuple(rows[inside] for (*_, rows), inside in zip(states, parts, strict=True))

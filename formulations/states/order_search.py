@@ -22,7 +22,6 @@ structure, with which every order ends.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -30,6 +29,7 @@ from itertools import islice
 
 import numpy as np
 
+from formulations.states.on_graph import StopError, exact_best
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph.explore import Explorer, Visited
 from seqopt.graph.orders import (
@@ -43,7 +43,7 @@ from seqopt.graph.orders import (
     worth,
 )
 from seqopt.graph.paths import keep_best, lexicographic, reached
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.scene import ORDERS, Order
 from seqopt.work.progress import Stage
@@ -54,52 +54,49 @@ GROWTH = 1.1  # of the threshold
 BETTER = 1e-9  # share by which an order must be better
 
 
-class _StopError(Exception):
-    """Time is used up."""
-
-
 @dataclass
 class _Search:
     """What was found so far."""
 
     problem: AllOrders
-    end: float
+    watch: Watch
     resources: Resources
     order: Order = ()
     value: float = np.inf
     bound: float = -np.inf
     evaluated: int = 0
-    tried: Stage | None = None  # of orders beside the best, how many
-    each: float = 0.0  # share of one of them
+    tries: int = 0  # of orders beside the best, and how many are left
+    left: int = 0
 
     def tell(self, what: object) -> None:
         """Say how far it is; end the search in time."""
         if self.resources.progress is not None:
             self.resources.progress(what)
-        if time.perf_counter() > self.end:
-            raise _StopError
+        if self.watch.over:
+            raise StopError("time")
 
     def tell_bricks(self, found: Explorer) -> None:
         """Say how far all orders are looked at."""
         self.tell(Stage("all orders", found.level / len(self.problem.scene.bricks)))
 
-    def try_order(self, order: Order) -> bool:
-        """Return whether an order is better than the best so far, and keep it if it is."""
-        if not self.problem.allows(order):
-            return False
-        return self.take(order, worth(self.problem, self.trial(order)))
+    def try_order(self, order: Order) -> None:
+        """Keep an order if it is allowed, and better than the best so far."""
+        if self.problem.allows(order):
+            self.take(order, worth(self.problem, self.trial(order)))
 
     def trial(self, order: Order) -> Trial:
         """Return an order to be tried against the best so far; end the search in time."""
         best = f", the best {self.value:.6g}" if self.order else ""
-        self.tell(self.tried or f"{self.evaluated} orders{best}")
+        said: object = f"{self.evaluated} orders{best}"
+        if self.tries:
+            said = Stage("orders beside the best", 1 - self.left / self.tries)
+        self.tell(said)
         return Trial(order, self.value * (1 - BETTER) if np.isfinite(self.value) else np.inf)
 
     def take(self, order: Order, value: float) -> bool:
         """Return whether an order that was tried is better than the best so far, and keep it."""
-        if self.tried is not None:
-            self.tried = replace(self.tried, share=min(1.0, self.tried.share + self.each))
         self.evaluated += 1
+        self.left -= 1
         better = value < self.value
         if better:
             self.order, self.value = order, value
@@ -119,22 +116,23 @@ def solve(
 
     ``most``: pairs of a set of bricks and a newest one, up to which all orders are looked at;
     ``tries``: how many orders are tried where there are more; ``seed``: in which turn; ``seconds``:
-    after which the best order found is returned; ``resources``: who is told how far it is, and who
-    tries orders where not all are looked at; what is found does not depend on it. Raises
-    `InfeasibleError`, `ProblemError`, `TimeUpError` if no order has a plan; a number is none, or no
-    plan was found by the end of the search.
+    after which the best order found is returned; ``resources``: what is found does not depend on
+    them. Raises `InfeasibleError`, `ProblemError`, `TimeUpError` if no order has a plan; a number
+    is none, or no plan was found by the end of the search.
     """
     if most < 0 or tries < 0:
         raise ProblemError(f"options most={most}, tries={tries}: give whole numbers from 0 on")
-    search = _Search(problem, time.perf_counter() + seconds, resources)
+    search = _Search(problem, Watch(seconds), resources)
     try:
         why = _run(search, most, tries, np.random.default_rng(seed))
-    except (_StopError, KeyboardInterrupt) as stop:
-        if not search.order and isinstance(stop, KeyboardInterrupt):
+    except StopError:
+        if not search.order:
+            raise TimeUpError("no order with a plan was found yet; give more") from None
+        why = "time"
+    except KeyboardInterrupt:
+        if not search.order:
             raise
-        why = "time" if isinstance(stop, _StopError) else "interrupt"
-    if not search.order and why == "time":
-        raise TimeUpError("no order with a plan was found yet; give more")
+        why = "interrupt"
     if not search.order:
         raise ProblemError("options most, tries: no order was found with a plan; give more")
     bound = min(search.bound, search.value)
@@ -143,7 +141,8 @@ def solve(
 
 def _run(search: _Search, most: int, tries: int, rng: np.random.Generator) -> str:
     """Search all orders, or try some; return why not all were looked at."""
-    own, *named = _first_orders(search.problem)
+    scene = search.problem.scene
+    own, *named = dict.fromkeys([scene.build_order, *(make(scene) for make in ORDERS.values())])
     search.try_order(own)
     search.bound = whole_bound(search.problem)
     if search.bound >= search.value * (1 - BETTER) or _all_orders(search, most):
@@ -152,15 +151,6 @@ def _run(search: _Search, most: int, tries: int, rng: np.random.Generator) -> st
         search.try_order(order)
     _neighbors(search, tries, rng)
     return "size"
-
-
-def _first_orders(problem: AllOrders) -> Iterator[Order]:
-    """Yield the scene's own order, and those that have names as far as they are allowed."""
-    own = problem.scene.build_order
-    yield own
-    for order in dict.fromkeys(make(problem.scene) for make in ORDERS.values()):
-        if order != own and problem.allows(order):
-            yield order
 
 
 def _all_orders(search: _Search, most: int) -> bool:
@@ -194,11 +184,7 @@ def _all_orders(search: _Search, most: int) -> bool:
 
 def _take_best(search: _Search, found: Explorer) -> None:
     """Keep the best order below the threshold, if it is better than the one that is known."""
-    while True:
-        visited = found.graph()
-        best = lexicographic(visited.graph)
-        if not found.refine(best.values):
-            break
+    visited, best = exact_best(found)
     if best.values[0] < search.value * (1 - BETTER):
         keys = dict.fromkeys(part for _, part, _ in visited.of(_first_ending(visited)))
         search.value = best.values[0]
@@ -218,17 +204,15 @@ def _neighbors(search: _Search, tries: int, rng: np.random.Generator) -> None:
     """Try orders beside the best, until none of them is better or all tries are made."""
     if not search.order:
         return
-    left, better = tries, True
+    search.tries = search.left = tries
+    better = True
     with hire(search.resources.executor, search.resources.workers) as crew:
         work = trying(search.problem, elsewhere=crew is not None)
-        while better and left > 0:
-            before = search.evaluated
-            search.tried, search.each = Stage("orders beside the best", 1 - left / tries), 1 / tries
-            orders = [*islice(_beside(search.order, search.problem, rng), left)]
+        while better and search.left > 0:
+            orders = [*islice(_beside(search.order, search.problem, rng), search.left)]
             trials = map(search.trial, orders)
             with closing(map_ordered(work, trials, crew)) as found:  # ends at the first better one
                 better = any(map(search.take, orders, found))
-            left -= search.evaluated - before
 
 
 def _beside(order: Order, problem: AllOrders, rng: np.random.Generator) -> Iterator[Order]:

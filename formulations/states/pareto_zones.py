@@ -17,12 +17,10 @@ and Vanderpooten, On the representation of the search region in multi-objective 
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 from seqopt.arrays import Bools, Floats
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, On
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.plan.front import FrontProblem, FrontSelection
 from seqopt.work.progress import Tell
 
@@ -32,10 +30,9 @@ def solve(
 ) -> FrontSelection:
     """Return all vectors that no plan dominates, and a plan for each.
 
-    ``seconds``: after which the points found are returned; ``progress``: told in a few words how
-    far the search is. Result: complete unless time was up or the search was interrupted.
+    ``seconds``: after which the points found are returned.
     """
-    end = time.perf_counter() + seconds
+    watch = Watch(seconds)
     zones = np.full((1, len(problem.names)), np.inf)
     points: list[Floats] = []
     plans: list[object] = []
@@ -43,35 +40,29 @@ def solve(
     try:
         while len(zones) and not stopped:
             progress(f"{len(points)} plans found, {len(zones)} regions left")
-            zone, rest = zones[-1], zones[:-1]
-            found = problem.best_below(zone)
-            zones = rest
-            if found is not None:
-                point, plan = found
-                points.append(point)
-                plans.append(plan)
-                zones = split(np.vstack([rest, zone]), point)
-            stopped = "time" if time.perf_counter() > end and len(zones) else ""
+            found = problem.best_below(zones[-1])
+            if found is None:
+                zones = zones[:-1]
+            else:
+                points.append(found[0])
+                plans.append(found[1])
+                zones = _split(zones, found[0])
+            stopped = "time" if watch.over and len(zones) else ""
     except KeyboardInterrupt:
         stopped = "interrupt"
     shape = np.array(points).reshape(-1, len(problem.names))
     return FrontSelection(shape, tuple(plans), stopped)
 
 
-def split(zones: Floats, point: Floats) -> Floats:
-    """Return the search zones that are left once a point is found.
+def _split(zones: Floats, point: Floats) -> Floats:
+    """Return the upper bounds (m, k) of the zones that are left once a point (k,) is found.
 
-    ``zones`` (n, k): their upper bounds; ``point`` (k,). Result (m, k): None of them lies in
-    another one.
+    ``zones`` (n, k). None of the result lies in another one.
     """
     inside = (point < zones).all(axis=1)
     kept = zones[~inside]
-    parts = []
-    for k in range(zones.shape[1]):
-        part = zones[inside].copy()
-        part[:, k] = point[k]
-        parts.append(part)
-    fresh = np.unique(np.concatenate(parts), axis=0)
+    cut = np.eye(zones.shape[1], dtype=bool)[:, None]  # in one number each
+    fresh = np.unique(np.concatenate(np.where(cut, point, zones[inside])), axis=0)
     fresh = fresh[~_within(fresh, kept)]
     alone = [i for i in range(len(fresh)) if not _within(fresh[i : i + 1], np.delete(fresh, i, 0))]
     return np.vstack([kept, fresh[alone]])
@@ -79,8 +70,7 @@ def split(zones: Floats, point: Floats) -> Floats:
 
 def _within(zones: Floats, others: Floats) -> Bools:
     """Return which zones lie in one of others, (n,) bool."""
-    inside = np.asarray((zones[:, None] <= others[None]).all(axis=2))
-    return np.asarray(inside.any(axis=1))
+    return np.asarray(np.all(zones[:, None] <= others[None], axis=2).any(axis=1))
 
 
 FORMULATION = Formulation(

@@ -17,16 +17,10 @@ the least value below which moves connect the start to an end is found by bisect
 from __future__ import annotations
 
 from formulations.states.on_graph import Choice, on_graph
-from seqopt.graph.graph import Graph
 from seqopt.graph.paths import lexicographic
-from seqopt.plan.calling.formulation import Watch
-
-
-def choose(graph: Graph, _: Watch) -> Choice:
-    """Return the best path."""
-    return Choice(*lexicographic(graph))
-
 
 FORMULATION = on_graph(
-    "path_dp", "dynamic programming over all states, one goal after the other", choose
+    "path_dp",
+    "dynamic programming over all states, one goal after the other",
+    lambda graph, _: Choice(*lexicographic(graph)),
 )

@@ -33,6 +33,7 @@ states must have it.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import comb
 from operator import le
@@ -76,14 +77,11 @@ def solve(
 ) -> StatePath:
     """Return the best path.
 
-    ``width``: from how many new states of a brick count the narrow search goes on; ``growth``: by
-    how much the threshold rises from one search to the next, over itself; ``seconds``: after which
-    the best plan found is returned, and what is proven by then; ``max_memory``: bytes that states,
-    moves and responses may take, about; then likewise. By default as many as are free.
-    ``progress``: told as a `seqopt.work.Stage` how far each pass through the bricks is. Result: its
-    bounds are its values, unless time or memory was used up or it was interrupted. Raises
-    `InfeasibleError` if no plan is allowed; `ProblemError`, `TimeUpError` if the width is not
-    positive, or memory or time is up before any plan is found.
+    ``width``: from how many new states of a brick count the narrow search goes on; ``growth``: of
+    the threshold from one search to the next, over itself; ``seconds``, ``max_memory`` (bytes, by
+    default all that are free): after which, or above which, the best plan found is returned, and
+    what is proven by then. Raises `InfeasibleError` if no plan is allowed; `ProblemError`,
+    `TimeUpError` if an option is none, or memory or time is up before any plan is found.
     """
     if width < 1 or not growth > 1:
         raise ProblemError(
@@ -160,10 +158,8 @@ def _best(
         threshold = max(_of_one(problem, options), proven[0])
     while True:
         if wide.rise(threshold):
-            try:
+            with suppress(InfeasibleError):  # of what stands
                 return best_standing(problem, wide)
-            except InfeasibleError:  # of what stands
-                pass
         if wide.excluded == np.inf:
             raise InfeasibleError("no plan is allowed")
         # of a state that every plan would have to pass, or a larger
@@ -210,9 +206,8 @@ def _unproven(found: StatePath, wide: Explorer, proven: float) -> StatePath:
     if not wide.peaks[0] and wide.level:
         graph, states = wide.graph()
         least = distances(graph, graph.amounts[:, 0])
-        count = [len(rows) for level, _, rows in states if level <= wide.level]
-        last = [len(rows) for level, _, rows in states if level == wide.level]
-        bound = float(least[sum(count) - sum(last) : sum(count)].min(initial=np.inf))
+        level = np.repeat([level for level, *_ in states], [len(rows) for *_, rows in states])
+        bound = float(least[level == wide.level].min(initial=np.inf))
     return replace(found, bound=(min(bound, found.objective[0]), *found.bound[1:]))
 
 

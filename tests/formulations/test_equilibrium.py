@@ -16,16 +16,14 @@ import pytest
 
 import formulations.contact.limit_analysis
 from experiments.stability.parts.blocks import stack
-from formulations.contact.limit_analysis import compile_equilibrium
-from formulations.solvers import (
+from formulations.contact.limit_analysis import (
     CONE_OPTIONS,
     ENDS,
-    GAPS,
     SECONDS,
-    minimize,
-    minimize_whole,
+    compile_equilibrium,
     solve_cones,
 )
+from formulations.solvers import GAPS, minimize, minimize_whole
 from seqopt.stability.limit_analysis import CAP, Case, Claim, Sense, limits
 from tests.builders import held
 

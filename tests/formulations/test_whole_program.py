@@ -8,34 +8,21 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from formulations.layers import (
-    assignment_loose,
-    assignment_tight,
-    minimax_arc,
-    minimax_big_m,
-    minimax_layer,
-    overlap_mip,
-)
-from formulations.whole_program import (
+from formulations.layers.exhibits import (
+    MINIMAX_LAYER,
     below,
     flow_of_peaks,
     largest_of_each,
-    solve_whole,
     worst_pairs,
 )
+from formulations.layers.overlap_flow import OVERLAP_MIP
 from seqopt.errors import InfeasibleError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.formulation import End, Watch
+from seqopt.plan.calling.formulation import End, Watch, exhibits
 from seqopt.plan.calling.priced_paths import ACCURACY
 
-PROGRAMS = {
-    module.FORMULATION.name: module
-    for module in (
-        *(assignment_loose, assignment_tight, overlap_mip),
-        *(minimax_arc, minimax_big_m, minimax_layer),
-    )
-}
+PROGRAMS = {OVERLAP_MIP.name: OVERLAP_MIP, **exhibits()}
 
 
 def costs_of(lowest, seed=0):
@@ -50,42 +37,42 @@ def costs_of(lowest, seed=0):
 @pytest.mark.parametrize("lowest", [-9.0, 1.0])
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_the_choice_and_its_bound_are_the_least(name, lowest):
-    costs, module = costs_of(lowest), PROGRAMS[name]
-    problem, aim = CostProblem(costs), module.FORMULATION.aim
+    costs, formulation = costs_of(lowest), PROGRAMS[name]
+    problem, aim = CostProblem(costs), formulation.aim
     least = min(aim.worth(costs, choice) for choice in product(*map(range, costs.sizes)))
-    found = module.solve(problem)
+    found = formulation.solve(problem)
     assert found.end is End.DONE
     assert aim.worth(costs, found.choice) == found.objective == pytest.approx(least, rel=1e-9)
     assert least - 1e-4 * max(abs(least), 9.0) <= found.bound <= least
     told = []
     watch = Watch(progress=told.append)
-    solve_whole(problem, module.write(problem), aim, watch)
+    formulation.solve(problem, watch=watch)
     assert all(one.bound <= least for one in told)
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_without_time_it_is_an_allowed_choice_and_what_is_known_of_the_least(name):
-    costs, module = costs_of(-9.0), PROGRAMS[name]
-    aim = module.FORMULATION.aim
+    costs, formulation = costs_of(-9.0), PROGRAMS[name]
+    aim = formulation.aim
     least = min(aim.worth(costs, choice) for choice in product(*map(range, costs.sizes)))
-    found = module.solve(CostProblem(costs), watch=Watch(time_limit=0.0))
+    found = formulation.solve(CostProblem(costs), watch=Watch(time_limit=0.0))
     assert found.end is End.STOPPED
     assert found.bound <= least <= found.objective == aim.worth(costs, found.choice)
 
 
 def test_a_program_is_itself_and_one_without_a_choice_is_infeasible():
     problem = CostProblem(costs_of(1.0))
-    written = overlap_mip.write(problem)
+    written = OVERLAP_MIP.solve.write(problem)
     with pytest.raises(FrozenInstanceError):
         written.feasible = False
-    assert written != overlap_mip.write(problem)  # each has variables of its own
+    assert written != OVERLAP_MIP.solve.write(problem)  # each has variables of its own
     assert hash(written) == hash(written)
-    assert minimax_layer.write(problem).feasible
+    assert MINIMAX_LAYER.solve.write(problem).feasible
     costs = costs_of(1.0)
     never = tuple(np.full(part.shape, np.inf) for part in costs.shared[1:])
     impossible = CostProblem(LayeredCosts(costs.single, (costs.shared[0], *never)))
     with pytest.raises(InfeasibleError):
-        overlap_mip.write(impossible)
+        OVERLAP_MIP.solve.write(impossible)
 
 
 def test_what_is_read_from_assignments():

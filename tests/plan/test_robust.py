@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 import seqopt
 from formulations.scenarios import scenario_search
 from formulations.scenarios.scenario_program import solve_program
-from formulations.scenarios.scenario_search import Searched, close_gap
-from formulations.scenarios.scenario_weights import best_weights
+from formulations.scenarios.scenario_search import Searched, best_weights, close_gap
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.costs import LayeredCosts

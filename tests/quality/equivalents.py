@@ -116,7 +116,13 @@ EQUIVALENT = (
         "there is this one at least",
     ),
     *(
-        Equivalent("formulations.solvers", "SECONDS", "300.0", size, "when a solver has stalled")
+        Equivalent(
+            "formulations.contact.limit_analysis",
+            "SECONDS",
+            "300.0",
+            size,
+            "when a solver has stalled",
+        )
         for size in ("299.0", "301.0")
     ),
     Equivalent(

@@ -78,7 +78,7 @@ def test_almost_solved_is_counted_and_put_to_the_proof():
 
 def test_a_time_limit_is_a_stall(monkeypatch):
     """The solver itself reaches its limit; that is counted, and no verdict."""
-    monkeypatch.setattr("formulations.solvers.SECONDS", 1e-9)
+    monkeypatch.setattr("formulations.contact.limit_analysis.SECONDS", 1e-9)
     result = assess(ring(20, 5.0, 0.6).assembly(2000.0), DRY)
     assert result.verdict is Verdict.UNDECIDED
     assert (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -47,7 +48,7 @@ def compared(
     """
     among = getattr(criterion, "among", Among.ALL)
     move = choices.moves[-1]
-    if among is Among.ALL or len(choices.moves) == 2 or not _meets(schedule, move):
+    if among is Among.ALL or len(choices.moves) == 2 or (move - 1, move) not in schedule.steps_of:
         return choices
     before, now = (np.array(schedule.moves[k].candidates) for k in (move - 1, move))
     same = before[:, None] == now if after is None else before[after] == now
@@ -55,17 +56,8 @@ def compared(
     return replace(choices, moves=(move - 1, move), responses=responses)
 
 
-def _meets(schedule: Schedule, move: int) -> bool:
-    """Return whether a move shares a step with the one before."""
-    return any(step.moves == (move - 1, move) for step in schedule.steps)
-
-
 def spread_over_pairs(choices: StepChoices, criterion: Criterion) -> Criterion:
-    """Return the criterion by which a step as it is compared is judged.
-
-    ``choices``: from `compared`. Result: that ranks row by row if one open move was spread over
-    pairs.
-    """
+    """Return the criterion of a step from `compared`: by rows if one move was spread over pairs."""
     if len(choices.moves) == len(choices.step.moves) or not isinstance(criterion, RankSum):
         return criterion
     return replace(criterion, ranked=Ranked.CONDITIONAL)
@@ -97,11 +89,9 @@ def window(
 
 
 def possible_after(schedule: Schedule, move: int, before: int) -> Bools:
-    """Return which candidates of a move are possible while the choice before is still held.
+    """Return which candidates (C_k,) of a move are possible after a candidate of the one before.
 
     Responses do not tell where all candidates are impossible: then nothing is known of any.
-
-    ``move``, ``before``: a move, and the candidate chosen for the move before it. Result (C_k,).
     """
     candidates = np.array(schedule.moves[move].candidates)
     if (move - 1, move) not in schedule.steps_of:
@@ -110,10 +100,9 @@ def possible_after(schedule: Schedule, move: int, before: int) -> Bools:
 
 
 def window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepChoices, ...]:
-    """Return the steps that a move decides, solved for its candidates alone.
+    """Return the steps that a move decides after a candidate of the one before, solved anew.
 
-    ``evaluation``: whose responses are not kept; ``move``, ``before``: a move, and the candidate
-    chosen for the move before it. Result: in order.
+    ``evaluation``: whose responses are not kept.
     """
     schedule = evaluation.schedule
     nodes = {move - 1: schedule.moves[move - 1].candidates[before]} if move else {}
@@ -128,17 +117,14 @@ def window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepCho
 
 def by_move(steps: Sequence[StepChoices]) -> Mapping[int, Sequence[StepChoices]]:
     """Return the steps that each move decides: those in which it is the last that is open."""
-    found: dict[int, list[StepChoices]] = {}
+    found = defaultdict[int, list[StepChoices]](list)
     for choices in steps:
-        found.setdefault(choices.moves[-1], []).append(choices)
+        found[choices.moves[-1]].append(choices)
     return found
 
 
 def window_kept(decided: Sequence[StepChoices], before: int) -> tuple[StepChoices, ...]:
-    """Return the steps that a move decides, for its candidates alone, from those of all choices.
-
-    ``before``: the candidate chosen for the move before it. Result: in order.
-    """
+    """Return the steps that a move decides after a candidate of the one before, from all pairs."""
     out = []
     for choices in decided:
         row = before if len(choices.moves) == 2 else slice(None)

@@ -23,7 +23,7 @@ from seqopt.problem.requirements import Criterion
 def floor_of(criterion: Criterion) -> float | None:
     """Return what a step costs at least, from zero.
 
-    Result: None where costs may be negative, depend on what else is looked at, or are not known.
+    None where costs may be negative, depend on what else is looked at, or are not known.
     """
     match criterion:
         case RankSum(ranked=Ranked.CONDITIONAL, among=Among.ALL):
@@ -63,28 +63,35 @@ class PartialCosts(FrozenValue):
     def to_go(self) -> tuple[Floats, ...]:
         """What the rest of the build costs at least, from every candidate on, (C_k,) each."""
         out = [self.single[-1]]
-        for single, rows in zip(self.single[-2::-1], self.rows[:0:-1], strict=True):
-            rest = out[0]
-            onward = np.full(len(single), self.join(self.floor, rest.min()))
-            for before, row in rows.items():
-                onward[before] = self.join(self._at_least(row), rest).min()
-            out.insert(0, self.join(single, onward))
+        for k in range(len(self.single) - 1, 0, -1):
+            onward = self.join(self._pairs(k, self.floor), out[0]).min(axis=1)
+            out.insert(0, self.join(self.single[k - 1], onward))
         return tuple(out)
 
     @cached_property
     def reached(self) -> tuple[Floats, ...]:
         """What the build costs at least up to every candidate, (C_k,) each."""
+        return self._forward(self.floor)
+
+    @cached_property
+    def arrived(self) -> tuple[Floats, ...]:
+        """What the build costs up to every candidate by pairs that are known, (C_k,) each."""
+        return self._forward(np.inf)
+
+    def _forward(self, unknown: float) -> tuple[Floats, ...]:
+        """Return the least cost up to every candidate, pairs that are not known costing so much."""
         out = [self.single[0]]
-        for single, rows in zip(self.single[1:], self.rows[1:], strict=True):
-            so_far = out[-1]
-            open_to = np.ones(len(so_far), dtype=bool)
-            open_to[list(rows)] = False
-            least = self.join(self.floor, so_far[open_to].min(initial=np.inf))
-            arrived = np.full(len(single), least)
-            for before, row in rows.items():
-                np.minimum(arrived, self.join(so_far[before], self._at_least(row)), out=arrived)
-            out.append(self.join(single, arrived))
+        for k, single in enumerate(self.single[1:], start=1):
+            through = self.join(out[-1][:, None], self._pairs(k, unknown))
+            out.append(self.join(single, through.min(axis=0)))
         return tuple(out)
+
+    def _pairs(self, move: int, unknown: float) -> Floats:
+        """Return what pairs of a move cost (C_{k-1}, C_k), those that are not known so much."""
+        out = np.full((len(self.single[move - 1]), len(self.single[move])), unknown)
+        for before, row in self.rows[move].items():
+            out[before] = np.where(np.isnan(row), unknown, row)
+        return out
 
     @property
     def bound(self) -> float:
@@ -96,40 +103,22 @@ class PartialCosts(FrozenValue):
         """The least that a choice costs of which all pairs are known; infinite if there is none."""
         return float(self.arrived[-1].min())
 
-    @cached_property
-    def arrived(self) -> tuple[Floats, ...]:
-        """What the build costs up to every candidate by pairs that are known, (C_k,) each."""
-        out = [self.single[0]]
-        for single, rows in zip(self.single[1:], self.rows[1:], strict=True):
-            by_pairs = np.full(len(single), np.inf)
-            for before, row in rows.items():
-                np.fmin(by_pairs, self.join(out[-1][before], row), out=by_pairs)
-            out.append(self.join(single, by_pairs))
-        return tuple(out)
-
     def promise(self, move: int) -> Floats:
-        """Return the least that a choice can cost by a candidate of the move before, from its row.
+        """Return the least that a choice by each candidate of the move before can cost (C_{k-1},).
 
-        ``move``: from 1. Result (C_{k-1},): infinite where the row is known.
+        Infinite where its row is known.
         """
         out = self.join(self.reached[move - 1], self.join(self.floor, self.to_go[move].min()))
         out[list(self.rows[move])] = np.inf
         return np.asarray(out)
 
     def worth_a_look(self, move: int, before: int) -> Bools:
-        """Return which candidates of a move, after one of the move before, could still be better.
-
-        Result (C_k,).
-        """
+        """Return which candidates (C_k,), after one of the move before, could still be better."""
         least = self.join(self.reached[move - 1][before], self.join(self.floor, self.to_go[move]))
         return np.asarray(least < self.best)
 
     def known(self) -> tuple[LayeredCosts, tuple[tuple[int, ...], ...]]:
-        """Return the costs of choices of which all pairs are known.
-
-        Results: ``costs``: over the candidates that are left; ``candidates``: of every move, which
-        of its candidates they are.
-        """
+        """Return the costs of choices whose pairs are all known, and which candidates are left."""
         last = tuple(range(len(self.single[-1])))
         left = (*(tuple(sorted(rows)) for rows in self.rows[1:]), last)
         single = tuple(own[list(kept)] for own, kept in zip(self.single, left, strict=True))
@@ -138,9 +127,6 @@ class PartialCosts(FrozenValue):
             found = np.array([rows[b][list(now)] for b in before]).reshape(len(before), len(now))
             shared.append(np.where(np.isnan(found), np.inf, found))
         return LayeredCosts(single, tuple(shared)), left
-
-    def _at_least(self, row: Floats) -> Floats:
-        return np.where(np.isnan(row), self.floor, row)
 
 
 def least_possible(costs: PartialCosts) -> float:

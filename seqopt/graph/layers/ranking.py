@@ -86,25 +86,24 @@ def least_among_least(first: LayeredCosts, second: LayeredCosts) -> float:
     ``first``, ``second``: of the same choices. Result: infinite if no choice is allowed.
     """
     arcs = [shared + single for shared, single in zip(first.shared, first.single, strict=True)]
-    reached, ways = np.zeros(1), []
-    for arc in arcs:
-        ways.append(reached)
-        reached = (reached[:, None] + arc).min(axis=0)
-    least = float(reached.min())
-    kept = on_a_least_path(arcs, ways, least + TIED_SUMS * max(abs(least), TINY))
-    total = np.zeros(1)
+    total, kept = np.zeros(1), on_a_least_path(arcs)
     for single, shared, mask in zip(second.single, second.shared, kept, strict=True):
         total = np.where(mask, total[:, None] + shared + single, np.inf).min(axis=0)
     return float(total.min())
 
 
-def on_a_least_path(arcs: Sequence[Floats], ways: Sequence[Floats], most: float) -> list[Bools]:
-    """Return which pairs lie on a path of at most a cost, move by move.
+def on_a_least_path(arcs: Sequence[Floats], size: float = TINY) -> list[Bools]:
+    """Return which pairs (C_{k-1}, C_k) lie on a path of least cost, move by move.
 
     ``arcs`` (sequence of (C_{k-1}, C_k) float): what a pair and its later choice cost together;
-    ``ways`` (sequence of (C_{k-1},) float): the least cost up to every candidate of the move
-    before. Result (list of (C_{k-1}, C_k) bool).
+    ``size``: of costs: what `TIED_SUMS` is at least relative to.
     """
+    reached, ways = np.zeros(1), []
+    for arc in arcs:
+        ways.append(reached)
+        reached = (reached[:, None] + arc).min(axis=0)
+    least = float(reached.min())
+    most = least + TIED_SUMS * max(abs(least), size)
     to_go = np.zeros(arcs[-1].shape[1])
     out = []
     for arc, way in zip(reversed(arcs), reversed(ways), strict=True):

@@ -7,6 +7,7 @@ lie on a best path. Among these the second aim is minimized, and so on.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
@@ -18,7 +19,7 @@ from seqopt.errors import ProblemError
 from seqopt.graph.layers.costs import TINY, Joined, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.layers.layers import Layers, compared
-from seqopt.graph.layers.ranking import TIED_SUMS, on_a_least_path
+from seqopt.graph.layers.ranking import on_a_least_path
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.problem.problem import Aim
 from seqopt.scene.checks import short
@@ -60,7 +61,7 @@ def solve_in_order(goals: Sequence[tuple[PlacementProblem, Aim]]) -> InOrder:
     _require_same(goals, layers)
     masks = _allowed(layers)
     for costs, (_, aim) in zip(layers, goals, strict=True):
-        masks = (_least_sums if aim is Aim.SUM else _least_peaks)(costs, masks)
+        masks = _best(costs, aim, masks)
     choice: list[int] = []
     for mask in masks:  # pairs without a way on are left out of every mask
         choice.append(int(np.argmax(mask[choice[-1] if choice else 0])))
@@ -83,46 +84,27 @@ def _require_same(
 
 def _allowed(layers: Sequence[LayeredCosts]) -> list[Bools]:
     """Return the pairs that all problems allow and that lie on a path from first to last move."""
-    pairs = [(np.isfinite(a + b).astype(float)) for a, b in _parts(layers[0])]
-    for costs in layers[1:]:
-        pairs = [p * np.isfinite(a + b) for p, (a, b) in zip(pairs, _parts(costs), strict=True)]
-    shut = [np.where(pair > 0, 0.0, np.inf) for pair in pairs]
+    every = (zip(costs.shared, costs.single, strict=True) for costs in layers)
+    shut = [
+        np.where(np.all([np.isfinite(a + b) for a, b in parts], axis=0), 0.0, np.inf)
+        for parts in zip(*every, strict=True)
+    ]
     LayeredCosts(tuple(np.zeros(len(s)) for s in layers[0].single), tuple(shut)).continuable()
-    return on_a_least_path(shut, _ways(shut), 0.0)
+    return on_a_least_path(shut)
 
 
-def _parts(costs: LayeredCosts) -> list[tuple[Floats, Floats]]:
-    return [*zip(costs.shared, costs.single, strict=True)]
-
-
-def _ways(arcs: Sequence[Floats]) -> list[Floats]:
-    """Return the least cost up to every candidate of the move before, move by move."""
-    reached, ways = np.zeros(1), []
-    for arc in arcs:
-        ways.append(reached)
-        reached = (reached[:, None] + arc).min(axis=0)
-    return ways
-
-
-def _least_sums(costs: LayeredCosts, masks: Sequence[Bools]) -> list[Bools]:
-    """Return the pairs of a mask that lie on a path of least sum."""
-    parts = zip(masks, _parts(costs), strict=True)
-    arcs = [np.where(mask, a + b, np.inf) for mask, (a, b) in parts]
-    ways = _ways(arcs)
-    least = float((ways[-1][:, None] + arcs[-1]).min())
-    size = sum(float(np.abs(arc[mask]).max()) for arc, mask in zip(arcs, masks, strict=True))
-    return on_a_least_path(arcs, ways, least + TIED_SUMS * max(abs(least), TINY, 1e-6 * size))
-
-
-def _least_peaks(costs: LayeredCosts, masks: Sequence[Bools]) -> list[Bools]:
-    """Return the pairs of a mask that lie on a path of least peak."""
-    parts = zip(masks, _parts(costs), strict=True)
-    arcs = [np.where(mask, np.maximum(a, b), np.inf) for mask, (a, b) in parts]
+def _best(costs: LayeredCosts, aim: Aim, masks: Sequence[Bools]) -> list[Bools]:
+    """Return the pairs of masks that lie on a path of least sum, or of least peak."""
+    join = np.add if aim is Aim.SUM else np.maximum
+    parts = zip(masks, costs.shared, costs.single, strict=True)
+    arcs = [np.where(mask, join(a, b), np.inf) for mask, a, b in parts]
+    if aim is Aim.SUM:
+        size = sum(float(np.abs(arc[mask]).max()) for arc, mask in zip(arcs, masks, strict=True))
+        return on_a_least_path(arcs, max(TINY, 1e-6 * size))
     reached = np.full(1, -np.inf)
     for arc in arcs:
         reached = np.maximum(reached[:, None], arc).min(axis=0)
-    shut = [np.where(arc <= reached.min(), 0.0, np.inf) for arc in arcs]
-    return on_a_least_path(shut, _ways(shut), 0.0)
+    return on_a_least_path([np.where(arc <= reached.min(), 0.0, np.inf) for arc in arcs])
 
 
 StepCosts = Sequence[tuple[tuple[int, ...], Floats]]
@@ -160,27 +142,22 @@ def least_quantile(problem: Layers, share: float = 0.1) -> StepQuantile:
     sizes = problem.sums.sizes
     most = math.floor(share * len(steps) + 1e-9)
     levels = np.unique(np.concatenate([costs[np.isfinite(costs)] for _, costs in steps]))
-    low, high = 0, len(levels) - 1
-    while low < high:
-        middle = (low + high) // 2
-        if least_sum(_above(steps, sizes, float(levels[middle]))) <= most:
-            high = middle
-        else:
-            low = middle + 1
-    above = _above(steps, sizes, float(levels[low]))
+
+    def kept(level: float) -> bool:
+        return least_sum(_above(steps, sizes, level)) <= most
+
+    level = float(levels[bisect_left(levels, x=True, hi=len(levels) - 1, key=kept)])
+    above = _above(steps, sizes, level)
     goals = [(CostProblem(above), Aim.SUM), (CostProblem(problem.sums), Aim.SUM)]
     found = solve_in_order(goals)
-    return StepQuantile(found.choice, float(levels[low]), round(found.values[0]), len(steps))
+    return StepQuantile(found.choice, level, round(found.values[0]), len(steps))
 
 
 def _step_costs(problem: Layers) -> list[tuple[tuple[int, ...], Floats]]:
     """Return the costs of every open step's choices, with the moves that are open in it."""
-    out = []
-    for steps in problem.evaluation.levels():
-        for choices in steps:
-            faced = compared(choices, problem.schedule, problem.criterion)
-            out.append((faced.moves, problem.step_costs(faced)))
-    return out
+    levels, criterion = problem.evaluation.levels(), problem.criterion
+    faced = (compared(each, problem.schedule, criterion) for steps in levels for each in steps)
+    return [(each.moves, problem.step_costs(each)) for each in faced]
 
 
 def _above(steps: StepCosts, sizes: Sequence[int], level: float) -> LayeredCosts:

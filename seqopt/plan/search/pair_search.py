@@ -22,16 +22,20 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.layers.layers import Layers, pairs_as_moves, possible_after, window
+from seqopt.graph.layers.layers import Layers, pairs_as_moves, possible_after
 from seqopt.graph.layers.partial_costs import PartialCosts, floor_of
 from seqopt.interrupts import answered
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection, Watch
 from seqopt.plan.calling.guard import select
-from seqopt.plan.search.window_search import WindowSearch, search_windows
+from seqopt.plan.search.window_search import (
+    WindowSearch,
+    alone_steps,
+    posed_anew,
+    search_windows,
+    shared_steps,
+)
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.problem import Aim
-from seqopt.responses.resources import Resources
-from seqopt.sequence.schedule import Schedule
 
 FIRST = 2  # rows of every move that are asked for at first
 MORE = 1.5  # by which that grows from one round to the next
@@ -57,20 +61,16 @@ class PairSearch:
     @property
     def objective(self) -> float:
         """What the steps cost that the choice meets."""
-        aim, choice = self.costs.aim, self.selection.choice
-        parts = [
-            aim.costs(problem).single for problem in (self.along.alone, *self.along.shared[1:])
-        ]
-        met = [own[now] for own, now in zip(parts[0], choice, strict=True)]
-        met += [row[now] for (row,), now in zip(parts[1:], choice[1:], strict=True)]
+        aim = self.costs.aim
+        parts = [(aim.costs(problem).single, choice) for problem, choice in self.along.met]
+        met = [own[now] for part in parts for own, now in zip(*part, strict=True)]
         return float(sum(met) if aim is Aim.SUM else max(met))
 
 
 def search_pairs(problem: Layers, formulation: Formulation, watch: Watch) -> PairSearch:
     """Solve a problem exactly, looking only at pairs that could be better than what is known.
 
-    ``problem``: its own responses are not computed; ``formulation``: exact; it is given what is
-    known; ``watch``: says when to stop, and is told every better choice and bound. Raises
+    ``problem``: its own responses are not computed; ``formulation``: is given what is known. Raises
     `InfeasibleError` if no choice is allowed; `ProblemError` if the formulation is not exact, there
     are budgets, or costs have no floor; `TimeUpError` if it is stopped before a choice is known.
     """
@@ -135,17 +135,16 @@ class _Pairs:
         try:
             first = search_windows(problem)
         except SolverError:  # move by move it is a dead end; other choices may lead on
-            steps = tuple(step for step in self._schedule.steps if len(step.moves) == 1)
-            self._alone = _of(problem, replace(self._schedule, steps=steps))
+            self._alone = alone_steps(problem)
             self.models = self._alone.evaluation.models
         else:
             self._alone = first.alone
             self.models = sum(part.evaluation.models for part in (first.alone, *first.shared))
             for k in range(1, len(sizes)):
                 before = first.choice[k - 1]
-                row = self._allowed(k, before, _own(first.shared[k], aim)[0])
+                row = self._allowed(k, before, aim.costs(first.shared[k]).single[0])
                 rows[k].setdefault(before, row)
-        self.costs = PartialCosts(_own(self._alone, aim), tuple(rows), floor, aim)
+        self.costs = PartialCosts(aim.costs(self._alone).single, tuple(rows), floor, aim)
 
     def _free(self, move: int, sizes: Sequence[int]) -> dict[int, Floats]:
         """Return the rows of a move that shares no step with the one before: nothing."""
@@ -157,9 +156,9 @@ class _Pairs:
         """Look at more and more pairs until none could be better, or time is over."""
         watch.tell(self.costs.best, self.costs.bound)
         for count in itertools.count():
-            most = math.ceil(FIRST * MORE**count)
             if _proven(self.costs) or watch.over:
                 return
+            most = math.ceil(FIRST * MORE**count)
             ends = self._aim is Aim.PEAK and count >= BROAD
             asked = self._where_it_ends(AT_END * most) if ends else self._everywhere(most)
             if not asked:
@@ -193,7 +192,7 @@ class _Pairs:
         """Solve rows of pairs, and learn from those that were done before time was over."""
         wanted = [self._wanted(k, before) for k, before in asked]
         schedule = pairs_as_moves(self._schedule, asked, wanted)
-        problem = _of(self._problem, schedule)
+        problem = posed_anew(self._problem, schedule)
         joined = Joined([len(move.candidates) for move in schedule.moves], self.costs.join)
         left = Counter(step.moves[0] for step in schedule.steps)
         with closing(problem.evaluation.levels()) as levels:
@@ -225,23 +224,6 @@ class _Pairs:
 
     def along(self, choice: tuple[int, ...]) -> WindowSearch:
         """Return the steps that a choice meets, as a search move by move would have."""
-        few = self._problem.evaluation.resources.alone()
         nodes = self._problem.nodes(choice)
-        shared = []
-        for k in range(len(choice)):
-            steps = window(self._schedule, k, nodes[:k])
-            shared.append(_of(self._problem, steps, few))
-        return WindowSearch(self._alone, tuple(shared), choice)
-
-
-def _own(problem: Layers, aim: Aim) -> tuple[Floats, ...]:
-    """Return the costs of each move's candidates where it alone is open."""
-    return aim.costs(problem).single
-
-
-def _of(problem: Layers, schedule: Schedule, resources: Resources | None = None) -> Layers:
-    """Return the problem of another schedule, everything else being the same."""
-    evaluation = replace(problem.evaluation, schedule=schedule)
-    if resources is not None:
-        evaluation = replace(evaluation, resources=resources)
-    return replace(problem, evaluation=evaluation)
+        met = tuple(shared_steps(self._problem, k, nodes) for k in range(len(choice)))
+        return WindowSearch(self._alone, met, choice)

@@ -24,11 +24,10 @@ def best_margin(
 ) -> tuple[float, float, States]:
     """Return the best value of the first goal, a margin, and what is left to choose at it.
 
-    ``problem``: whose first goal is about a margin; ``tell``: called with the states that are
-    reached; may raise to end the search. Results: ``value``: with which plans exist in which every
-    state is proven to stand; ``bound``: with which none does; ``rest``: of the goals after it, with
-    the demand that all stand with that value. Raises `InfeasibleError` if there is no plan,
-    whatever the margin.
+    ``tell``: called with the states that are reached; may raise to end the search. Results:
+    ``value``: with which plans exist in which every state is proven to stand; ``bound``: with which
+    none does; ``rest``: of the goals after it, with the demand that all stand with that value.
+    Raises `InfeasibleError` if there is no plan, whatever the margin.
     """
     name = problem.goals[0].response
 

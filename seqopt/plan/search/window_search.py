@@ -10,7 +10,7 @@ window after the other, and knows nothing of what it misses.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 
@@ -22,7 +22,6 @@ from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.layers import Layers, possible_after, window
 from seqopt.plan.calling.formulation import Watch
 from seqopt.responses.choices import StepChoices
-from seqopt.responses.resources import Resources
 from seqopt.sequence.schedule import Schedule
 
 
@@ -51,23 +50,17 @@ class WindowSearch(Terse):
         return [(self.alone, self.choice), *((problem, (now,)) for problem, now in each)]
 
     def costs(self, move: int) -> Floats:
-        """Return what the candidates of a move cost after the choices before it.
-
-        ``move``: index of a move that was chosen. Result (C_k,).
-        """
+        """Return what the candidates of a move cost after the choices before it, (C_k,)."""
         return np.asarray(self.alone.singles[move] + self.shared[move].singles[0])
 
 
 def search_windows(problem: Layers, watch: Watch | None = None) -> WindowSearch:
-    """Choose every open grip of a build, one move after the other.
+    """Choose every open grip of a build, one move after the other, by ascending brick counts.
 
-    Brick counts come in ascending order, each move being chosen as soon as its own steps are known.
-
-    ``problem``: its own responses are not computed; ``watch``: with the time limit; by default
-    there is none. Result: with a choice for every move. Raises `SolverError` if a move has no
-    candidate left after the choices before it, while others may have led on, or if time is over
-    before the last move is chosen; `MemoryShortError` if there is not the memory for what it looks
-    at; `KeyboardInterrupt`, with the nodes that were chosen so far as its text.
+    ``problem``: its own responses are not computed. Raises `SolverError` if a move has no candidate
+    left after the choices before it, while others may have led on, or if time is over before the
+    last move is chosen; `MemoryShortError` if there is not the memory for what it looks at;
+    `KeyboardInterrupt`, with the nodes that were chosen so far as its text.
     """
     walk = _Walk(problem)
     try:
@@ -88,10 +81,7 @@ class _Walk:
 
     def __init__(self, problem: Layers) -> None:
         self._problem, self._schedule = problem, problem.schedule
-        single = tuple(step for step in self._schedule.steps if len(step.moves) == 1)
-        self.alone = _of(
-            problem, replace(self._schedule, steps=single), problem.evaluation.resources
-        )
+        self.alone = alone_steps(problem)
         if self.alone.evaluation.streams:
             raise MemoryShortError(
                 "the responses of steps with one open grip do not fit into the memory that may be "
@@ -122,9 +112,7 @@ class _Walk:
 
     def _ask(self, k: int) -> None:
         """Look at the steps that a move shares with the one before, whose choice is made."""
-        nodes = {k - 1: self._node(k - 1)} if k else {}
-        few = self._problem.evaluation.resources.alone()
-        self.shared.append(_of(self._problem, window(self._schedule, k, nodes), few))
+        self.shared.append(shared_steps(self._problem, k, {k - 1: self._node(k - 1)} if k else {}))
         _ = self.shared[-1].singles
 
     def _node(self, k: int) -> int:
@@ -149,7 +137,21 @@ class _Walk:
         return f"{moves} were chosen, at nodes {chosen}" if chosen else "no move was chosen yet"
 
 
-def _of(problem: Layers, schedule: Schedule, resources: Resources) -> Layers:
+def alone_steps(problem: Layers) -> Layers:
+    """Return the problem of the steps in which one move is open."""
+    steps = tuple(step for step in problem.schedule.steps if len(step.moves) == 1)
+    return posed_anew(problem, replace(problem.schedule, steps=steps))
+
+
+def shared_steps(problem: Layers, move: int, nodes: Sequence[int] | Mapping[int, int]) -> Layers:
+    """Return the problem of the steps that a move shares with the one before, whose node is chosen.
+
+    ``nodes``: chosen for the moves before.
+    """
+    few = replace(problem.evaluation, resources=problem.evaluation.resources.alone())
+    return posed_anew(replace(problem, evaluation=few), window(problem.schedule, move, nodes))
+
+
+def posed_anew(problem: Layers, schedule: Schedule) -> Layers:
     """Return the problem of another schedule, everything else being the same."""
-    evaluation = replace(problem.evaluation, schedule=schedule, resources=resources)
-    return replace(problem, evaluation=evaluation)
+    return replace(problem, evaluation=replace(problem.evaluation, schedule=schedule))
