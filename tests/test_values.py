@@ -29,9 +29,9 @@ from seqopt.engines.rigid.response_maps import ResponseMaps, scene_maps
 from seqopt.network.build import build_network
 from seqopt.network.mechanics import build_statics
 from seqopt.scene.boxes import boxes
-from seqopt.scene.imports.contacts import flat_face
-from seqopt.scene.imports.detection import Surface, touching_faces
+from seqopt.scene.imports.contacts import flat_face, touching_faces
 from seqopt.scene.library.joints import overlaps
+from seqopt.scene.shape import Surface
 from seqopt.stability.assessment import assess, bonded
 from seqopt.stability.held_states import HoldingForces, Known, first_directions
 from seqopt.stability.prover import Prover

@@ -10,6 +10,7 @@ from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frozen, skew
 from seqopt.errors import SceneError
+from seqopt.network.mechanics import spread
 from seqopt.network.network import GROUND
 
 
@@ -63,9 +64,7 @@ class Assembly(FrozenValue):
         blocks = len(self.centroid)
         if not blocks:
             raise SceneError("assembly: it has no blocks; give at least one")
-        if self.bodies.size and not (
-            (self.bodies >= GROUND).all() and (self.bodies < blocks).all()
-        ):
+        if ((self.bodies < GROUND) | (self.bodies >= blocks)).any():
             raise SceneError(f"assembly: bodies name blocks beyond 0 to {blocks - 1}")
         if (self.bodies[:, 1] == GROUND).any():
             raise SceneError("assembly: the ground is a contact's second body; name it first")
@@ -77,8 +76,8 @@ class Assembly(FrozenValue):
     def corner_area(self) -> Floats:
         """Area of the face that each corner represents, (K,) m².
 
-        Half of the two triangles between the face's centroid and the edges that meet in the
-        corner: one more corner on an edge or on a corner changes no sum.
+        Half of the two triangles between the face's centroid and the edges that meet in the corner,
+        so that one more corner on an edge changes no sum.
         """
         corners = np.bincount(self.contact, minlength=len(self.bodies))
         mean = self._sums(self.corner) / np.maximum(corners, 1)[:, None]
@@ -121,10 +120,7 @@ class Assembly(FrozenValue):
 
     @cached_property
     def scales(self) -> tuple[float, float]:
-        """A force (N) and a length (m) of the assembly: its heaviest block, its longest lever.
-
-        Everything is compared in these, so that units and scale change no verdict.
-        """
+        """A force (N) and a length (m) to compare in: the heaviest block, the longest lever."""
         force = float(np.linalg.norm(self.weight, axis=1).max())
         levers = [np.linalg.norm(self.grip_position - self.centroid[self.grip_block], axis=1)]
         for body in self.bodies[self.contact].T:
@@ -141,19 +137,15 @@ class Assembly(FrozenValue):
 
     @cached_property
     def contact_map(self) -> sparse.csr_array:
-        """Wrenches on the blocks from corner forces, (6B, 3K).
+        """Wrenches on the blocks from corner forces on contacts' second bodies, (6B, 3K).
 
-        A corner force acts on the contact's second body and is given by its normal part
-        (compression positive) and its two tangential parts. Wrenches are taken about the
-        centroids, moments divided by the length scale.
+        Forces have a normal part (compression positive) and two tangential ones; wrenches are about
+        the centroids, their moments over the length scale.
         """
         axes = self.axes[self.contact]
-        bodies = self.bodies[self.contact]
-        parts = [
-            self._wrenches(bodies[:, i], self.corner, sign * axes)
-            for i, sign in ((0, -1.0), (1, 1.0))
-        ]
-        return frozen(sparse.csr_array(parts[0] + parts[1]))
+        first, second = self.bodies[self.contact].T
+        on_first = self._wrenches(first, self.corner, -axes)
+        return frozen(sparse.csr_array(on_first + self._wrenches(second, self.corner, axes)))
 
     @cached_property
     def grip_map(self) -> sparse.csr_array:
@@ -167,17 +159,10 @@ class Assembly(FrozenValue):
         arm = (point[real] - self.centroid[block[real]]) / self.scales[1]
         force = axes[real].transpose(0, 2, 1)
         values = np.concatenate([force, skew(arm) @ force], axis=1)
-        rows = np.broadcast_to(6 * block[real, None, None] + np.arange(6)[:, None], values.shape)
-        columns = np.broadcast_to(3 * real[:, None, None] + np.arange(3), values.shape)
-        entries = (values.ravel(), (rows.ravel(), columns.ravel()))
-        return sparse.csr_array(entries, shape=(6 * len(self.centroid), 3 * len(block)))
+        return spread(block[real], real, values, (len(self.centroid), len(block)))
 
     def load(self, direction: Vector | None = None) -> Floats:
-        """Return the weights as wrenches over the force scale.
-
-        ``direction``: every block is pulled this way as hard as it weighs; down by default. Result
-        (6B,).
-        """
+        """Return weights, or as much along a direction, as wrenches (6B,) over the force scale."""
         pull = self.weight
         if direction is not None:
             pull = np.linalg.norm(self.weight, axis=1, keepdims=True) * np.array(direction)

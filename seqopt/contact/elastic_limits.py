@@ -1,10 +1,7 @@
 """Elastic limits: whether the stress in joints stays below the strength of their mortar.
 
-The wrench (force and moment) of a joint is distributed linearly over its face: force over area,
-moment over second moment. The stress is largest at the corners, so it is checked there: tension
-against the tensile strength, and shear against cohesion and friction.
-
-A face is also a bed of points here, on which the wrench of its joint acts.
+The wrench of a joint is distributed linearly over its face, force over area and moment over second
+moment, and checked at the corners, where the stress is largest.
 """
 
 from __future__ import annotations
@@ -19,6 +16,7 @@ from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import Mortar
 from seqopt.network.mechanics import point_motion
 from seqopt.network.network import Network
+from seqopt.scene.shape import fans
 
 _CUTS = 2  # times that each triangle of a face is cut into four
 
@@ -33,17 +31,15 @@ class Quadrature(FrozenValue):
 
 
 def face_quadrature(assembly: Assembly, cuts: int = _CUTS) -> Quadrature:
-    """Return the bed of all contacts.
+    """Return the bed of all contacts, in their order.
 
-    Faces are cut into triangles, each into four ``cuts`` times; the middles of a triangle's edges
-    with a third of its area each integrate squares exactly.
-
-    Result: faces in ascending order.
+    The middles of the edges of triangles, each cut into four ``cuts`` times, integrate squares
+    exactly.
     """
     triangles, face = [], []
     for c in range(len(assembly.bodies)):
         corner = assembly.corner[assembly.contact == c]
-        fan = [np.array([corner[0], corner[i], corner[i + 1]]) for i in range(1, len(corner) - 1)]
+        fan = [*corner[fans([range(len(corner))])]]
         for _ in range(cuts):
             fan = [part for triangle in fan for part in _quarters(triangle)]
         triangles += fan
@@ -64,21 +60,18 @@ def _quarters(triangle: Floats) -> list[Floats]:
 
 
 def opening_maps(assembly: Assembly, points: Floats, face: Ints, center: Floats) -> Floats:
-    """Return the motions of points for unit twists of their faces' second bodies.
+    """Return the motions (P, 3, 6) of points for unit twists of their faces' second bodies.
 
-    ``points`` (P, 3). ``face`` (P,): the contact of every point. ``center`` (C, 3): where the
-    twists of the C faces are taken, m; their axes are the scene's. Result (P, 3, 6): normal part
-    first, then two tangential ones (`Assembly.axes`).
+    ``points`` (P, 3), ``face`` (P,): with their contacts; ``center`` (C, 3): where twists are
+    taken, m. The parts of a motion are along `Assembly.axes`.
     """
-    axes = assembly.axes[face]
-    return np.asarray(axes @ point_motion(points - center[face]))
+    return np.asarray(assembly.axes[face] @ point_motion(points - center[face]))
 
 
 def quadrature_stiffness(bed: Quadrature, maps: Floats, moduli: Floats) -> Floats:
-    """Return the stiffness of the beds of C faces at their centers.
+    """Return the stiffness (C, 6, 6) of the beds of faces at their centers, N/m and N m/rad.
 
-    ``bed``: its faces in ascending order; ``maps`` (P, 3, 6): from `opening_maps`; ``moduli`` (C,
-    2): normal and tangential, N/m³. Result (C, 6, 6): N/m and N m/rad.
+    ``maps`` (P, 3, 6): from `opening_maps`; ``moduli`` (C, 2): normal and tangential, N/m³.
     """
     slope = bed.area[:, None] * moduli[bed.face][:, [0, 1, 1]]
     each = np.einsum("pij,pi,pik->pjk", maps, slope, maps)
@@ -86,11 +79,7 @@ def quadrature_stiffness(bed: Quadrature, maps: Floats, moduli: Floats) -> Float
 
 
 def first_points(face: Ints, faces: int) -> Ints:
-    """Return the first point of every face.
-
-    ``face`` (P,): the face of every point, ascending; ``faces``: how many there are. Result
-    (faces,).
-    """
+    """Return the first point of every face. ``face`` (P,): of every point, ascending."""
     return np.searchsorted(face, np.arange(faces))
 
 
@@ -114,11 +103,7 @@ class ElasticLimits(FrozenValue):
     stress: Floats
 
     def excess(self, wrench: Floats) -> Floats:
-        """Return by how much wrenches exceed the limits of the joints.
-
-        ``wrench`` (S, J, 6): as of `seqopt.engines.interface.Fields`, N and N m. Result (S, J): Pa;
-        negative is within.
-        """
+        """Return by how much wrenches (S, J, 6) exceed the limits of the joints, (S, J), Pa."""
         face, mortar = self.assembly.contact, self.mortar
         stress = np.einsum("kij,skj->ski", self.stress, wrench[:, face])
         shear = np.linalg.norm(stress[..., 1:], axis=2)
@@ -130,10 +115,7 @@ class ElasticLimits(FrozenValue):
         return np.asarray(np.where(np.any(wrench, axis=2), most, -np.inf))
 
     def exceeded(self, wrench: Floats) -> Bools:
-        """Return which grip sets leave the elastic limits anywhere, beyond rounding.
-
-        ``wrench`` (S, J, 6): as of `excess`. Result (S,).
-        """
+        """Return which grip sets (S,) leave the elastic limits anywhere, beyond rounding."""
         margin = _STRESS_MARGIN * self.assembly.stress_scale
         if self._bound(wrench) <= margin:  # as a rule, and a tenth of the work
             return np.zeros(len(wrench), dtype=bool)

@@ -1,16 +1,13 @@
 """The faces where bricks touch, and a step of a build as an assembly of rigid blocks.
 
-Faces are projected onto the plane of their joint before their overlap is taken, so that bricks
-meters apart, or one inside the other, would have a contact like any others. What lies between the
-faces is the joint's thickness: none where bricks are laid dry, at most `THICKEST` of the smallest
-dimension of the bricks, or what the joint itself says. Faces that are not quite parallel meet in
-places; everything is measured in the middle of the overlap.
+Faces are projected onto the plane of their joint, so what lies between them is checked: the joint's
+thickness, if it says one, else at most `THICKEST` of the smallest dimension of the bricks, in the
+middle of the overlap.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,59 +21,45 @@ _OVERLAP = 0.05  # by which bricks may interpenetrate, over their smallest dimen
 _BESIDE = 0.5  # by which a joint's position may lie beside the faces, over the same
 
 
-@dataclass(frozen=True)
-class _JointSpace:
-    """Where a joint lies between the faces of its bricks.
+def _require_touching(
+    name: str, bricks: Sequence[Brick], ends: tuple[float, float], beside: float, thickness: float
+) -> None:
+    """Require bricks, one on the ground or two, that touch through a joint.
 
-    ``bricks``: one on the ground, or two. ``ends``: where the faces of the first body and of the
-    last are along the joint's normal, from its plane and in the middle of the overlap, m.
-    ``beside``: how far its position lies outside the overlap, m; negative inside. ``thickness``:
-    what the scene says, m; NaN if it does not.
+    ``ends``: their faces along the joint's normal, from its plane; ``beside``: its position from
+    the overlap, negative inside; ``thickness``: as the scene says, else NaN; all in m.
     """
-
-    name: str
-    bricks: tuple[Brick, ...]
-    ends: tuple[float, float]
-    beside: float
-    thickness: float
-
-    def require_touching(self) -> None:
-        """Raise an error unless the bricks touch through the joint.
-
-        Raises `SceneError` if they are too far apart, interpenetrate, or the joint lies elsewhere.
-        """
-        size = min(min(brick.dimensions) for brick in self.bricks)
-        apart, slack = self.ends[1] - self.ends[0], _OVERLAP * size
-        inside = max(self.ends[0], -self.ends[1])
-        if apart < -slack:
-            raise SceneError(
-                f"joint {self.name}: its bricks interpenetrate by {-1e3 * apart:.3g} mm, more than "
-                f"{1e3 * slack:.3g} mm; move them apart"
-            )
-        if inside > slack:
-            raise SceneError(
-                f"joint {self.name}: its plane lies {1e3 * inside:.3g} mm inside a brick; "
-                "move its position between the faces"
-            )
-        most = THICKEST * size if np.isnan(self.thickness) else self.thickness + slack
-        if apart > most:
-            raise SceneError(
-                f"joint {self.name}: there are {1e3 * apart:.3g} mm between its faces, more than "
-                f"{1e3 * most:.3g} mm; move the bricks together or give the joint its thickness"
-            )
-        if self.beside > _BESIDE * size:
-            raise SceneError(
-                f"joint {self.name}: its position lies {1e3 * self.beside:.3g} mm beside the faces "
-                "that it joins; move it between them"
-            )
+    size = min(min(brick.dimensions) for brick in bricks)
+    apart, slack = ends[1] - ends[0], _OVERLAP * size
+    inside = max(ends[0], -ends[1])
+    most = THICKEST * size if np.isnan(thickness) else thickness + slack
+    wrong = ""
+    if apart < -slack:
+        wrong = (
+            f"its bricks interpenetrate by {-1e3 * apart:.3g} mm, more than "
+            f"{1e3 * slack:.3g} mm; move them apart"
+        )
+    elif inside > slack:
+        wrong = (
+            f"its plane lies {1e3 * inside:.3g} mm inside a brick; "
+            "move its position between the faces"
+        )
+    elif apart > most:
+        wrong = (
+            f"there are {1e3 * apart:.3g} mm between its faces, more than "
+            f"{1e3 * most:.3g} mm; move the bricks together or give the joint its thickness"
+        )
+    elif beside > _BESIDE * size:
+        wrong = (
+            f"its position lies {1e3 * beside:.3g} mm beside the faces "
+            "that it joins; move it between them"
+        )
+    if wrong:
+        raise SceneError(f"joint {name}: {wrong}")
 
 
 def face_distance(brick: Brick, normal: Floats, point: Floats) -> float:
-    """Return how far along a normal the face of a brick lies that looks against it.
-
-    ``normal`` (3,): unit vector that points into the brick; ``point`` (3,): from where, m. Result:
-    m; negative if the point lies inside.
-    """
+    """Return how far from a point the face of a brick lies along a normal into it, m."""
     frame = brick.frame
     i = int(np.abs(frame @ normal).argmax())
     outward = -np.sign(frame[i] @ normal) * frame[i]
@@ -85,11 +68,7 @@ def face_distance(brick: Brick, normal: Floats, point: Floats) -> float:
 
 
 def distance_beside(polygon: Floats) -> float:
-    """Return how far the origin lies outside a convex polygon.
-
-    ``polygon`` (m, 2): corners counterclockwise, m. Result: m; negative inside. Of the lines of its
-    edges: beside a corner it is somewhat farther.
-    """
+    """Return how far the origin lies outside the edges of a convex polygon (m, 2), m."""
     edge = np.roll(polygon, -1, axis=0) - polygon
     size = np.linalg.norm(edge, axis=1)
     real = size > 0
@@ -101,10 +80,7 @@ _SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
 
 
 class Contacts(dict[int, tuple[str, Floats, Floats]]):
-    """Contacts of a network by their springs, each found when it is first asked for.
-
-    A name, a normal (3,) and the corners (m, 3) of a face, m.
-    """
+    """Names, normals (3,) and corners (m, 3) of contacts by springs, found when first asked for."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
@@ -195,30 +171,22 @@ def _contact(network: Network, spring: int) -> tuple[str, Floats, Floats]:
     if len(springs.face[spring]):
         return name, springs.axes[spring, 0], springs.face[spring]
     between = [placed[b] for b in (first, second) if b != GROUND]
-    _require_boxes(name, between)
-    point = springs.position[spring]
-    axes = _oriented(springs.axes[spring], point, between)
-    common = _overlap(axes, point, between, name)
-    middle = point + _centroid(common) @ axes[1:]
-    before = -face_distance(between[0], -axes[0], middle) if len(between) > 1 else 0.0
-    _JointSpace(
-        name=name,
-        bricks=tuple(between),
-        ends=(before, face_distance(between[-1], axes[0], middle)),
-        beside=distance_beside(common),
-        thickness=float(springs.thickness[spring]),
-    ).require_touching()
-    return name, axes[0], np.asarray(point + common @ axes[1:])
-
-
-def _require_boxes(name: str, between: list[Brick]) -> None:
-    """Raise an error if faces cannot be told from the shapes of bricks."""
     for brick in between:
         if brick.shape is not None:
             raise SceneError(
                 f"joint {name}: brick {brick.name} is not a box and the joint has no "
                 "face; give it one"
             )
+    point = springs.position[spring]
+    axes = _oriented(springs.axes[spring], point, between)
+    common = _overlap(axes, point, between, name)
+    middle = point + _centroid(common) @ axes[1:]
+    before = -face_distance(between[0], -axes[0], middle) if len(between) > 1 else 0.0
+    ends = (before, face_distance(between[-1], axes[0], middle))
+    _require_touching(
+        name, between, ends, distance_beside(common), float(springs.thickness[spring])
+    )
+    return name, axes[0], np.asarray(point + common @ axes[1:])
 
 
 def _oriented(axes: Floats, point: Floats, between: list[Brick]) -> Floats:
@@ -230,11 +198,9 @@ def _oriented(axes: Floats, point: Floats, between: list[Brick]) -> Floats:
 
 def _overlap(axes: Floats, point: Floats, between: list[Brick], name: str) -> Floats:
     """Return the corners (m, 2) of the overlap of the bricks' faces in a contact's plane."""
-    flat = [(_face(brick, axes[0], point) - point) @ axes[1:].T for brick in between]
-    common = _ordered(flat[0])
-    for other in flat[1:]:
-        common = _clip(common, _ordered(other))
-    size = min(_polygon_area(_ordered(face)) for face in flat)
+    flat = [_ordered((_face(brick, axes[0], point) - point) @ axes[1:].T) for brick in between]
+    common = flat[0] if len(flat) == 1 else _clip(*flat)
+    size = min(map(_polygon_area, flat))
     if len(common) < 3 or not _polygon_area(common) > _SLIVER * size:
         raise SceneError(
             f"joint {name}: the faces of its bricks do not overlap along its normal; "

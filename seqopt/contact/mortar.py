@@ -64,9 +64,7 @@ MORTARS = {"epoxy": EPOXY, "dry": DRY}
 
 
 def bond_mortar(strength: float, friction: float = _FRICTION) -> Mortar:
-    """Return the mortar of a bond with the same strength in tension and in shear.
-
-    ``strength``: Pa. Raises `SceneError` if a number is negative or not finite.
+    """Return the mortar of a bond with the same strength in tension and in shear, Pa.
 
     Examples
     --------
@@ -77,10 +75,7 @@ def bond_mortar(strength: float, friction: float = _FRICTION) -> Mortar:
 
 
 def find_mortar(mortar: Mortar | str) -> Mortar:
-    """Return a mortar, by name or itself.
-
-    ``mortar``: a mortar, a name of `MORTARS`, or ``bond=STRENGTH`` with a strength in Pa.
-    """
+    """Return a mortar: itself, by a name of `MORTARS`, or as ``bond=STRENGTH``, in Pa."""
     if isinstance(mortar, Mortar):
         return mortar
     if mortar in MORTARS:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,7 @@ from seqopt.scene.scene import Scene, in_order
 _EQUALLY_FAR = 1e-6  # inner nodes whose distances from a joint differ by no larger share
 
 
-@dataclass(frozen=True)
-class _Node:
+class _Node(NamedTuple):
     name: object
     kind: PartKind
     since: int
@@ -26,8 +25,7 @@ class _Node:
     brick: int = -1
 
 
-@dataclass(frozen=True)
-class _Edge:
+class _Edge(NamedTuple):
     nodes: tuple[object, object]
     kind: PartKind
     since: int
@@ -67,13 +65,11 @@ def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Net
     names = _joint_names(springs)
     nodes, edges = _of_bricks(scene)
     for s, (spring, since) in enumerate(springs):
-        ends = spring.bricks if isinstance(spring, Joint) else (spring.brick,)
-        name, first = names[s], min(index_of[b] for b in ends) + 1
-        nodes.append(_Node(name, PartKind.JOINT, first, spring.position, s))
+        name, ends = names[s], [index_of[b] for b in spring.ends]
+        nodes.append(_Node(name, PartKind.JOINT, min(ends) + 1, spring.position, s))
         for b in ends:
-            brick = scene.placed[index_of[b]]
-            met = (_nearest(brick, spring), name)
-            edges.append(_Edge(met, PartKind.JOINT, index_of[b] + 1, index_of[b], s))
+            met = (_nearest(scene.placed[b], spring), name)
+            edges.append(_Edge(met, PartKind.JOINT, b + 1, b, s))
         if isinstance(spring, Ground):
             base = ("base", *name[1:])
             nodes.append(_Node(base, PartKind.BASE, since, spring.anchor, s))
@@ -117,10 +113,9 @@ def _springs(scene: Scene, index_of: dict[int, int]) -> list[tuple[Joint | Groun
 
 def _since(spring: Joint | Ground, index_of: dict[int, int]) -> int:
     """Return the brick count from which a spring acts."""
-    if isinstance(spring, Joint):
-        return max(index_of[b] for b in spring.bricks) + 1
-    closes = spring.brick if spring.closes_with is None else spring.closes_with
-    return max(index_of[spring.brick], index_of[closes]) + 1
+    closes = spring.closes_with if isinstance(spring, Ground) else None
+    ends = spring.ends if closes is None else (*spring.ends, closes)
+    return max(index_of[b] for b in ends) + 1
 
 
 def _joint_names(springs: list[tuple[Joint | Ground, int]]) -> list[tuple[object, ...]]:
@@ -156,7 +151,7 @@ def _arrays(
             since=np.array([since for _, since in springs]),
             node=np.array([index[name] for name in _joint_names(springs)]),
             position=np.array([spring.position for spring, _ in springs]),
-            anchor=np.array([_anchor(spring) for spring, _ in springs]),
+            anchor=np.array([getattr(s, "anchor", s.position) for s, _ in springs]),
             axes=_axes(springs, index_of),
             translational_stiffness=np.array([s.translational_stiffness for s, _ in springs]),
             rotational_stiffness=np.array([s.rotational_stiffness for s, _ in springs]),
@@ -196,17 +191,10 @@ def _support(
 ) -> Ints:
     """Return the places of the scene's ground ends among springs sorted by when they act."""
     order = np.argsort([_since(ground, index_of) for ground in scene.grounds], kind="stable")
-    out = np.empty(len(order), dtype=np.int64)
-    out[order] = [i for i, (spring, _) in enumerate(springs) if isinstance(spring, Ground)]
-    return out
+    found = [i for i, (spring, _) in enumerate(springs) if isinstance(spring, Ground)]
+    return np.array(found, dtype=np.int64)[np.argsort(order)]
 
 
-def _bodies(spring: Joint | Ground, index_of: dict[int, int]) -> tuple[int, int]:
-    if isinstance(spring, Joint):
-        a, b = sorted(index_of[name] for name in spring.bricks)
-        return a, b
-    return GROUND, index_of[spring.brick]
-
-
-def _anchor(spring: Joint | Ground) -> tuple[float, float, float]:
-    return spring.anchor if isinstance(spring, Ground) else spring.position
+def _bodies(spring: Joint | Ground, index_of: dict[int, int]) -> list[int]:
+    """Return the two bodies of a spring, the ground or the lower one first."""
+    return sorted([GROUND, *(index_of[b] for b in spring.ends)][-2:])

@@ -16,10 +16,10 @@ from seqopt.network.network import GROUND, Network, PartKind
 
 
 def point_motion(arm: Floats) -> Floats:
-    """Return the displacements of points of a body for its unit twists.
+    """Return the displacements (..., 3, 6) of points of a body for its unit twists.
 
-    ``arm`` (..., 3): from the body's reference point to the point, m. Result (..., 3, 6): ``[I,
-    -skew(arm)]``; its transpose takes forces at the points to wrenches.
+    ``arm`` (..., 3): from the body's reference point, m. The transpose takes forces at the points
+    to wrenches.
     """
     shift = np.broadcast_to(np.eye(3), (*arm.shape, 3))
     return np.concatenate([shift, -skew(arm)], axis=-1)
@@ -46,22 +46,19 @@ def node_motion(network: Network, bricks: int) -> sparse.csr_array:
     node, brick, share = _followers(network, bricks)
     block = point_motion(network.node_position[node] - network.centroid[brick])
     shape = (network.count_nodes(bricks), bricks)
-    return _spread(node, brick, share[:, None, None] * block, shape)
+    return spread(node, brick, share[:, None, None] * block, shape)
 
 
 def _followers(network: Network, bricks: int) -> tuple[Ints, Ints, Floats]:
     """Return which node follows which brick by which share."""
     springs = network.springs
     kind = network.node_kind[: network.count_nodes(bricks)]
-    inner, joint = (
-        np.flatnonzero(kind == PartKind.INNER.value),
-        np.flatnonzero(kind == PartKind.JOINT.value),
-    )
+    inner = np.flatnonzero(kind == PartKind.INNER.value)
+    joint = np.flatnonzero(kind == PartKind.JOINT.value)
     spring = network.node_spring[joint]
     bodies = springs.bodies[spring]
-    acts = springs.since[spring] <= bricks
     there = (bodies != GROUND) & (bodies < bricks)
-    share = np.where(acts[:, None], 0.5, 1.0) * there
+    share = np.where(springs.since[spring] <= bricks, 0.5, 1.0)[:, None] * there
     row, side = np.nonzero(there)
     node = np.concatenate([inner, joint[row]])
     brick = np.concatenate([network.node_brick[inner], bodies[row, side]])
@@ -71,12 +68,11 @@ def _followers(network: Network, bricks: int) -> tuple[Ints, Ints, Floats]:
 def deformation(
     bodies: Ints, at: Floats, center: Floats, axes: Floats | None = None
 ) -> sparse.csr_array:
-    """Return the twists of second bodies against first ones for unit twists of all bodies.
+    """Return the twists (6s, 6n) of second bodies against first ones for unit twists of all.
 
-    ``bodies`` (s, 2): first and second body of every spring; `GROUND` does not move. ``at`` (s, 3):
-    the point at which each twist is taken, m. ``center`` (n, 3): reference points of the bodies, m.
-    ``axes`` (s, 3, 3): rows are the axes in which each twist is given; by default those of the
-    scene. Result (6s, 6n).
+    ``bodies`` (s, 2): of every spring; `GROUND` does not move. ``at`` (s, 3): where each twist is
+    taken; ``center`` (n, 3): reference points of bodies, m; ``axes`` (s, 3, 3): rows in which
+    twists are given, by default those of the scene.
     """
     spring, side = np.nonzero(bodies != GROUND)
     body = bodies[spring, side]
@@ -87,14 +83,11 @@ def deformation(
         turn = np.zeros((len(axes), 6, 6))
         turn[:, :3, :3] = turn[:, 3:, 3:] = axes
         block = turn[spring] @ block
-    return _spread(spring, body, block, (len(bodies), len(center)))
+    return spread(spring, body, block, (len(bodies), len(center)))
 
 
 def spring_stiffness(network: Network, which: Ints) -> Floats:
-    """Return the stiffness of springs in the scene's axes.
-
-    ``which`` (s,): springs of the network. Result (s, 6, 6): N/m and N m/rad.
-    """
+    """Return the stiffness (s, 6, 6) of springs (s,) in the scene's axes, N/m and N m/rad."""
     springs = network.springs
     stiffness = np.zeros((len(which), 6, 6))
     for row, s in enumerate(which):
@@ -105,11 +98,7 @@ def spring_stiffness(network: Network, which: Ints) -> Floats:
 
 
 def spring_maps(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
-    """Return what stiffness matrices are assembled from, dense and spring by spring.
-
-    Results: ``acting`` (s,): the springs that act; ``gap`` (s, 6, 6b): their `deformation` for unit
-    twists of the bricks, in the scene's axes; ``stiffness`` (s, 6, 6): N/m and N m/rad.
-    """
+    """Return which springs act (s,), their `deformation` (s, 6, 6b) and stiffness (s, 6, 6)."""
     springs = network.springs
     acting = springs.acting(bricks)
     center = network.centroid[:bricks]
@@ -118,7 +107,7 @@ def spring_maps(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
     return acting, gap.toarray().reshape(len(acting), 6, 6 * bricks), stiffness
 
 
-def _spread(row: Ints, column: Ints, block: Floats, shape: tuple[int, int]) -> sparse.csr_array:
+def spread(row: Ints, column: Ints, block: Floats, shape: tuple[int, int]) -> sparse.csr_array:
     """Return the sparse matrix of blocks (m, p, q) at block rows and columns (m,)."""
     down, across = block.shape[1:]
     rows = np.broadcast_to(down * row[:, None, None] + np.arange(down)[:, None], block.shape)
@@ -163,16 +152,14 @@ def build_statics(network: Network) -> Statics:
     """
     axis, kind, spring = network.edge_axis, network.edge_kind, network.edge_spring
     springs = network.springs
-    outer = np.flatnonzero(kind != PartKind.INNER.value)
-    on_first = (springs.bodies[spring[outer], 0] == network.edge_brick[outer]) & (
-        kind[outer] == PartKind.JOINT.value
-    )
-    sign = np.where(on_first, -1.0, 1.0)[:, None]
     inner = np.flatnonzero(kind == PartKind.INNER.value)
-    inner_edge = np.empty(len(network.inner), dtype=np.int64)
-    inner_edge[network.edge_brick[inner]] = inner
+    outer = np.flatnonzero(kind != PartKind.INNER.value)
     half = kind[outer] == PartKind.JOINT.value
     brick = network.edge_brick[outer]
+    on_first = half & (springs.bodies[spring[outer], 0] == brick)
+    sign = np.where(on_first, -1.0, 1.0)[:, None]
+    inner_edge = np.empty(len(network.inner), dtype=np.int64)
+    inner_edge[network.edge_brick[inner]] = inner
     arrives = half & (network.edge_nodes[outer, 0] == network.inner[brick, 1])
     through = inner_edge[brick[arrives]]
     rows = np.concatenate([outer, through])
@@ -183,16 +170,7 @@ def build_statics(network: Network) -> Statics:
     moment = np.tile(np.eye(6), (len(support), 1, 1))
     moment[:, 3:, :3] = skew(springs.position[support] - springs.anchor[support])
     return Statics(
-        edge_of_spring=_by_threes(rows, columns, values, (len(axis), len(springs.since))),
-        edge_of_load=_by_threes(inner, second, axis[inner], (len(axis), network.inner.size)),
+        edge_of_spring=spread(rows, columns, values[:, None], (len(axis), len(springs.since))),
+        edge_of_load=spread(inner, second, axis[inner][:, None], (len(axis), network.inner.size)),
         support_of_spring=moment,
     )
-
-
-def _by_threes(
-    rows: np.ndarray, columns: np.ndarray, values: Floats, shape: tuple[int, int]
-) -> sparse.csr_array:
-    """Return a sparse matrix whose row vectors of three stand at columns 3c, 3c+1, 3c+2."""
-    spread = (3 * columns[:, None] + np.arange(3)).ravel()
-    entries = (values.ravel(), (np.repeat(rows, 3), spread))
-    return sparse.csr_array(entries, shape=(shape[0], 3 * shape[1]))

@@ -1,12 +1,8 @@
-"""The double-cross network: nodes and edges, and with which brick each appears.
+"""The double-cross network of section 3.2.1 of Bruun et al., its parts sorted by brick count.
 
-Every brick has an inner edge between its two inner nodes. Every joint splits the connection of
-two bricks into two half-edges that meet in a joint node; a half-edge whose other brick is not
-placed yet is a free stub. A ground end adds a stub from its joint node to a fixed base node.
-Source: section 3.2.1 of Bruun et al.
-
-Bricks, nodes, edges and springs are sorted by the brick count that brings them, so those of a
-partial structure are the first ones of each array.
+Every brick has an inner edge. Every joint splits the connection of two bricks into half-edges that
+meet in a joint node; a ground end adds a stub to a fixed base node. So the parts of a partial
+structure come first in every array.
 """
 
 from __future__ import annotations
@@ -32,12 +28,7 @@ _OFF_PLANE = 1e-9  # lever of a weight about the line of its nodes treated as ze
 
 
 def _shared_weight(brick: Brick, weight: Floats) -> Floats:
-    """Return forces at a brick's two inner nodes that act on it as its weight does.
-
-    ``brick``: with nodes of its own; ``weight`` (3,): at the centroid, N. Result (2, 3): N. Raises
-    `SceneError` if the weight turns the brick about the line through its nodes: two forces there
-    cannot.
-    """
+    """Return forces (2, 3) at a brick's inner nodes that act on it as its weight (3,) does, N."""
     first, second = (np.subtract(brick.node_position(node), brick.position) for node in brick.nodes)
     span, middle = 0.5 * (second - first), 0.5 * (first + second)
     moment = -np.cross(middle, weight)  # of the weight about the middle between the nodes
@@ -189,11 +180,7 @@ class Network(Shown, FrozenValue):
 
     @cached_property
     def inner_weight(self) -> Floats:
-        """What of its brick's weight every inner node bears, (2B, 3), N; order of ``inner``.
-
-        Half, where nodes lie on either side of the centroid, as far. Elsewhere two forces that
-        share the weight and have its moment.
-        """
+        """What of its brick's weight every inner node bears, (2B, 3), N; order of ``inner``."""
         half = np.repeat(0.5 * self.weight, 2, axis=0)
         for i, brick in enumerate(self.scene.placed):
             if brick.node_offsets is not None:
@@ -217,7 +204,7 @@ class Network(Shown, FrozenValue):
 
     @cached_property
     def index_of_grip(self) -> tuple[Ints, Ints]:
-        """Numbers of all inner nodes, (2B,) ascending, and their indices in ``inner.ravel()``.
+        """Numbers of inner nodes, (2B,) ascending, and their indices in ``inner.ravel()``.
 
         A node that must not be held has an index after all others.
         """
@@ -235,21 +222,12 @@ class Network(Shown, FrozenValue):
         return int(np.searchsorted(self.edge_since, bricks, side="right"))
 
     def plot(self, bricks: int | None = None) -> Figure:
-        """Draw the network, or its part of the first bricks.
-
-        ``bricks``: how many, in build order; all by default. Result: a notebook shows it;
-        ``savefig`` writes it to a file. Raises `ExtraError` if matplotlib is not installed (extra
-        ``plot``).
-        """
+        """Draw the network, or its part of the first ``bricks``, in build order."""
         figure: Figure = display("network_picture")(self, bricks)
         return figure
 
     def graph(self, bricks: int) -> nx.Graph[object]:
-        """Return a partial structure as a graph.
-
-        Result: nodes carry ``kind`` and ``position`` (m), edges ``number`` (from 1), ``kind`` and
-        ``length`` (m).
-        """
+        """Return a partial structure as a graph, with kinds, positions and lengths, m."""
         import networkx as nx  # noqa: PLC0415  # slow to import, and needed nowhere else
 
         graph: nx.Graph[object] = nx.Graph(name=self.scene.name, bricks=bricks)

@@ -6,14 +6,15 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.scene.boxes import as_vector
+from seqopt.scene.boxes import as_vector, spring_fields
 from seqopt.scene.checks import short
-from seqopt.scene.parts import THICKEST, Anywhere, Brick, Ground, Joint, Reach, Robot, Side
+from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot, Side
 from seqopt.scene.scene import Scene
 
 _LEFT = np.array([0.0, 1.0, 0.0])
@@ -143,8 +144,8 @@ def arch_scene(
     >>> arch_scene(ArchShape(pitch=(1.2, 0.6, 0.0, -0.6, -1.2), pattern="V"), "small")
     <Scene small: 5 bricks, 4 joints, 2 ground ends, 3 robots>
     """
-    tangent, left, ends = _axes(shape)
-    bricks = _bricks(shape, (tangent, left, ends), line_nodes or {})
+    axes = tangent, _, ends = _axes(shape)
+    bricks = _bricks(shape, axes, line_nodes or {})
     bisector = tangent[:-1] + tangent[1:]
     joints = [_joint(shape, b, ends[b], bisector[b - 1]) for b in range(1, len(bricks))]
     grounds = [_ground(shape, 1, ends[0], tangent[0], -1.0)]
@@ -163,21 +164,18 @@ def arch_scene(
 
 
 def _robots_beside(shape: ArchShape) -> tuple[Robot, ...]:
-    """Return three robots for an arch: one on either side, and a mobile one that reaches all.
+    """Return three robots, each for the whole arch: one on either side, and one that reaches all.
 
     Those beside it reach its line, but not the far ends of bricks that stick out to the other side.
-    Each can bear the weight of the whole arch: give robots of your own to have payloads that bind.
     """
     beyond = shape.overhang + 0.25 * shape.dimensions[1]
     weight = math.prod(shape.dimensions) * shape.density * STANDARD_GRAVITY * len(shape.pitch)
-    reaches: tuple[Reach, ...] = (
-        Side(toward=(0.0, 1.0, 0.0), point=(0.0, -beyond, 0.0)),
-        Side(toward=(0.0, -1.0, 0.0), point=(0.0, beyond, 0.0)),
-        Anywhere(),
-    )
-    return tuple(
-        Robot(name=f"rob{i}", payload=weight, reach=reach)
-        for i, reach in enumerate(reaches, start=1)
+    left = Side(toward=(0.0, 1.0, 0.0), point=(0.0, -beyond, 0.0))
+    right = Side(toward=(0.0, -1.0, 0.0), point=(0.0, beyond, 0.0))
+    return (
+        Robot(name="rob1", payload=weight, reach=left),
+        Robot(name="rob2", payload=weight, reach=right),
+        Robot(name="rob3", payload=weight),
     )
 
 
@@ -253,33 +251,25 @@ def _brick(shape: ArchShape, b: int, pose: tuple[Floats, Floats, Floats], line_n
     )
 
 
+def _spring(shape: ArchShape, position: Floats, direction: Floats, along: Floats) -> dict[str, Any]:
+    """Return what the joints and ground ends of an arch have in common."""
+    stiffness = (shape.translational_stiffness, shape.rotational_stiffness)
+    fields = spring_fields(position, along, _across(direction), stiffness)
+    return {**fields, "thickness": shape.thickness}
+
+
 def _joint(shape: ArchShape, brick: int, position: Floats, direction: Floats) -> Joint:
     """Return the joint between a brick and the next one."""
-    return Joint(
-        bricks=(brick, brick + 1),
-        position=as_vector(position),
-        along=as_vector(direction / np.linalg.norm(direction)),
-        across=_across(direction),
-        translational_stiffness=shape.translational_stiffness,
-        rotational_stiffness=shape.rotational_stiffness,
-        thickness=shape.thickness,
-    )
+    along = direction / np.linalg.norm(direction)
+    return Joint(bricks=(brick, brick + 1), **_spring(shape, position, direction, along))
 
 
 def _ground(shape: ArchShape, brick: int, end: Floats, tangent: Floats, sign: float) -> Ground:
-    return Ground(
-        brick=brick,
-        position=as_vector(end),
-        along=as_vector(tangent),
-        across=_across(tangent),
-        translational_stiffness=shape.translational_stiffness,
-        rotational_stiffness=shape.rotational_stiffness,
-        thickness=shape.thickness,
-        anchor=as_vector(end + sign * shape.stub * tangent),
-    )
+    anchor = as_vector(end + sign * shape.stub * tangent)
+    return Ground(brick=brick, anchor=anchor, **_spring(shape, end, tangent, tangent))
 
 
-def _across(direction: Floats) -> Vector:
+def _across(direction: Floats) -> Floats:
     """Return the unit vector to the left at right angles to a direction."""
     rest = _LEFT - direction * (direction @ _LEFT) / (direction @ direction)
-    return as_vector(rest / np.linalg.norm(rest))
+    return np.asarray(rest / np.linalg.norm(rest))

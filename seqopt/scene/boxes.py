@@ -1,8 +1,7 @@
 """Bricks as boxes: how far they are apart, and whether two of them overlap.
 
-Two boxes are apart if a plane passes between them, and if one does, then one that is parallel to a
-face of either or to an edge of each. The largest distance over these 15 directions is negative for
-boxes that interpenetrate: the shortest way to part them.
+Two boxes are apart if a plane passes between them, parallel to a face of either or to an edge of
+each.
 """
 
 from __future__ import annotations
@@ -10,14 +9,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import short, vector, whole
+from seqopt.scene.checks import rows, short, vector, whole
 from seqopt.scene.parts import Brick
-from seqopt.scene.shape import Polyhedron, rows
+from seqopt.scene.shape import Polyhedron
 
 _Numbers = tuple[int, int] | None
 _Places = tuple[Vector, Vector] | None
@@ -26,18 +26,10 @@ _Places = tuple[Vector, Vector] | None
 def block_brick(
     name: int, shape: Polyhedron, density: float, *, nodes: _Numbers = None, grips: _Places = None
 ) -> Brick:
-    """Return a brick of any shape.
+    """Return a brick of any shape, placed by its second node.
 
-    ``shape``: where it is in the scene, m. ``density``: kg/m³. ``nodes``: numbers of its nodes;
-    twice the name, and one more, by default. ``grips``: where these are, in the scene, m;
-    `Polyhedron.nodes` by default. Result: placed by its second node.
-
-    Examples
-    --------
-    >>> corners = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 3))
-    >>> wedge = Polyhedron(corners, ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)))
-    >>> round(block_brick(1, wedge, 2400.0).mass)
-    1200
+    ``shape``: where it is in the scene, m. ``nodes``: twice the name, and one more, by default.
+    ``grips``: where these are, in the scene, m; `Polyhedron.nodes` by default.
     """
     if not isinstance(shape, Polyhedron):
         raise SceneError(f"brick {short(name)}: shape is {short(shape)}; give a Polyhedron")
@@ -70,30 +62,34 @@ def _from(center: Floats, name: int, grips: _Places) -> tuple[Vector, Vector]:
     return first, second
 
 
+def spring_fields(
+    position: Floats, along: Floats, across: Floats, stiffness: tuple[Vector, Vector]
+) -> dict[str, Any]:
+    """Return the fields of a joint or ground end; stiffnesses are N/m, then N m/rad."""
+    names = ("position", "along", "across", "translational_stiffness", "rotational_stiffness")
+    return dict(zip(names, (*map(as_vector, (position, along, across)), *stiffness), strict=True))
+
+
 def as_vectors(points: Floats) -> tuple[Vector, ...]:
-    """Return the rows of an array as tuples. ``points`` (k, 3)."""
+    """Return the rows of an array (k, 3) as tuples."""
     return tuple((x, y, z) for x, y, z in points.tolist())
 
 
 def as_vector(values: Floats) -> Vector:
-    """Return three numbers of an array as a tuple. ``values`` (3,)."""
+    """Return three numbers of an array as a tuple."""
     x, y, z = values.tolist()
     return x, y, z
 
 
 def vertices_of(brick: Brick) -> tuple[Floats, Sequence[Sequence[int]]]:
-    """Return the vertices of a brick, box or not, and its faces.
-
-    Results: ``vertices`` (V, 3): in the scene, m; ``faces``: places among them, counterclockwise
-    from outside.
-    """
+    """Return the vertices (V, 3) of a brick in the scene, m, and its faces among them."""
     if brick.shape is not None:
         return np.asarray(brick.shape.points + np.array(brick.position)), brick.shape.faces
     half = 0.5 * np.array(brick.dimensions)[:, None] * brick.frame
     return np.asarray(np.array(brick.position) + BOX_CORNERS @ half), BOX_FACES
 
 
-BOX_CORNERS = np.array([[a, b, c] for a in (-1.0, 1.0) for b in (-1.0, 1.0) for c in (-1.0, 1.0)])
+BOX_CORNERS = np.array([*product((-1.0, 1.0), repeat=3)])
 BOX_FACES = ((0, 1, 3, 2), (6, 7, 5, 4), (4, 5, 1, 0), (2, 3, 7, 6), (0, 2, 6, 4), (5, 7, 3, 1))
 
 
@@ -110,9 +106,8 @@ class Boxes(FrozenValue):
     half: Floats  # (n, 3); half of each dimension, m
 
     def corners(self) -> Floats:
-        """Return where the corners are. Result (n, 8, 3): m."""
-        signs = np.array(list(product((-1.0, 1.0), repeat=3)))
-        return np.asarray(self.place[:, None] + (signs * self.half[:, None]) @ self.frame)
+        """Return where the corners are, (n, 8, 3), m."""
+        return np.asarray(self.place[:, None] + (BOX_CORNERS * self.half[:, None]) @ self.frame)
 
 
 def boxes(bricks: Sequence[Brick]) -> Boxes:
@@ -127,19 +122,10 @@ def boxes(bricks: Sequence[Brick]) -> Boxes:
 
 
 def separations(bricks: Sequence[Brick]) -> tuple[Ints, Floats]:
-    """Return how far bricks are apart that are near each other.
+    """Return how far bricks are apart that are near each other, as pairs (P, 2) and m (P,).
 
-    Results: ``pairs`` (P, 2): indices of the bricks whose centroids are no farther apart than the
-    longest diagonal. ``distance`` (P,): m, along the direction in which they are farthest apart: no
-    more than their distance, and the same where faces look at each other; negative where they
-    interpenetrate.
-
-    Examples
-    --------
-    >>> from seqopt.scene.scene_file import load_scene
-    >>> pairs, distance = separations(load_scene("arch25").bricks)
-    >>> bool((distance > 0).all())
-    True
+    Along the direction in which they are farthest apart: at most their distance, negative where
+    they interpenetrate.
     """
     from scipy.spatial import KDTree  # noqa: PLC0415  # slow to import, and not always needed
 
@@ -162,10 +148,7 @@ def separations(bricks: Sequence[Brick]) -> tuple[Ints, Floats]:
 def require_apart(
     where: str, bricks: Sequence[Brick], remedy: str, deepest: float = _DEEPEST
 ) -> None:
-    """Require bricks of which no two interpenetrate.
-
-    ``deepest``: by how much they may, over the smallest dimension.
-    """
+    """Require bricks that interpenetrate by at most ``deepest`` of the smallest dimension."""
     pairs, distance = separations(bricks)
     thin = min(min(brick.dimensions) for brick in bricks)
     if distance.min(initial=0.0) < -deepest * thin:

@@ -1,10 +1,12 @@
-"""Checked vectors and numbers: the atoms of a scene."""
+"""Checked vectors and numbers, the atoms of a scene; what is wrong with one is a `SceneError`."""
 
 from __future__ import annotations
 
+import json
 import math
 import operator
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar
 
 from seqopt.arrays import Vector
@@ -12,35 +14,25 @@ from seqopt.errors import SceneError
 
 _Part = TypeVar("_Part")
 LARGEST_NUMBER = 10**15  # of a brick or node: what arrays of numbers hold without loss
+MOST_BRICKS = 20_000  # of a generated scene
 _TURNS = {*range(0x202A, 0x202F), *range(0x2066, 0x206A), 0x2028, 0x2029}  # turn or break lines
-UNIT_TOLERANCE = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
 
 
 def steers(sign: str) -> bool:
-    """Return whether a character steers a terminal or is half of one, and is none to be read.
-
-    ``sign``: one character. Result: for control characters, lone surrogates, and what turns or
-    breaks lines.
-    """
+    """Return whether a character steers a terminal, turns or breaks lines, or is half of one."""
     code = ord(sign)
     return code < 0x20 or 0x7F <= code < 0xA0 or 0xD800 <= code < 0xE000 or code in _TURNS
 
 
 def printable(where: str, value: str) -> str:
-    """Return a name that can be printed and written.
-
-    Raises `SceneError` if it is no text, or holds what steers a terminal or half a character.
-    """
+    """Return a name that can be printed and written, without what steers a terminal."""
     if not isinstance(value, str) or any(map(steers, value)):
         raise SceneError(f"{where}: its name is {short(value)}; give text of printable characters")
     return value
 
 
 def whole(where: str, value: int) -> int:
-    """Return a whole number, as bricks and nodes have for names.
-
-    Raises `SceneError` if it is none, or larger than `LARGEST_NUMBER`.
-    """
+    """Return a whole number up to `LARGEST_NUMBER`, as bricks and nodes have for names."""
     try:
         number = int(value) if isinstance(value, float) else operator.index(value)
     except (TypeError, ValueError, OverflowError):
@@ -52,26 +44,27 @@ def whole(where: str, value: int) -> int:
     return number
 
 
-def wholes(where: str, values: Iterable[int]) -> tuple[int, ...]:
-    """Return whole numbers.
+def whole_between(where: str, value: int, least: int, most: int = MOST_BRICKS) -> int:
+    """Return a whole number, of no type of decimals, between limits."""
+    try:
+        number = least - 1 if isinstance(value, bool) else operator.index(value)
+    except TypeError:
+        number = least - 1
+    if not least <= number <= most:
+        raise SceneError(f"{where} is {short(value)}; give a whole number from {least} to {most}")
+    return number
 
-    Raises `SceneError` if there are none to go through, or one is not whole.
-    """
+
+def rows(where: str, values: Iterable[_Part], what: str = "a list") -> tuple[_Part, ...]:
+    """Return what there is to go through; text is nothing to go through."""
     if isinstance(values, str) or not isinstance(values, Iterable):
-        raise SceneError(f"{where} is {short(values)}; give whole numbers")
-    return tuple(whole(where, value) for value in values)
+        raise SceneError(f"{where} is {short(values)}; give {what}")
+    return tuple(values)
 
 
-def parts(where: str, values: Iterable[_Part], kind: type[_Part]) -> tuple[_Part, ...]:
-    """Return parts of a scene if all are of one kind.
-
-    Raises `SceneError` if one is of another kind, or there is nothing to go through.
-    """
-    found = tuple(values) if isinstance(values, Iterable) else (values,)
-    for value in found:
-        if not isinstance(value, kind):
-            raise SceneError(f"{where}: give each as {kind.__name__}(...), not {short(value)}")
-    return found
+def wholes(where: str, values: Iterable[int]) -> tuple[int, ...]:
+    """Return whole numbers, as `whole` returns one."""
+    return tuple(whole(where, value) for value in rows(where, values, "whole numbers"))
 
 
 def short(value: object, most: int = 60) -> str:
@@ -84,11 +77,7 @@ def short(value: object, most: int = 60) -> str:
 
 
 def vector(where: str, values: Iterable[float], at_least: float = -math.inf) -> Vector:
-    """Return three finite floats.
-
-    ``at_least``: the least value that is allowed. Raises `SceneError` if there are not three, or
-    one is not finite or too small.
-    """
+    """Return three finite floats, none below ``at_least``."""
     try:
         x, y, z = (float(value) for value in values)
     except (TypeError, ValueError, OverflowError) as error:
@@ -99,43 +88,48 @@ def vector(where: str, values: Iterable[float], at_least: float = -math.inf) -> 
     return x, y, z
 
 
-def positive(where: str, value: float, unit: str) -> float:
-    """Return a positive finite float.
+def sizes(where: str, values: Iterable[float]) -> Vector:
+    """Return three positive lengths, m."""
+    found = vector(where, values)
+    for length in found:
+        positive(where, length, "m")
+    return found
 
-    Raises `SceneError` if it is no number, not finite or not positive.
-    """
+
+def as_float(value: object) -> float:
+    """Return a number as a float: NaN for what is none, infinity for one that is too large."""
     try:
-        number = float(value) if isinstance(value, int | float) else math.nan
+        return float(value) if isinstance(value, int | float) else math.nan
     except OverflowError:
-        number = math.inf
+        return math.inf
+
+
+def positive(where: str, value: float, unit: str) -> float:
+    """Return a positive finite float."""
+    number = as_float(value)
     if not 0 < number < math.inf:
         raise SceneError(f"{where} is {short(value)}; give a positive number of {unit}")
     return number
 
 
-def axes(where: str, first: Iterable[float], second: Iterable[float]) -> tuple[Vector, Vector]:
-    """Return two unit vectors at right angles.
-
-    Raises `SceneError` if one is not of unit length, or they are not at right angles, to
-    `UNIT_TOLERANCE`.
-    """
-    a, b = vector(where, first), vector(where, second)
-    if max(abs(dot(a, a) - 1), abs(dot(b, b) - 1), abs(dot(a, b))) > UNIT_TOLERANCE:
-        raise SceneError(f"{where} are {list(a)} and {list(b)}; give perpendicular unit vectors")
-    return a, b
-
-
-def dot(a: Vector, b: Vector) -> float:
-    """Return the scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
 def finite(where: str, value: float) -> float:
-    """Return a finite float. Raises `SceneError` if it is no number or not finite."""
-    try:
-        number = float(value) if isinstance(value, int | float) else math.nan
-    except OverflowError:
-        number = math.inf
+    """Return a finite float."""
+    number = as_float(value)
     if not math.isfinite(number):
         raise SceneError(f"{where} is {short(value)}; give a finite number")
     return number
+
+
+@contextmanager
+def reading_json(where: str, what: str) -> Iterator[None]:
+    """Say in a `SceneError` what is wrong with JSON. ``what``: stands there, as "a scene"."""
+    try:
+        yield
+    except json.JSONDecodeError as error:
+        raise SceneError(f"{where}: not JSON, line {error.lineno}: {error.msg}") from error
+    except RecursionError as error:
+        raise SceneError(f"{where}: nested too deep for {what}; give one") from error
+    except SceneError:
+        raise
+    except ValueError as error:  # an integer of thousands of digits
+        raise SceneError(f"{where}: a number has too many digits; give fewer") from error

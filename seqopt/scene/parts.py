@@ -7,24 +7,66 @@ kg/m³, forces in N, stiffnesses in N/m and N m/rad.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import (
-    UNIT_TOLERANCE,
-    axes,
-    dot,
-    positive,
-    printable,
-    short,
-    vector,
-    whole,
-    wholes,
-)
-from seqopt.scene.shape import Polyhedron, check_shape, convex_polygon, two_points
+from seqopt.scene.checks import positive, printable, rows, short, sizes, vector, whole, wholes
+from seqopt.scene.shape import Polyhedron
+
+_UNIT = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
+_STRAIGHT = 1e-9  # by how much a convex polygon may turn back, over the square of its longest edge
+_SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
+
+
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _unit_axes(where: str, **given: Vector) -> dict[str, Vector]:
+    """Return two unit vectors at right angles, by their names."""
+    found = {name: vector(f"{where}: {' and '.join(given)}", axis) for name, axis in given.items()}
+    a, b = found.values()
+    if max(abs(_dot(a, a) - 1), abs(_dot(b, b) - 1), abs(_dot(a, b))) > _UNIT:
+        raise SceneError(
+            f"{where}: {' and '.join(given)} are {list(a)} and {list(b)}; "
+            "give perpendicular unit vectors"
+        )
+    return found
+
+
+def _two_points(where: str, given: Iterable[Iterable[float]]) -> tuple[Vector, Vector]:
+    """Return where the nodes of a block are if they are two places."""
+    found = [vector(where, row) for row in rows(where, given)]
+    if len(found) != 2 or found[0] == found[1]:
+        raise SceneError(f"{where} are {short(given)}; give two different points")
+    return found[0], found[1]
+
+
+def _convex_polygon(
+    where: str, corners: Iterable[Iterable[float]]
+) -> tuple[tuple[float, float], ...]:
+    """Return the corners of a convex polygon that has an area, counterclockwise, m."""
+    points = []
+    for corner in rows(where, corners):
+        x, y, _ = vector(f"{where}: a corner", (*rows(f"{where}: a corner", corner), 0.0))
+        points.append((x, y))
+    edges = [(u - x, v - y) for (x, y), (u, v) in zip(points, points[1:] + points[:1], strict=True)]
+    after = [*zip(edges, edges[1:] + edges[:1], strict=True)]
+    turns = [a * d - b * c for (a, b), (c, d) in after]
+    slack = _STRAIGHT * max((a * a + b * b for a, b in edges), default=0.0)
+    angle = math.fsum(
+        math.atan2(turn, a * c + b * d) for turn, ((a, b), (c, d)) in zip(turns, after, strict=True)
+    )
+    if len(points) < 3 or not max(turns) > slack or min(turns) < -slack or angle > 3 * math.pi:
+        raise SceneError(
+            f"{where} is {short(points)}; give three corners or more of a convex polygon, "
+            "counterclockwise"
+        )
+    return tuple(points)
 
 
 @dataclass(frozen=True)
@@ -40,23 +82,22 @@ class Anywhere:
 class Side:
     """A robot beside the structure reaches every point of a half-space.
 
-    ``toward``: unit vector that points to the robot's side; ``point``: a point of the plane that
-    bounds the reach, m. Raises `SceneError` if ``toward`` is not a unit vector or a number is not
-    finite.
+    ``toward``: unit vector to the robot's side; ``point``: of the plane that bounds the reach, m.
     """
 
     toward: Vector
     point: Vector
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "toward", vector("reach: toward", self.toward))
-        object.__setattr__(self, "point", vector("reach: point", self.point))
-        if abs(dot(self.toward, self.toward) - 1) > UNIT_TOLERANCE:
+        vars(self).update(
+            toward=vector("reach: toward", self.toward), point=vector("reach: point", self.point)
+        )
+        if abs(_dot(self.toward, self.toward) - 1) > _UNIT:
             raise SceneError(f"reach: toward is {list(self.toward)}; give a unit vector")
 
     def covers(self, point: Vector) -> bool:
         """Return whether a point is within reach."""
-        return dot(self.toward, point) >= dot(self.toward, self.point)
+        return _dot(self.toward, point) >= _dot(self.toward, self.point)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,8 +127,8 @@ class Sphere:
     radius: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "center", vector("reach: center", self.center))
-        object.__setattr__(self, "radius", positive("reach: radius", self.radius, "m"))
+        center = vector("reach: center", self.center)
+        vars(self).update(center=center, radius=positive("reach: radius", self.radius, "m"))
 
     def covers(self, point: Vector) -> bool:
         """Return whether a point is within reach."""
@@ -152,20 +193,16 @@ class Brick(Terse):
     node_offsets: tuple[Vector, Vector] | None = None
 
     def __post_init__(self) -> None:
-        _set(self, "name", whole("brick: its name", self.name))
+        vars(self).update(name=whole("brick: its name", self.name))
         where = f"brick {self.name}"
-        _set(self, "position", vector(f"{where}: position", self.position))
-        _set(self, "dimensions", vector(f"{where}: dimensions", self.dimensions))
-        for length in self.dimensions:
-            positive(f"{where}: dimensions", length, "m")
-        first, second = axes(
-            f"{where}: length_axis and width_axis", self.length_axis, self.width_axis
+        vars(self).update(
+            position=vector(f"{where}: position", self.position),
+            dimensions=sizes(f"{where}: dimensions", self.dimensions),
+            **_unit_axes(where, length_axis=self.length_axis, width_axis=self.width_axis),
+            density=positive(f"{where}: density", self.density, "kg/m³"),
+            nodes=wholes(f"{where}: nodes", self.nodes),
+            placing_node=whole(f"{where}: placing_node", self.placing_node),
         )
-        _set(self, "length_axis", first)
-        _set(self, "width_axis", second)
-        _set(self, "density", positive(f"{where}: density", self.density, "kg/m³"))
-        _set(self, "nodes", wholes(f"{where}: nodes", self.nodes))
-        _set(self, "placing_node", whole(f"{where}: placing_node", self.placing_node))
         if len(set(self.nodes)) != 2 or len(self.nodes) != 2:
             raise SceneError(f"{where}: nodes are {list(self.nodes)}; give two different numbers")
         if self.placing_node not in self.nodes:
@@ -174,10 +211,28 @@ class Brick(Terse):
                 f"give one of its nodes {list(self.nodes)}"
             )
         if self.node_offsets is not None:
-            _set(self, "node_offsets", two_points(where, self.node_offsets))
+            offsets = _two_points(f"{where}: node_offsets", self.node_offsets)
+            vars(self).update(node_offsets=offsets)
         if self.shape is not None:
-            across = (self.length_axis, self.width_axis)
-            check_shape(where, self.shape, self.dimensions, across)
+            self._check_shape(where, self.shape)
+
+    def _check_shape(self, where: str, shape: object) -> None:
+        """Require a shape about the centroid that extends as far as the dimensions say."""
+        if not isinstance(shape, Polyhedron):
+            raise SceneError(f"{where}: shape is {short(shape)}; give a Polyhedron")
+        slack = _SAME_PLACE * max(self.dimensions)
+        off = math.hypot(*shape.centroid.tolist())
+        if not off <= slack:
+            raise SceneError(
+                f"{where}: the centroid of its shape is {off:.3g} m from its position; give "
+                "vertices from the centroid"
+            )
+        extents = shape.extents(self.frame)
+        if not np.allclose(extents, self.dimensions, rtol=0.0, atol=slack):
+            raise SceneError(
+                f"{where}: dimensions are {list(self.dimensions)}, and its shape extends "
+                f"{[float(f'{e:.6g}') for e in extents]} along its axes; give these"
+            )
 
     @property
     def frame(self) -> Floats:
@@ -197,29 +252,23 @@ class Brick(Terse):
 
     def node_position(self, node: int) -> Vector:
         """Return where one of the brick's inner nodes lies. ``node``: one of ``nodes``."""
+        step = (-0.25 if node == self.nodes[0] else 0.25) * self.dimensions[0]
+        away = [step * a for a in self.length_axis]
         if self.node_offsets is not None:
-            away = self.node_offsets[self.nodes.index(node)]
-            x, y, z = (p + d for p, d in zip(self.position, away, strict=True))
-            return x, y, z
-        sign = -0.25 if node == self.nodes[0] else 0.25
-        step = sign * self.dimensions[0]
-        x, y, z = (p + step * a for p, a in zip(self.position, self.length_axis, strict=True))
+            away = [*self.node_offsets[self.nodes.index(node)]]
+        x, y, z = (p + d for p, d in zip(self.position, away, strict=True))
         return x, y, z
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Spring(Terse):
-    """Where a joint acts and how stiff it is, in its own axes.
+    """Where a joint acts and how stiff it is, along and about its own axes; zero is allowed.
 
-    ``position``: the point where the springs act, m. ``along``, ``across``: unit vectors along the
-    joint's normal and across it, at right angles; the third axis is their cross product.
-    ``translational_stiffness``: N/m along the three axes, zero allowed. ``rotational_stiffness``: N
-    m/rad about the three axes, zero allowed. ``thickness``: of what lies between the faces, m: to
-    be given where it is more than `THICKEST` of the smallest dimension of the bricks; faces farther
-    apart do not touch. ``face``: corners of the convex face over which the bodies touch, once
-    around: from ``position`` along ``across`` and along the third axis, m. ``along`` then points
-    from the first brick into the second, or from the ground into its brick. By default faces follow
-    from the boxes.
+    ``along``, ``across``: unit vectors, the first its normal; ``thickness``: of what lies between
+    the faces, m, to be given where it is more than `THICKEST` of the smallest dimension of the
+    bricks. ``face``: corners of the convex face over which the bodies touch, from ``position``
+    along ``across`` and the third axis, m; ``along`` then points into the second brick. By default
+    faces follow from the boxes.
     """
 
     position: Vector
@@ -231,16 +280,16 @@ class Spring(Terse):
     face: tuple[tuple[float, float], ...] | None = None
 
     def _check(self, where: str) -> None:
-        _set(self, "position", vector(f"{where}: position", self.position))
-        first, second = axes(f"{where}: along and across", self.along, self.across)
-        _set(self, "along", first)
-        _set(self, "across", second)
+        vars(self).update(
+            position=vector(f"{where}: position", self.position),
+            **_unit_axes(where, along=self.along, across=self.across),
+        )
         for name in ("translational_stiffness", "rotational_stiffness"):
-            _set(self, name, vector(f"{where}: {name}", getattr(self, name), at_least=0.0))
+            vars(self)[name] = vector(f"{where}: {name}", getattr(self, name), at_least=0.0)
         if self.thickness is not None:
-            _set(self, "thickness", positive(f"{where}: thickness", self.thickness, "m"))
+            vars(self).update(thickness=positive(f"{where}: thickness", self.thickness, "m"))
         if self.face is not None:
-            _set(self, "face", convex_polygon(f"{where}: face", self.face))
+            vars(self).update(face=_convex_polygon(f"{where}: face", self.face))
 
     @property
     def corners(self) -> tuple[Vector, ...] | None:
@@ -270,11 +319,20 @@ class Joint(Spring):
     bricks: tuple[int, int]
 
     def __post_init__(self) -> None:
-        _set(self, "bricks", wholes("joint: bricks", self.bricks))
-        where = f"joint {self.bricks}"
+        vars(self).update(bricks=wholes("joint: bricks", self.bricks))
         if len(set(self.bricks)) != 2 or len(self.bricks) != 2:
-            raise SceneError(f"{where}: name two different bricks")
-        self._check(where)
+            raise SceneError(f"{self.label}: name two different bricks")
+        self._check(self.label)
+
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+        return f"joint {self.bricks}"
+
+    @property
+    def ends(self) -> tuple[int, ...]:
+        """Names of the bricks that it joins."""
+        return self.bricks
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -301,14 +359,24 @@ class Ground(Spring):
     closes_with: int | None = None
 
     def __post_init__(self) -> None:
-        _set(self, "brick", whole("ground end: brick", self.brick))
-        where = f"ground end of brick {self.brick}"
+        vars(self).update(brick=whole("ground end: brick", self.brick))
+        where = self.label
         if self.closes_with is not None:
-            _set(self, "closes_with", whole(f"{where}: closes_with", self.closes_with))
+            vars(self).update(closes_with=whole(f"{where}: closes_with", self.closes_with))
         self._check(where)
-        _set(self, "anchor", vector(f"{where}: anchor", self.anchor))
+        vars(self).update(anchor=vector(f"{where}: anchor", self.anchor))
         if self.anchor == self.position:
             raise SceneError(f"{where}: anchor and position are one point; give the stub a length")
+
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+        return f"ground end of brick {self.brick}"
+
+    @property
+    def ends(self) -> tuple[int, ...]:
+        """The name of the brick that it joins to the ground."""
+        return (self.brick,)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -343,9 +411,7 @@ class Robot:
 
     def __post_init__(self) -> None:
         printable("robot", self.name)
-        _set(self, "reach", _as_reach(f"robot {self.name}: reach", self.reach))
-        _set(self, "payload", positive(f"robot {self.name}: payload", self.payload, "N"))
-
-
-def _set(value: object, name: str, content: object) -> None:
-    object.__setattr__(value, name, content)
+        vars(self).update(
+            reach=_as_reach(f"robot {self.name}: reach", self.reach),
+            payload=positive(f"robot {self.name}: payload", self.payload, "N"),
+        )

@@ -1,92 +1,67 @@
 """Scenarios: random variations of a scene, reproducible by a seed.
 
-The stiffness of a joint is not known before it is made, nor are the exact weight and position of a
-brick. A scenario draws all of these at random. Topology, names, nodes, build order and robots stay
-those of the scene. The choices of a schedule therefore mean the same in all scenarios.
+Stiffnesses, weights and positions vary; topology, names, build order and robots stay, so the
+choices of a schedule mean the same in all scenarios.
 """
 
 from __future__ import annotations
 
 import math
-import operator
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
-from seqopt.arrays import Floats, Vector
+from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.scene.checks import short
-from seqopt.scene.parts import Ground, Joint
+from seqopt.scene.boxes import as_vector
+from seqopt.scene.checks import short, whole_between
+from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
 
 _End = TypeVar("_End", Joint, Ground)
+_Part = TypeVar("_Part", Brick, Joint, Ground)
 
 
 def stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene:
-    """Return a scene whose joints and ground ends are stiffer by factors.
+    """Return a scene stiffer by factors (J + G,), one for every joint, then every ground end."""
 
-    ``translational``, ``rotational`` (J + G,): a factor for every joint, then for every ground end,
-    for all three axes; no unit.
-    """
-    pairs = [*zip(translational.tolist(), rotational.tolist(), strict=True)]
-
-    def stiffer(spring: _End, factors: tuple[float, float]) -> _End:
-        (x, y, z), (a, b, c) = spring.translational_stiffness, spring.rotational_stiffness
-        t, r = factors
+    def stiffer(spring: _End, shift: float, turn: float) -> _End:
         return replace(
             spring,
-            translational_stiffness=(t * x, t * y, t * z),
-            rotational_stiffness=(r * a, r * b, r * c),
+            translational_stiffness=as_vector(shift * np.array(spring.translational_stiffness)),
+            rotational_stiffness=as_vector(turn * np.array(spring.rotational_stiffness)),
         )
 
     count = len(scene.joints)
-    joints = map(stiffer, scene.joints, pairs[:count])
-    return replace(
-        scene, joints=tuple(joints), grounds=tuple(map(stiffer, scene.grounds, pairs[count:]))
-    )
+    joints = map(stiffer, scene.joints, translational[:count], rotational[:count])
+    grounds = map(stiffer, scene.grounds, translational[count:], rotational[count:])
+    return replace(scene, joints=tuple(joints), grounds=tuple(grounds))
 
 
 def weighed(scene: Scene, factors: Floats) -> Scene:
-    """Return a scene whose bricks are heavier by factors.
-
-    ``factors`` (B,): for the density of every brick, in the scene's order; no unit.
-    """
+    """Return a scene whose bricks are heavier by factors (B,), in the scene's order; no unit."""
     pairs = zip(scene.bricks, factors.tolist(), strict=True)
     return replace(scene, bricks=tuple(replace(b, density=b.density * f) for b, f in pairs))
 
 
 def shifted(scene: Scene, size: float, rng: np.random.Generator) -> Scene:
-    """Return a scene with bricks, joints and ground ends moved up to a size along every axis.
+    """Return a scene moved up to a size along every axis, m, uniformly and piece by piece.
 
     A brick takes its nodes with it, a ground end its fixed point.
-
-    ``size``: m; every coordinate moves by a uniform draw between minus and plus this.
     """
 
-    def moved(point: Vector, step: Floats) -> Vector:
-        x, y, z = (np.array(point) + step).tolist()
-        return x, y, z
+    def moved(part: _Part) -> _Part:
+        step = rng.uniform(-size, size, 3)
+        names = [name for name in ("position", "anchor") if hasattr(part, name)]
+        new: dict[str, Any] = {n: as_vector(np.array(getattr(part, n)) + step) for n in names}
+        return replace(part, **new)
 
-    def draw() -> Floats:
-        return rng.uniform(-size, size, 3)
-
-    grounds = []
-    for ground in scene.grounds:
-        step = draw()
-        grounds.append(
-            replace(
-                ground, position=moved(ground.position, step), anchor=moved(ground.anchor, step)
-            )
-        )
-    return replace(
-        scene,
-        bricks=tuple(replace(b, position=moved(b.position, draw())) for b in scene.bricks),
-        joints=tuple(replace(j, position=moved(j.position, draw())) for j in scene.joints),
-        grounds=tuple(grounds),
-    )
+    grounds = tuple(map(moved, scene.grounds))  # the first to draw
+    bricks, joints = tuple(map(moved, scene.bricks)), tuple(map(moved, scene.joints))
+    return replace(scene, bricks=bricks, joints=joints, grounds=grounds)
 
 
 MOST = 100_000  # scenarios; more are a slip of the finger
@@ -97,9 +72,8 @@ _LARGEST_FACTOR = 1e6
 class Scenarios:
     """Samples of a scene, and how they were drawn.
 
-    ``nominal``: what they are samples of; ``stiffness`` (float, float): least and largest factor of
-    a joint's stiffness; ``density``: largest relative change of a brick's density; ``position``:
-    largest shift along every axis, m.
+    ``stiffness``: least and largest factor; ``density``: largest relative change; ``position``:
+    largest shift, m.
     """
 
     nominal: Scene
@@ -175,8 +149,8 @@ def scenarios(
     low, high = _factors(stiffness)
     spread = _from_zero("density", density, most=1.0)
     shift = _from_zero("position", position, most=math.inf)
-    number = _whole("count", count, 1, MOST)
-    seed = _whole("seed", seed, 0, 2**63)
+    number = whole_between("count", count, 1, MOST)
+    seed = whole_between("seed", seed, 0, 2**63)
     drawn = tuple(_sample(scene, (low, high), spread, shift, (seed, i)) for i in range(number))
     return Scenarios(scene, (low, high), spread, shift, seed, drawn)
 
@@ -223,14 +197,3 @@ def _from_zero(name: str, given: float, most: float) -> float:
         limit = f" to below {most:g}" if math.isfinite(most) else ""
         raise SceneError(f"{name} is {short(given)}; give a number from 0{limit}")
     return float(given)
-
-
-def _whole(name: str, given: int, least: int, most: int) -> int:
-    """Return a whole number between limits."""
-    try:
-        number = least - 1 if isinstance(given, bool) else operator.index(given)
-    except TypeError:
-        number = least - 1
-    if not least <= number <= most:
-        raise SceneError(f"{name} is {short(given)}; give a whole number from {least} to {most}")
-    return number

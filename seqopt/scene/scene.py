@@ -7,11 +7,11 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import parts, printable, vector, wholes
+from seqopt.scene.checks import printable, short, vector, wholes
 from seqopt.scene.parts import Brick, Ground, Joint, Reach, Robot
 from seqopt.showing import Shown, display
 
@@ -23,8 +23,8 @@ from collections.abc import Callable
 import networkx as nx
 
 from seqopt.errors import did_you_mean
-from seqopt.scene.checks import short
 
+_Part = TypeVar("_Part")
 _AT_NODE = 1e-6  # distance treated as zero, over the length of the brick
 _FAR = 1e9  # of a position from the origin, over the smallest dimension: digits are lost beyond
 _SIZES = (1e-9, 1e9)  # m; dimensions that a brick may have
@@ -57,33 +57,25 @@ def _check_springs(springs: Sequence[Joint | Ground], bricks: Mapping[int, Brick
     """Require joints and ground ends whose edges have a length. ``bricks``: by name."""
     farthest = _FAR * max(max(brick.dimensions) for brick in bricks.values())
     for spring in springs:
-        ends = spring.bricks if isinstance(spring, Joint) else (spring.brick,)
-        where = (
-            f"joint {spring.bricks}"
-            if isinstance(spring, Joint)
-            else f"ground end of brick {ends[0]}"
-        )
-        points = {"position": spring.position}
-        if isinstance(spring, Ground):
-            points["anchor"] = spring.anchor
+        points = {"position": spring.position, "anchor": getattr(spring, "anchor", spring.position)}
         for name, point in points.items():
             if max(map(abs, point)) > farthest:
-                raise SceneError(f"{where}: {name} is {list(point)}; move it to its bricks")
+                raise SceneError(f"{spring.label}: {name} is {list(point)}; move it to its bricks")
         stiffness = (*spring.translational_stiffness, *spring.rotational_stiffness)
-        stiffest = max(stiffness)
-        softest = min(filter(None, stiffness), default=1.0)
-        if stiffest > _HEAVY or softest < 1 / _HEAVY:
-            wrong = stiffest if stiffest > _HEAVY else softest
+        stiffest, softest = max(stiffness), min(filter(None, stiffness), default=1.0)
+        wrong = stiffest if stiffest > _HEAVY else softest
+        if not 1 / _HEAVY <= wrong <= _HEAVY:
             raise SceneError(
-                f"{where}: a stiffness is {wrong:g}; give 0, or from {1 / _HEAVY:g} to {_HEAVY:g}"
+                f"{spring.label}: a stiffness is {wrong:g}; "
+                f"give 0, or from {1 / _HEAVY:g} to {_HEAVY:g}"
             )
-        for brick in (bricks[end] for end in ends):
-            _check_edges(where, spring, brick)
+        for end in spring.ends:
+            _check_edges(spring, bricks[end])
 
 
-def _check_edges(where: str, spring: Joint | Ground, brick: Brick) -> None:
+def _check_edges(spring: Joint | Ground, brick: Brick) -> None:
     """Require a joint off the nodes of a brick, and a stub with a length."""
-    near = _AT_NODE * brick.dimensions[0]
+    where, near = spring.label, _AT_NODE * brick.dimensions[0]
     for node in brick.nodes:
         if math.dist(brick.node_position(node), spring.position) <= near:
             raise SceneError(
@@ -144,19 +136,21 @@ class Scene(Shown):
 
     def __post_init__(self) -> None:
         for name, kind in _KINDS.items():
-            _set(self, name, parts(f"scene: {name}", getattr(self, name), kind))
-        printable("scene", self.name)
-        for name in ("build_order", "blocked_nodes"):
-            _set(self, name, wholes(f"scene {self.name}: {name}", getattr(self, name)))
-        _set(self, "gravity", vector(f"scene {self.name}: gravity", self.gravity))
+            vars(self)[name] = _parts(f"scene: {name}", getattr(self, name), kind)
+        where = f"scene {printable('scene', self.name)}"
+        vars(self).update(
+            build_order=wholes(f"{where}: build_order", self.build_order),
+            blocked_nodes=wholes(f"{where}: blocked_nodes", self.blocked_nodes),
+            gravity=vector(f"{where}: gravity", self.gravity),
+        )
         if not self.bricks:
-            raise SceneError(f"scene {self.name}: it has no bricks; give at least one")
+            raise SceneError(f"{where}: it has no bricks; give at least one")
         if not self.grounds:
-            raise SceneError(f"scene {self.name}: it has no ground end; give at least one")
-        _unique(f"scene {self.name}: brick", (brick.name for brick in self.bricks))
-        _unique(f"scene {self.name}: node", (n for brick in self.bricks for n in brick.nodes))
-        _unique(f"scene {self.name}: robot", (robot.name for robot in self.robots))
-        self._check_references()
+            raise SceneError(f"{where}: it has no ground end; give at least one")
+        _unique(f"{where}: brick", (brick.name for brick in self.bricks))
+        _unique(f"{where}: node", (n for brick in self.bricks for n in brick.nodes))
+        _unique(f"{where}: robot", (robot.name for robot in self.robots))
+        self._check_references(where)
         _check_bricks(self.bricks, self.gravity)
         _check_springs((*self.joints, *self.grounds), {brick.name: brick for brick in self.bricks})
 
@@ -167,25 +161,19 @@ class Scene(Shown):
         )
         return f"<Scene {self.name}: {counts}>"
 
-    def _check_references(self) -> None:
+    def _check_references(self, where: str) -> None:
         names = {brick.name for brick in self.bricks}
         for joint in self.joints:
-            _known(f"joint {joint.bricks}", "brick", joint.bricks, names)
+            _known(joint.label, "brick", joint.bricks, names)
         for ground in self.grounds:
-            wanted = (
-                (ground.brick,)
-                if ground.closes_with is None
-                else (ground.brick, ground.closes_with)
-            )
-            _known(f"ground end of brick {ground.brick}", "brick", wanted, names)
+            closes = ground.brick if ground.closes_with is None else ground.closes_with
+            _known(ground.label, "brick", (ground.brick, closes), names)
         if Counter(self.build_order) != Counter(names):
             raise SceneError(
-                f"scene {self.name}: build_order is {list(self.build_order)}; "
+                f"{where}: build_order is {list(self.build_order)}; "
                 f"name each of the {len(names)} bricks once"
             )
-        _known(
-            f"scene {self.name}: blocked_nodes", "node", self.blocked_nodes, set(self.brick_of_node)
-        )
+        _known(f"{where}: blocked_nodes", "node", self.blocked_nodes, {*self.brick_of_node})
         for brick in self.bricks:
             if brick.placing_node in self.blocked_nodes:
                 raise SceneError(
@@ -199,14 +187,11 @@ class Scene(Shown):
         return {node: brick for brick in self.bricks for node in brick.nodes}
 
     def node_position(self, node: int) -> Vector:
-        """Return where an inner node lies. ``node``: its number."""
+        """Return where an inner node lies."""
         return self.brick_of_node[node].node_position(node)
 
     def within_reach(self, robot: Robot) -> tuple[tuple[int, ...], ...]:
-        """Return the nodes that a robot may hold, by brick.
-
-        Result: bricks in build order; nodes neither blocked nor out of reach.
-        """
+        """Return the nodes, not blocked, that a robot reaches, brick by brick in build order."""
         if robot.reach not in self._within_reach:
             blocked, covers = {*self.blocked_nodes}, robot.reach.covers
             self._within_reach[robot.reach] = tuple(
@@ -245,12 +230,7 @@ class Scene(Shown):
         return replace(self, robots=robots)
 
     def plot(self, bricks: int | None = None) -> Figure:
-        """Draw the scene, or its first bricks.
-
-        ``bricks``: how many, in build order; the others are drawn pale. All by default. Result: a
-        notebook shows it; ``savefig`` writes it to a file. Raises `ExtraError` if matplotlib is not
-        installed (extra ``plot``).
-        """
+        """Draw the scene, or its first ``bricks`` in build order and the others pale."""
         figure: Figure = display("scene_picture")(self, bricks)
         return figure
 
@@ -264,8 +244,13 @@ class Scene(Shown):
         return x, y, z
 
 
-def _set(value: object, name: str, content: object) -> None:
-    object.__setattr__(value, name, content)
+def _parts(where: str, values: Iterable[_Part], kind: type[_Part]) -> tuple[_Part, ...]:
+    """Return parts of a scene if all are of one kind."""
+    found = tuple(values) if isinstance(values, Iterable) else (values,)
+    for value in found:
+        if not isinstance(value, kind):
+            raise SceneError(f"{where}: give each as {kind.__name__}(...), not {short(value)}")
+    return found
 
 
 def _unique(what: str, names: Iterable[object]) -> None:
@@ -285,17 +270,7 @@ _PART = re.compile(r"(-?\d+)(?:\.\.(-?\d+))?")
 
 
 def from_all_ends(scene: Scene) -> Order:
-    """Return the order that builds from all ground ends at once.
-
-    Result: bricks by how many joints lie between them and the nearest ground end, those of one
-    number in turn from one ground end to the next; then those that no joint ties to any.
-
-    Examples
-    --------
-    >>> from seqopt.scene.scene_file import load_scene
-    >>> from_all_ends(load_scene("arch25"))[:5]
-    (1, 25, 2, 24, 3)
-    """
+    """Return the order that builds from all ground ends at once, one brick each in turn."""
     graph: nx.Graph[int] = nx.Graph([joint.bricks for joint in scene.joints])
     graph.add_nodes_from(scene.build_order)
     far: dict[int, tuple[int, int]] = {}
@@ -306,26 +281,15 @@ def from_all_ends(scene: Scene) -> Order:
     return tuple(sorted(scene.build_order, key=lambda name: far.get(name, last)))
 
 
-def _reversed(scene: Scene) -> Order:
-    return scene.build_order[::-1]
-
-
-ORDERS: dict[str, Callable[[Scene], Order]] = {"reversed": _reversed, "ends": from_all_ends}
+ORDERS: dict[str, Callable[[Scene], Order]] = {
+    "reversed": lambda scene: scene.build_order[::-1],
+    "ends": from_all_ends,
+}
 """Orders by name: the scene's own from its last brick on, and from all ground ends at once."""
 
 
 def parse_order(scene: Scene, text: str) -> Order:
-    """Return an order from words.
-
-    ``text``: a key of `ORDERS`, or names of bricks with commas between them, runs as ``1..12`` or
-    ``25..13``.
-
-    Examples
-    --------
-    >>> from seqopt.scene.scene_file import load_scene
-    >>> parse_order(load_scene("arch25"), "1..12,25..13")[11:14]
-    (12, 25, 24)
-    """
+    """Return an order from a key of `ORDERS`, or names with commas between, runs as ``25..13``."""
     if text in ORDERS:
         return ORDERS[text](scene)
     out: list[int] = []
@@ -346,23 +310,11 @@ def parse_order(scene: Scene, text: str) -> Order:
 
 
 def in_order(scene: Scene, order: Sequence[int] | str | None) -> Scene:
-    """Return a scene whose bricks are placed in an order.
-
-    ``order``: names of all bricks, or words as `parse_order` takes them; None for the scene's own.
-    Raises `SceneError` if a brick is missing, unknown or named twice.
-
-    Examples
-    --------
-    >>> from seqopt.scene.scene_file import load_scene
-    >>> in_order(load_scene("arch25"), "reversed").placed[0].name
-    25
-    """
+    """Return a scene built in an order: names of all bricks, or words for `parse_order`."""
     if order is None:
         return scene
-    if isinstance(order, str):
-        given = parse_order(scene, order)
-    else:
-        given = wholes(f"scene {scene.name}: order", order)
+    where = f"scene {scene.name}: order"
+    given = parse_order(scene, order) if isinstance(order, str) else wholes(where, order)
     _require_all(scene, given)
     return replace(scene, build_order=given)
 

@@ -21,10 +21,11 @@ import numpy as np
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.files import read_text, write_text
+from seqopt.scene.checks import reading_json, short
 from seqopt.scene.library.by_words import ABOUT, GENERATED, KINDS, scene_by_words
 from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Reach, Robot, Side, Sphere
 from seqopt.scene.scene import Scene
-from seqopt.scene.shape import with_shape
+from seqopt.scene.shape import Polyhedron
 
 _ONE_PLACE = 0.25  # distance of centroids treated as zero, over the smallest dimension
 _FAR_AWAY = 1.0  # of a joint from a brick, over the brick's largest dimension
@@ -34,33 +35,12 @@ _PULL = 100.0  # m/s²; ten times that of the earth
 
 
 def find_warnings(scene: Scene) -> tuple[str, ...]:
-    """Return what looks wrong in a scene, one line each.
-
-    Result: each names the object, its value and what may be meant; empty for most scenes.
-
-    Examples
-    --------
-    >>> from dataclasses import replace
-    >>> from seqopt.scene.scene_file import load_scene
-    >>> scene = load_scene("arch25")
-    >>> find_warnings(scene)
-    ()
-    >>> find_warnings(replace(scene, gravity=(0.0, 0.0, -9810.0)))
-    ('gravity is 9810 m/s²: give it in meters, if it is meant in millimeters',)
-    """
+    """Return what looks wrong in a scene, one line each; most scenes have none."""
     return (*_of_units(scene), *_of_places(scene), *_of_joints(scene))
 
 
 def warn_of(scene: Scene, name: str) -> None:
-    """Warn of what looks wrong in a scene.
-
-    ``name``: what to call it.
-
-    Warns
-    -----
-    SceneWarning
-        A warning for each doubt.
-    """
+    """Give a `SceneWarning` for each thing that looks wrong in a scene."""
     for doubt in find_warnings(scene):
         warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=3)
 
@@ -97,11 +77,10 @@ def _of_joints(scene: Scene) -> Iterator[str]:
     bricks = {brick.name: brick for brick in scene.bricks}
     springs: tuple[Joint | Ground, ...] = (*scene.joints, *scene.grounds)
     for spring in springs:
-        ends = spring.bricks if isinstance(spring, Joint) else (spring.brick,)
-        for brick in (bricks[end] for end in ends):
+        for brick in (bricks[end] for end in spring.ends):
             away = _distance(brick, spring.position)
             if away > _FAR_AWAY * max(brick.dimensions):
-                yield f"{_called(spring)}: it lies {away:.4g} m from brick {brick.name}"
+                yield f"{spring.label}: it lies {away:.4g} m from brick {brick.name}"
 
 
 def _distance(brick: Brick, point: Vector) -> float:
@@ -111,12 +90,6 @@ def _distance(brick: Brick, point: Vector) -> float:
     return float(np.linalg.norm(np.maximum(at - 0.5 * np.array(brick.dimensions), 0.0)))
 
 
-def _called(spring: Joint | Ground) -> str:
-    if isinstance(spring, Joint):
-        return f"joint {spring.bricks}"
-    return f"ground end of brick {spring.brick}"
-
-
 def _named(bricks: list[Brick]) -> str:
     more = f" and {len(bricks) - 1} more" if len(bricks) > 1 else ""
     return f"brick {bricks[0].name}{more}"
@@ -124,40 +97,34 @@ def _named(bricks: list[Brick]) -> str:
 
 _VERSION = 1
 _UNSAID = ("thickness", "face", "shape", "node_offsets")  # left out of a file where there is none
-_REACHES: dict[str, type[Anywhere] | type[Side] | type[Sphere]] = {
-    "anywhere": Anywhere,
-    "side": Side,
-    "sphere": Sphere,
-}
+_REACHES: dict[str, type[Reach]] = {"anywhere": Anywhere, "side": Side, "sphere": Sphere}
+_DATA = resources.files("seqopt").joinpath("data")
 
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of a scene file."""
-    text = resources.files("seqopt").joinpath("data/scene.schema.json").read_text(encoding="utf-8")
-    document: dict[str, Any] = json.loads(text)
+    document: dict[str, Any] = json.loads(_DATA.joinpath("scene.schema.json").read_text("utf-8"))
     return document
 
 
 def builtin_scenes() -> tuple[str, ...]:
-    """Return the names of the scenes that ship with the package. Result: in alphabetical order."""
+    """Return the names of the scenes that ship with the package, in alphabetical order."""
     return tuple(sorted({*_stored(), *GENERATED}))
 
 
 def about(name: str) -> str:
-    """Return what a built-in scene is. ``name``: one of `builtin_scenes`. Result: a line."""
+    """Return in a line what one of `builtin_scenes` is."""
     return ABOUT[name]
 
 
 def _stored() -> tuple[str, ...]:
     """Return the names of the scenes that ship as files."""
-    folder = resources.files("seqopt").joinpath("data/scenes")
-    return tuple(item.name.removesuffix(".json") for item in folder.iterdir())
+    return tuple(item.name.removesuffix(".json") for item in _DATA.joinpath("scenes").iterdir())
 
 
 def _load_stored(name: str) -> Scene:
     """Return a scene that ships as a file."""
-    source = resources.files("seqopt").joinpath(f"data/scenes/{name}.json")
-    return parse_scene(source.read_text(encoding="utf-8"), name)
+    return parse_scene(_DATA.joinpath("scenes", f"{name}.json").read_text("utf-8"), name)
 
 
 def load_scene(name: str | Path) -> Scene:
@@ -218,22 +185,10 @@ def _no_such(name: str) -> str:
 
 
 def parse_scene(text: str, source: str = "text") -> Scene:
-    """Return the scene that a JSON document describes.
-
-    ``text``: the document. Raises `SceneError` if the text is not JSON, breaks the schema or
-    describes no scene that can be.
-    """
-    try:
+    """Return the scene that a JSON document describes, if it obeys the schema."""
+    with reading_json(f"scene {source}", "a scene"):
         document = json.loads(text, object_pairs_hook=partial(_entries, source))
         _check_schema(document, source)
-    except json.JSONDecodeError as error:
-        raise SceneError(f"scene {source}: not JSON, line {error.lineno}: {error.msg}") from error
-    except RecursionError as error:
-        raise SceneError(f"scene {source}: nested too deep for a scene; give one") from error
-    except SceneError:
-        raise
-    except ValueError as error:  # an integer of thousands of digits
-        raise SceneError(f"scene {source}: a number has too many digits; give fewer") from error
     return _scene_from_dict(document)
 
 
@@ -248,12 +203,9 @@ def _entries(source: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _scene_from_dict(document: dict[str, Any]) -> Scene:
-    """Return the scene of a document that obeys the schema.
-
-    ``document``: as of `scene_to_dict`. Raises `SceneError` if its parts do not fit together.
-    """
+    """Return the scene of a document that obeys the schema."""
     content = {key: value for key, value in document.items() if key not in ("format", "version")}
-    content["bricks"] = [Brick(**with_shape(brick)) for brick in content["bricks"]]
+    content["bricks"] = [Brick(**_with_shape(brick)) for brick in content["bricks"]]
     content["joints"] = [Joint(**joint) for joint in content["joints"]]
     content["grounds"] = [Ground(**ground) for ground in content["grounds"]]
     content["robots"] = [
@@ -261,6 +213,16 @@ def _scene_from_dict(document: dict[str, Any]) -> Scene:
         for robot in content["robots"]
     ]
     return Scene(**content)
+
+
+def _with_shape(entry: dict[str, Any]) -> dict[str, Any]:
+    """Return the entry of a brick with its shape, if it has one, as a value."""
+    if entry.get("shape") is None:
+        return entry
+    try:
+        return {**entry, "shape": Polyhedron(**entry["shape"])}
+    except SceneError as error:
+        raise SceneError(f"brick {short(entry['name'])}: {error}") from error
 
 
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
@@ -278,9 +240,8 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
 
 def dump_scene(scene: Scene) -> str:
     """Return a scene as JSON text, one brick, joint or robot a line."""
-    document = scene_to_dict(scene)
     lines = []
-    for key, value in document.items():
+    for key, value in scene_to_dict(scene).items():
         if isinstance(value, tuple) and value and isinstance(value[0], dict):
             rows = ",\n    ".join(json.dumps(item, ensure_ascii=False) for item in value)
             lines.append(f"  {json.dumps(key)}: [\n    {rows}\n  ]")
@@ -326,8 +287,8 @@ def _check_schema(document: object, source: str) -> None:
     error = jsonschema.exceptions.best_match(validator.iter_errors(document))
     if error is not None:
         entry = error.json_path.removeprefix("$").removeprefix(".") or "document"
-        raise SceneError(f"scene {source}: {entry}: {_short(error.message)}")
+        raise SceneError(f"scene {source}: {entry}: {_cut(error.message)}")
 
 
-def _short(text: str, limit: int = 160) -> str:
+def _cut(text: str, limit: int = 160) -> str:
     return text if len(text) <= limit else f"{text[: limit - 1]}…"

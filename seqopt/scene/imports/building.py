@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import heapq
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
-import numpy as np
-
 from seqopt.errors import SceneError
-from seqopt.scene.boxes import as_vectors, block_brick
-from seqopt.scene.checks import LARGEST_NUMBER, positive, short
+from seqopt.scene.boxes import as_vector, block_brick, spring_fields
+from seqopt.scene.checks import LARGEST_NUMBER, positive, short, whole_between
 from seqopt.scene.imports.contacts import GROUND, Contacts, face_ground, face_joint, find_contacts
 from seqopt.scene.imports.content import MOST_CORNERS, UNITS, UPS, Content, FileJoint, Given
-from seqopt.scene.imports.repair import Repaired, repair_shape
-from seqopt.scene.library.common import MASONRY, JointLaw, mobile_robots, whole_number
+from seqopt.scene.imports.meshes import Repaired, repair_shape
+from seqopt.scene.library.common import MASONRY, JointLaw, mobile_robots, touching_order
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
-from seqopt.scene.shape import Polyhedron
+from seqopt.scene.shape import Polyhedron, plane_axes
 
 
 def upward_order(
@@ -26,28 +23,9 @@ def upward_order(
     starts: Iterable[int],
     keys: Sequence[str],
 ) -> list[int]:
-    """Return blocks in an order in which each touches the ground or what stands before it.
-
-    ``rank``: of every block; of those that can be placed, the lowest is next. ``pairs``: which
-    touch each other. ``starts``: which touch the ground. Raises `SceneError` if some touch nothing
-    that leads to the ground.
-
-    Examples
-    --------
-    >>> upward_order([(0,), (2,), (1,)], [(0, 2), (2, 1)], [0], "abc")
-    [0, 2, 1]
-    """
-    beside = _beside(len(rank), pairs)
-    ready = [(rank[i], i) for i in sorted(set(starts))]
-    heapq.heapify(ready)
-    seen, order = {i for _, i in ready}, list[int]()
-    while ready:
-        i = heapq.heappop(ready)[1]
-        order.append(i)
-        for j in beside[i] - seen:
-            seen.add(j)
-            heapq.heappush(ready, (rank[j], j))
-    lost = [keys[i] for i in range(len(rank)) if i not in seen]
+    """Return blocks in an order in which each touches the ground or what stands before it."""
+    order = touching_order(rank, pairs, starts)
+    lost = [keys[i] for i in sorted({*range(len(rank))} - {*order})]
     if lost:
         raise SceneError(
             f"{len(lost)} blocks touch nothing that leads to the ground, the first of them "
@@ -56,39 +34,29 @@ def upward_order(
     return order
 
 
-def _beside(count: int, pairs: Iterable[tuple[int, int]]) -> list[set[int]]:
-    """Return what each of so many blocks touches."""
-    out: list[set[int]] = [set() for _ in range(count)]
-    for a, b in pairs:
-        out[a].add(b)
-        out[b].add(a)
-    return out
-
-
 _STUB = 0.1  # of a ground end, over the smallest dimension of its block
 
 
 def build_scene(content: Content, given: Given, source: str) -> Scene:
-    """Return the scene of what a file and its user say.
+    """Return the scene of what a file and its user say, for which shapely is needed.
 
-    ``source``: what the file is called, for messages and the provenance. Result: what was read,
-    mended and assumed stands in its provenance, a line each. Raises `SceneError` if the file lacks
-    what the user did not give, or its assembly cannot be built; `FileError` if shapely is not
-    installed.
+    ``source``: what the file is called. What was read, mended and assumed stands in the provenance.
     """
     try:
         said = list(content.said)
         _check_size(content)
-        content = _upright(content.scaled(_factor(content, given, said)), given, said)
+        content = content.placed(_unit(content, given, said), _up(given, said))
         supports = _supports(content, given, said)
-        blocks = _tidied(content, supports, said)
+        blocks = [repair_shape(b, may_be_open=i in supports) for i, b in enumerate(content.blocks)]
+        total = sum((block.mended for block in blocks), Counter[str]())
+        said += [f"{text}: {count}" for text, count in total.items()]
         bricks = _bricks(content, given, blocks, supports, said)
         touching = find_contacts(content, given, blocks, bricks)
         said += touching.said
         law = _law(content, given, touching, said)
         springs = _springs(touching, bricks, law)
         order = _order(touching, content, bricks, said)
-        robots = mobile_robots([*bricks.values()], whole_number("robots", given.robots, 1))
+        robots = mobile_robots([*bricks.values()], whole_between("robots", given.robots, 1))
     except SceneError as error:
         raise SceneError(f"{source}: {error}") from error
     said.append(f"{len(robots)} robots reach all and bear all; z is up")
@@ -111,7 +79,7 @@ def _check_size(content: Content) -> None:
         raise SceneError(f"its blocks have {corners} corners; {MOST_CORNERS} is the most")
 
 
-def _factor(content: Content, given: Given, said: list[str]) -> float:
+def _unit(content: Content, given: Given, said: list[str]) -> float:
     """Return the file's unit of length in m."""
     if given.unit is not None and given.unit not in UNITS:
         raise SceneError(f"unit is {short(given.unit)}; give one of {', '.join(UNITS)}")
@@ -124,43 +92,33 @@ def _factor(content: Content, given: Given, said: list[str]) -> float:
     return UNITS[content.unit or given.unit or "m"]
 
 
-def _upright(content: Content, given: Given, said: list[str]) -> Content:
-    """Return the content with z up."""
+def _up(given: Given, said: list[str]) -> str:
+    """Return the axis of the file that points up."""
     if given.up not in UPS:
         raise SceneError(f"up is {short(given.up)}; give one of {', '.join(UPS)}")
-    if given.up == "z":
-        return content
-    said.append("y is up in the file, as given: (x, y, z) is (x, -z, y) here")
-    return content.turned()
+    if given.up == "y":
+        said.append("y is up in the file, as given: (x, y, z) is (x, -z, y) here")
+    return given.up
 
 
 def _supports(content: Content, given: Given, said: list[str]) -> set[int]:
     """Return the places of the blocks that are the ground."""
     place = {block.key: i for i, block in enumerate(content.blocks)}
-    if given.supports is None:
-        keys = [block.key for block in content.blocks if block.support]
-        origin = "as the file says"
-    else:
-        keys, origin = [*given.supports], "as given"
-    unknown = [key for key in keys if key not in place]
-    if unknown:
-        known = short(", ".join(place), 200)
-        raise SceneError(f"there is no block {short(unknown[0])}; known are {known}")
+    marked = [block.key for block in content.blocks if block.support]
+    keys = marked if given.supports is None else [*given.supports]
+    for key in keys:
+        if key not in place:
+            known = short(", ".join(place), 200)
+            raise SceneError(f"there is no block {short(key)}; known are {known}")
     if keys:
         shown = ", ".join(keys[:8])
         more = "" if len(keys) <= 8 else f" and {len(keys) - 8} more"
+        origin = "as the file says" if given.supports is None else "as given"
         said.append(f"supports are blocks {shown}{more}, {origin}: the ground")
-    if len({place[key] for key in keys}) == len(place):
+    supports = {place[key] for key in keys}
+    if len(supports) == len(place):
         raise SceneError("all blocks are supports; leave one to be built")
-    return {place[key] for key in keys}
-
-
-def _tidied(content: Content, supports: set[int], said: list[str]) -> list[Repaired]:
-    """Return the blocks as polyhedra, and say what was mended."""
-    blocks = [repair_shape(b, may_be_open=i in supports) for i, b in enumerate(content.blocks)]
-    total = sum((block.mended for block in blocks), Counter[str]())
-    said += [f"{text}: {count}" for text, count in total.items()]
-    return blocks
+    return supports
 
 
 def _bricks(
@@ -172,27 +130,21 @@ def _bricks(
     if [str(number) for number in numbers] != keys:
         said.append("blocks are numbered from 1 in the file's order")
     density = None if given.density is None else positive("density", given.density, "kg/m³")
-    silent = [
-        block.key
-        for i, block in enumerate(content.blocks)
-        if block.density is None and i not in supports
-    ]
+    built = [(i, block) for i, block in enumerate(content.blocks) if i not in supports]
+    silent = [block.key for _, block in built if block.density is None]
     if silent and density is None:
         raise SceneError(f"block {silent[0]} has no density; give one in kg/m³")
     if silent:
         said.append(f"density of {len(silent)} blocks is {density:g} kg/m³, as given")
     return {
-        i: block_brick(numbers[i], block.solid, content.blocks[i].density or density or 0.0)
-        for i, block in enumerate(blocks)
-        if i not in supports and isinstance(block.solid, Polyhedron)
+        i: block_brick(numbers[i], solid, block.density or density or 0.0)
+        for i, block in built
+        if isinstance(solid := blocks[i].solid, Polyhedron)
     }
 
 
 def block_numbers(keys: Sequence[str]) -> list[int]:
-    """Return the names of bricks: the keys of their blocks where these are numbers, else from 1.
-
-    ``keys``: of all blocks of a file.
-    """
+    """Return names of bricks: the keys of all blocks where these are numbers, else from 1."""
     if all(key.isascii() and key.isdigit() and len(key) < 10 for key in keys):
         found = [int(key) for key in keys]
         if len(set(found)) == len(keys) and max(found) < LARGEST_NUMBER // 4:
@@ -234,29 +186,12 @@ def _faceless(joint: FileJoint, bricks: Mapping[int, Brick], law: JointLaw) -> J
     """Return a joint, or a ground end, that has no face."""
     a, b = joint.blocks
     shift, turn = law.stiffness(joint.side**2, (joint.side**4 / 12,) * 2)
-    side = np.cross(joint.along, np.eye(3)[int(np.abs(joint.along).argmin())])
-    side /= np.linalg.norm(side)
-    position, along, across = as_vectors(np.stack([joint.position, joint.along, side]))
-    shift, turn = joint.translational or shift, joint.rotational or turn
+    stiffness = (joint.translational or shift, joint.rotational or turn)
+    fields = spring_fields(joint.position, joint.along, plane_axes(joint.along)[1], stiffness)
     if a != GROUND:
-        return Joint(
-            bricks=(bricks[a].name, bricks[b].name),
-            position=position,
-            along=along,
-            across=across,
-            translational_stiffness=shift,
-            rotational_stiffness=turn,
-        )
+        return Joint(bricks=(bricks[a].name, bricks[b].name), **fields)
     behind = joint.position - _STUB * min(bricks[b].dimensions) * joint.along
-    return Ground(
-        brick=bricks[b].name,
-        position=position,
-        along=along,
-        across=across,
-        translational_stiffness=shift,
-        rotational_stiffness=turn,
-        anchor=as_vectors(behind[None])[0],
-    )
+    return Ground(brick=bricks[b].name, anchor=as_vector(behind), **fields)
 
 
 def _order(

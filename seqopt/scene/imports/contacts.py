@@ -1,42 +1,252 @@
-"""Where the blocks of a file touch each other and the ground: its own faces, or those found."""
+"""Where the blocks of a file touch each other and the ground: its own faces, or those found.
+
+Polygons are shapely's.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
-from seqopt.arrays import Floats, FrozenValue, Vector
-from seqopt.errors import SceneError
-from seqopt.scene.boxes import as_vectors
+from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.errors import FileError, SceneError
+from seqopt.scene.boxes import as_vector, spring_fields
 from seqopt.scene.checks import positive, short
 from seqopt.scene.imports.content import Content, FileJoint, Given
-from seqopt.scene.imports.detection import (
-    OPPOSED,
-    Surface,
-    convex_pieces,
-    require_polygons,
-    touching_faces,
-)
-from seqopt.scene.imports.repair import Repaired
+from seqopt.scene.imports.meshes import Repaired
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.parts import Brick, Ground, Joint
-from seqopt.scene.shape import Polyhedron, normal_of
+from seqopt.scene.shape import Polyhedron, Surface, normal_of, plane_axes
+from seqopt.work.progress import Progress, Tell
+
+_Shape = Polyhedron | Surface
+_THIN_PIECE = 1e-6  # by which the hull of what is convex may be larger, over its area
+_GRAIN = 1e-9  # length to which corners are rounded, over the size of what overlaps
+
+
+def _convex_pieces(polygons: Sequence[Any]) -> Iterator[Floats]:
+    """Yield the convex pieces of a union of polygons: corners (m, 2), counterclockwise, m."""
+    shapely = import_module("shapely")
+    size = max((max(abs(x) for x in polygon.bounds) for polygon in polygons), default=1.0)
+    grain = _GRAIN * size
+    try:
+        whole = shapely.unary_union(list(polygons), grid_size=grain).simplify(grain)
+        for part in _polygons(whole):
+            if part.is_empty:
+                continue
+            if _is_convex(part):
+                yield _corners(part)
+                continue
+            triangles = [*shapely.constrained_delaunay_triangles(part).geoms]
+            yield from map(_corners, _merged(triangles, grain))
+    except import_module("shapely.errors").ShapelyError as error:  # they are too degenerate
+        raise SceneError(f"a face where blocks touch cannot be cut: {short(error, 80)}") from error
+
+
+def _polygons(shape: Any) -> list[Any]:
+    """Return the polygons that a shape consists of, among points and lines perhaps."""
+    return [part for part in getattr(shape, "geoms", [shape]) if part.geom_type == "Polygon"]
+
+
+def _valid(corners: Floats) -> Any:
+    """Return corners (m, 2) as a polygon, or polygons where they cross themselves."""
+    shapely = import_module("shapely")
+    return shapely.make_valid(shapely.Polygon(corners))
+
+
+def _merged(pieces: list[Any], grain: float) -> list[Any]:
+    """Return convex polygons united as long as two of them have a convex union."""
+    pieces = sorted(pieces, key=lambda piece: -piece.area)
+    i = 0
+    while i < len(pieces):
+        for j in range(i + 1, len(pieces)):
+            if pieces[i].intersection(pieces[j]).length <= grain:
+                continue
+            union = pieces[i].union(pieces[j], grid_size=grain).simplify(grain)
+            if union.geom_type == "Polygon" and _is_convex(union):
+                pieces[i] = union
+                del pieces[j]
+                break
+        else:
+            i += 1
+    return pieces
+
+
+def _is_convex(polygon: Any) -> bool:
+    hull = polygon.convex_hull.area
+    return not polygon.interiors and bool(hull - polygon.area <= _THIN_PIECE * hull)
+
+
+def _corners(polygon: Any) -> Floats:
+    """Return the corners of the hull of a polygon that is convex but for rounding."""
+    hull = import_module("shapely").geometry.polygon.orient(polygon.convex_hull)
+    return np.array(hull.exterior.coords)[:-1]
+
+
+_OPPOSED = np.cos(np.radians(15.0))  # cosine from which on normals are against each other
+_LEVEL = 1 - 1e-6  # cosine from which on faces are in one plane
+_MOST_PAIRS = 300_000  # of blocks that are near each other
+_SLIVER = 1e-6  # overlap treated as zero, over the smaller of two faces
+
+_Plane = tuple[Floats, Floats, list[Any]]  # origin, axes, and polygons in it
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _TouchingFace(FrozenValue):
+    """A convex face between two blocks."""
+
+    blocks: tuple[int, int]  # places of the blocks, ascending
+    corners: Floats  # (m, 3); once around, m
+    normal: Floats  # (3,); unit vector from the first block into the second
+
+
+@dataclass(frozen=True)
+class _Facets:
+    """The faces of a block: corners, unit normals outward, and middles."""
+
+    corners: tuple[Floats, ...]
+    normal: Floats
+    middle: Floats
+
+
+def _require_polygons() -> None:
+    """Require what cuts polygons."""
+    if find_spec("shapely") is None:
+        raise FileError("finding where blocks touch needs shapely; pip install 'seqopt[blocks]'")
+
+
+def touching_faces(
+    shapes: Sequence[_Shape], gap: float, progress: Tell | None = None
+) -> tuple[_TouchingFace, ...]:
+    """Return the faces over which blocks touch, in the order of the blocks.
+
+    Two blocks touch where a face of one lies on a face of the other: normals against each other,
+    and no more than a gap between the planes anywhere in the overlap. What overlaps in one plane is
+    united and cut into convex pieces, each a face of its own, halfway between the two.
+
+    ``shapes``: where they are in the scene; ``gap``: most that may lie between two faces, or by
+    which they may interpenetrate, m; ``progress``: told how far it is, once it takes longer than a
+    second. Raises `FileError` if shapely is not installed.
+
+    Examples
+    --------
+    >>> from seqopt.scene.shape import Polyhedron
+    >>> corners = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0.5, 1))
+    >>> sides = ((0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4))
+    >>> up = Polyhedron(corners, (*sides, (3, 2, 1, 0)))
+    >>> down = Polyhedron(
+    ...     tuple((x, y, -z) for x, y, z in corners),
+    ...     (*(side[::-1] for side in sides), (0, 1, 2, 3)),
+    ... )
+    >>> [(face.blocks, face.normal.tolist()) for face in touching_faces([up, down], 1e-6)]
+    [((0, 1), [0.0, 0.0, -1.0])]
+    """
+    _require_polygons()
+    gap = positive("gap", gap, "m")
+    for shape in shapes:
+        if not hasattr(shape, "points") or not hasattr(shape, "faces"):
+            raise SceneError(f"shapes: {short(shape)} is not a shape; give each as Polyhedron(...)")
+    return tuple(_found(shapes, gap, Progress("finding faces", len(shapes), progress)))
+
+
+def _found(shapes: Sequence[_Shape], gap: float, course: Progress) -> Iterator[_TouchingFace]:
+    """Yield the faces over which blocks touch, pair by pair."""
+    facets, done = [_facets(shape) for shape in shapes], 0
+    for tries, (i, j) in enumerate(_near(shapes, gap)):
+        course.add(i - done)
+        done = i
+        if tries == _MOST_PAIRS:
+            raise SceneError(f"more than {_MOST_PAIRS} pairs of blocks are in one place; part them")
+        for polygons, (origin, axes) in _overlaps(facets[i], facets[j], gap):
+            for piece in _convex_pieces(polygons):
+                yield _TouchingFace((i, j), origin + piece @ axes[1:], axes[0])
+
+
+def _facets(shape: _Shape) -> _Facets:
+    corners = tuple(shape.points[list(face)] for face in shape.faces)
+    normals = np.array([normal_of(face) for face in corners])
+    size = np.linalg.norm(normals, axis=1, keepdims=True)
+    return _Facets(corners, normals / size, np.array([face.mean(axis=0) for face in corners]))
+
+
+def _near(shapes: Sequence[_Shape], gap: float) -> Iterator[tuple[int, int]]:
+    """Yield pairs of blocks whose boxes along the axes are no farther apart than a gap."""
+    low = np.array([shape.points.min(axis=0) for shape in shapes]).reshape(-1, 3) - gap
+    high = np.array([shape.points.max(axis=0) for shape in shapes]).reshape(-1, 3)
+    for i in range(len(shapes)):
+        later = slice(i + 1, None)
+        over = ((low[later] <= high[i]) & (low[i] <= high[later])).all(axis=1)
+        for j in np.flatnonzero(over):
+            yield i, i + 1 + int(j)
+
+
+def _overlaps(first: _Facets, second: _Facets, gap: float) -> Iterator[tuple[list[Any], Any]]:
+    """Yield overlaps of the faces of two blocks, plane by plane, with the origins and axes."""
+    planes: list[_Plane] = []
+    for k, m in _opposed(first, second, gap):
+        normal = first.normal[k] - second.normal[m]
+        normal /= np.linalg.norm(normal)
+        middle = 0.5 * (first.middle[k] + second.middle[m])
+        same = next((plane for plane in planes if _in_plane(plane, normal, middle, gap)), None)
+        origin, axes, known = (middle, plane_axes(normal), []) if same is None else same
+        known += _overlap(first.corners[k], second.corners[m], (origin, axes), gap)
+        if same is None and known:
+            planes.append((origin, axes, known))
+    for origin, axes, polygons in planes:
+        yield polygons, (origin, axes)
+
+
+def _in_plane(plane: _Plane, normal: Floats, middle: Floats, gap: float) -> bool:
+    """Return whether a face lies in a plane, no farther off than half a gap."""
+    origin, axes, _ = plane
+    return bool(normal @ axes[0] > _LEVEL and abs((middle - origin) @ axes[0]) <= 0.5 * gap)
+
+
+def _opposed(first: _Facets, second: _Facets, gap: float) -> Ints:
+    """Return pairs (P, 2) of faces that look at each other from near planes."""
+    against = first.normal @ second.normal.T < -_OPPOSED
+    step = second.middle[None] - first.middle[:, None]
+    apart = np.abs(np.einsum("kmi,ki->km", step, first.normal))
+    wide = np.linalg.norm(step, axis=2)
+    return np.argwhere(against & (apart <= gap + (1 - _OPPOSED**2) ** 0.5 * wide)).astype(np.int64)
+
+
+def _overlap(first: Floats, second: Floats, plane: tuple[Floats, Floats], gap: float) -> list[Any]:
+    """Return the overlap of two faces (m, 3), seen along a normal, if they are near all over it."""
+    shapely = import_module("shapely")
+    origin, axes = plane
+    seen = [(face - origin) @ axes.T for face in (first, second)]
+    one, other = (_valid(face[:, 1:]) for face in seen)
+    common = one.intersection(other)
+    if not common.area > _SLIVER * min(one.area, other.area):
+        return []
+    points = shapely.get_coordinates(common)
+    heights = [_heights(face, points) for face in seen]
+    if np.abs(heights[1] - heights[0]).max() > gap:
+        return []
+    return _polygons(common)
+
+
+def _heights(face: Floats, points: Floats) -> Floats:
+    """Return how high a plane through corners (m, 3) lies over points (k, 2) of its first axis."""
+    normal, middle = normal_of(face), face.mean(axis=0)
+    return np.asarray(middle[0] - (points - middle[1:]) @ normal[1:] / normal[0])
+
 
 _STUB = 0.05  # m; from a face on the ground to the fixed point behind it
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _FlatFace(FrozenValue):
-    """A convex face in its own plane.
+    """A convex face in its own plane: m, m², m⁴.
 
-    ``center`` (3,): centroid, m; ``axes`` (3, 3): rows are unit vectors: the normal, and the two
-    principal axes of the area; ``corners`` (m, 2): from the centroid along the principal axes,
-    counterclockwise, m; ``area``: m²; ``moments``: second moments of area about the principal axes,
-    m⁴.
+    ``axes`` (3, 3): rows are the normal and the principal axes of the area; ``corners`` (m, 2):
+    from the centroid along these, counterclockwise; ``moments``: about these.
     """
 
     center: Floats
@@ -47,17 +257,10 @@ class _FlatFace(FrozenValue):
 
 
 def flat_face(corners: Floats, normal: Floats | None = None) -> _FlatFace:
-    """Return a face in its own plane.
+    """Return a face (m, 3) in its mean plane; ``normal``: to which side it looks.
 
-    ``corners`` (m, 3): once around, m; what leaves their plane is projected onto it. ``normal``
-    (3,): to which side the normal points; counterclockwise corners by default. Raises `SceneError`
-    if it has no area, or crosses itself so much that it is none.
-
-    Examples
-    --------
-    >>> face = flat_face(np.array([[0.0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]]))
-    >>> face.area, face.axes[0].tolist(), [round(m, 4) for m in face.moments]
-    (2.0, [0.0, 0.0, 1.0], [0.1667, 0.6667])
+    Corners are counterclockwise by default. Raises `SceneError` if it has no area, or crosses
+    itself.
     """
     corners = np.asarray(corners, dtype=float).reshape(-1, 3)
     across = normal_of(corners) if len(corners) > 2 else np.zeros(3)
@@ -85,43 +288,22 @@ def flat_face(corners: Floats, normal: Floats | None = None) -> _FlatFace:
     )
 
 
-def face_joint(bricks: tuple[int, int], face: _FlatFace, law: JointLaw) -> Joint:
-    """Return the joint of two bricks over a face.
+def _fields(face: _FlatFace, law: JointLaw) -> dict[str, Any]:
+    """Return what a joint and a ground end over a face have in common."""
+    stiffness = law.stiffness(face.area, face.moments)
+    fields = spring_fields(face.center, face.axes[0], face.axes[1], stiffness)
+    return {**fields, "face": tuple((x, y) for x, y in face.corners.tolist())}
 
-    ``bricks``: names; the face's normal points from the first into the second.
-    """
-    shift, turn = law.stiffness(face.area, face.moments)
-    position, along, across = as_vectors(np.vstack([face.center, face.axes[:2]]))
-    return Joint(
-        bricks=bricks,
-        position=position,
-        along=along,
-        across=across,
-        translational_stiffness=shift,
-        rotational_stiffness=turn,
-        face=_pairs(face.corners),
-    )
+
+def face_joint(bricks: tuple[int, int], face: _FlatFace, law: JointLaw) -> Joint:
+    """Return the joint of two bricks over a face whose normal points into the second."""
+    return Joint(bricks=bricks, **_fields(face, law))
 
 
 def face_ground(brick: int, face: _FlatFace, law: JointLaw, stub: float = _STUB) -> Ground:
-    """Return the ground end of a brick over a face.
-
-    ``brick``: name; the face's normal points into it. ``stub``: from the face to the fixed point
-    behind it, m.
-    """
-    shift, turn = law.stiffness(face.area, face.moments)
-    position, along, across = as_vectors(np.vstack([face.center, face.axes[:2]]))
-    anchor: Vector = as_vectors((face.center - stub * face.axes[0])[None])[0]
-    return Ground(
-        brick=brick,
-        position=position,
-        along=along,
-        across=across,
-        translational_stiffness=shift,
-        rotational_stiffness=turn,
-        anchor=anchor,
-        face=_pairs(face.corners),
-    )
+    """Return the ground end of a brick over a face whose normal points into it; ``stub`` in m."""
+    anchor = as_vector(face.center - stub * face.axes[0])
+    return Ground(brick=brick, anchor=anchor, **_fields(face, law))
 
 
 def _moments(flat: Floats) -> tuple[float, Floats, Floats]:
@@ -147,26 +329,20 @@ def _principal(spread: Floats) -> Floats:
     return np.array([first, [-first[1], first[0]]])
 
 
-def _pairs(corners: Floats) -> tuple[tuple[float, float], ...]:
-    return tuple((x, y) for x, y in corners.tolist())
-
-
 _GAP = 0.05  # between faces that touch, over the thinnest block
 _OFF = 0.05  # of a face from a block that it joins, over the size of the block
 _ASIDE = 1e-2  # how far beside a face a point is that tells on which side of it a block lies
 GROUND = -1
 _DOWN = np.array([0.0, 0.0, -1.0])
 
-_Shape = Polyhedron | Surface
 _Held = tuple[tuple[int, int], _FlatFace]
 
 
 @dataclass(frozen=True)
 class Contacts:
-    """Where blocks touch each other and the ground.
+    """Where blocks touch: faces whose normals point into the second, and joints without a face.
 
-    ``faces`` (int, int): places of the blocks in the file, the ground is -1 and comes first;
-    normals point into the second. ``joints``: those without a face. ``said``: where they come from.
+    Places are those of the file; the ground is -1 and comes first.
     """
 
     faces: tuple[_Held, ...]
@@ -182,13 +358,8 @@ class Contacts:
 def find_contacts(
     content: Content, given: Given, blocks: Sequence[Repaired], bricks: Mapping[int, Brick]
 ) -> Contacts:
-    """Return where blocks touch each other and the ground.
-
-    ``content``: in m. ``blocks``: all of the file. ``bricks``: those that are built, by their
-    places in the file; others are the ground. Raises `FileError` if shapely is not installed;
-    `SceneError` if a face of the file does not lie on a block that it joins.
-    """
-    require_polygons("finding where blocks touch")
+    """Return where blocks touch each other and the ground, which those not built belong to."""
+    _require_polygons()
     solids, facets = [block.solid for block in blocks], [block.facets for block in blocks]
     thin = min(min(brick.dimensions) for brick in bricks.values())
     gap = _GAP * thin if given.gap is None else positive("gap", given.gap, "m")
@@ -251,23 +422,19 @@ def _off_blocks(content: Content, facets: Sequence[Surface], gap: float) -> list
 
 def _sides(solid: Surface) -> Iterator[tuple[_FlatFace, Any]]:
     """Yield the sides of a block in their mean planes, and as polygons there."""
-    shapely = import_module("shapely")
     for face in solid.faces:
         flat = flat_face(solid.points[list(face)])
-        yield flat, shapely.make_valid(shapely.Polygon(flat.corners))
+        yield flat, _valid(flat.corners)
 
 
 def _file_faces(content: Content, solids: Sequence[_Shape]) -> Iterator[_Held]:
     """Yield the faces of a file, in convex pieces, their normals into the second block."""
-    shapely = import_module("shapely")
     for held in content.faces:
         a, b = held.blocks
         if a == b or len(held.corners) < 3:
             continue
         plane = flat_face(held.corners)
-        polygon = shapely.make_valid(shapely.Polygon(plane.corners))
-        parts = [p for p in getattr(polygon, "geoms", [polygon]) if p.geom_type == "Polygon"]
-        for piece in convex_pieces(parts):
+        for piece in _convex_pieces(_polygons(_valid(plane.corners))):
             corners = plane.center + piece @ plane.axes[1:]
             yield (a, b), flat_face(corners, _into(corners, plane.axes[0], solids[a], solids[b]))
 
@@ -297,8 +464,8 @@ def _standing(bricks: Mapping[int, Brick], solids: Sequence[_Shape], gap: float)
         for face in solids[i].faces:
             corners = solids[i].points[list(face)]
             flat = flat_face(corners)
-            if flat.axes[0] @ _DOWN > OPPOSED and corners[:, 2].max() <= level + gap:
+            if flat.axes[0] @ _DOWN > _OPPOSED and corners[:, 2].max() <= level + gap:
                 low.append(shapely.Polygon(corners[:, :2]))
-        for piece in convex_pieces(low) if low else ():
+        for piece in _convex_pieces(low) if low else ():
             height = np.full((len(piece), 1), level)
             yield (GROUND, i), flat_face(np.hstack([piece, height]), -_DOWN)

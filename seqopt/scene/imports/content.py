@@ -1,19 +1,25 @@
-"""What a file says about an assembly, and what the user has to add."""
+"""What a file says about an assembly, what the user has to add, and JSON that is read strictly."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import Floats
+from seqopt.errors import SceneError
+from seqopt.scene.checks import as_float, reading_json, short
 from seqopt.scene.library.common import JointLaw
 from seqopt.work.progress import Tell
 
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}  # m
 UPS = ("z", "y")
 _Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # (x, y, z) to (x, -z, y)
+LARGEST = 1e15  # number: products of coordinates beyond lose all digits
 MOST_BLOCKS = 20_000
 MOST_CORNERS = 2_000_000  # of all faces of all blocks
 
@@ -42,10 +48,9 @@ class FileFace:
 class FileJoint:
     """A joint that has a place and no face. Where its blocks touch over faces, these count.
 
-    ``blocks``: places among the blocks; -1 first for the ground. ``position``, ``along`` (3,): in
-    the file's unit of length; a direction. ``side``: of the square over which the law of joints is
-    taken, in the file's unit of length. ``translational``, ``rotational``: N/m, N m/rad, along and
-    across; in place of the law's.
+    ``blocks``: -1 first for the ground. ``side``: of the square over which the law of joints is
+    taken, in the file's unit, unless ``translational``, N/m, and ``rotational``, N m/rad, are
+    given.
     """
 
     blocks: tuple[int, int]
@@ -65,30 +70,23 @@ class Content:
     joints: tuple[FileJoint, ...] = ()  # of frames and of beams that run into each other
     unit: str | None = None  # unit of length, one of `UNITS`, if the file says it
     law: JointLaw | None = None  # if the file has stiffnesses
-    said: tuple[str, ...] = field(default=())  # what was read, left out or assumed
+    said: tuple[str, ...] = ()  # what was read, left out or assumed
 
-    def scaled(self, factor: float) -> Content:
-        """Return the content with all lengths times a factor."""
-        return replace(
-            self,
-            blocks=tuple(replace(b, vertices=factor * b.vertices) for b in self.blocks),
-            faces=tuple(replace(f, corners=factor * f.corners) for f in self.faces),
-            joints=tuple(
-                replace(j, position=factor * j.position, side=factor * j.side) for j in self.joints
-            ),
+    def placed(self, unit: float, up: str) -> Content:
+        """Return the content in m, with z up. ``unit``: of its lengths, m; ``up``: one of `UPS`."""
+        turn = _Y_TO_Z if up == "y" else np.eye(3)
+        blocks = (replace(b, vertices=unit * b.vertices @ turn) for b in self.blocks)
+        faces = (replace(f, corners=unit * f.corners @ turn) for f in self.faces)
+        joints = (
+            replace(
+                joint,
+                position=unit * joint.position @ turn,
+                side=unit * joint.side,
+                along=joint.along @ turn,
+            )
+            for joint in self.joints
         )
-
-    def turned(self) -> Content:
-        """Return the content of a file whose y is up, with z up."""
-        return replace(
-            self,
-            blocks=tuple(replace(b, vertices=b.vertices @ _Y_TO_Z) for b in self.blocks),
-            faces=tuple(replace(f, corners=f.corners @ _Y_TO_Z) for f in self.faces),
-            joints=tuple(
-                replace(j, position=j.position @ _Y_TO_Z, along=j.along @ _Y_TO_Z)
-                for j in self.joints
-            ),
-        )
+        return replace(self, blocks=tuple(blocks), faces=tuple(faces), joints=tuple(joints))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,3 +112,67 @@ class Given:
     robots: int = 3
     name: str | None = None
     progress: Tell | None = None
+
+
+Entry = dict[str, Any]
+
+
+def parse_json(text: str, source: str) -> Any:
+    """Return a JSON document, nested no deeper and with no longer numbers than Python reads."""
+    with reading_json(source, "an assembly"):
+        return json.loads(text, parse_constant=partial(_refuse, source))
+
+
+def _refuse(source: str, name: str) -> float:
+    raise SceneError(f"{source}: {name} stands where a number should; give finite numbers")
+
+
+def mapping(where: str, value: object) -> Entry:
+    """Return an object of a document."""
+    if not isinstance(value, dict):
+        raise SceneError(f"{where} is {short(value)}; an object is expected")
+    return value
+
+
+def entry(where: str, holder: object, *keys: str) -> Any:
+    """Return what stands in an object under the first of some keys that there is."""
+    found = mapping(where, holder)
+    for key in keys:
+        if key in found:
+            return found[key]
+    raise SceneError(f"{where}: {' or '.join(keys)} is missing")
+
+
+def listing(where: str, value: object, most: int = 10**7) -> list[Any]:
+    """Return a list of a document. ``most``: entries that it may have."""
+    if not isinstance(value, list):
+        raise SceneError(f"{where} is {short(value)}; a list is expected")
+    if len(value) > most:
+        raise SceneError(f"{where} has {len(value)} entries; {most} is the most")
+    return value
+
+
+def number(where: str, value: object) -> float:
+    """Return a finite number of a document, up to `LARGEST`."""
+    found = as_float(value)
+    if not abs(found) <= LARGEST or isinstance(value, bool):
+        raise SceneError(
+            f"{where} is {short(value)}; a finite number up to {LARGEST:g} is expected"
+        )
+    return found
+
+
+def point(where: str, value: object) -> Floats:
+    """Return a point (3,) of a document: three numbers, as they are or in an object of COMPAS."""
+    plain = value
+    while isinstance(plain, dict):
+        plain = entry(where, plain, "data", "value", "point")
+    row = listing(where, plain)
+    if len(row) != 3:
+        raise SceneError(f"{where} is {short(value)}; three numbers are expected")
+    return np.array([number(where, x) for x in row])
+
+
+def points(where: str, value: object) -> Floats:
+    """Return the points (k, 3) of a list of a document."""
+    return np.array([point(where, row) for row in listing(where, value)]).reshape(-1, 3)

@@ -1,20 +1,25 @@
-"""File formats of other programs, how they are recognized, and reading them as scenes."""
+"""File formats of other programs, how they are recognized, and reading them; tables of boxes."""
 
 from __future__ import annotations
 
+import csv
+import io
+import math
 import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
 from seqopt.errors import SceneError, SceneWarning
 from seqopt.files import read_bytes, read_text
+from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.checks import printable, short
-from seqopt.scene.imports.boxes_csv import read_boxes
 from seqopt.scene.imports.building import build_scene
-from seqopt.scene.imports.compas_data import kind, parse_json
-from seqopt.scene.imports.compas_models import read_assembly, read_model, read_timber
-from seqopt.scene.imports.content import Content, Given
+from seqopt.scene.imports.compas_models import kind, read_assembly, read_model, read_timber
+from seqopt.scene.imports.content import LARGEST, MOST_BLOCKS, Content, FileBlock, Given, parse_json
 from seqopt.scene.imports.frames import read_frame
 from seqopt.scene.imports.meshes import read_mesh, read_obj
 from seqopt.scene.scene import Scene
@@ -79,11 +84,7 @@ def _warn_of_lying(scene: Scene) -> None:
 
 
 def read_content(path: Path, form: str | None = None) -> Content:
-    """Return what a file of others says.
-
-    ``form``: one of `FORMATS`; by default what the file looks like. Raises `FileError` if the file
-    cannot be read, or what reads it is not installed.
-    """
+    """Return what a file says, in one of `FORMATS`; by default in that which it looks like."""
     source = str(path)
     named = _SUFFIXES.get(path.suffix.lower()) if form is None else form
     if named is None or (form is not None and form not in FORMATS):
@@ -93,16 +94,13 @@ def read_content(path: Path, form: str | None = None) -> Content:
         return read_mesh(read_bytes(path), source, named)
     text = read_text(path)
     if named in ("boxes", "obj"):
-        return (read_boxes if named == "boxes" else read_obj)(text, source)
+        return (_read_boxes if named == "boxes" else read_obj)(text, source)
     document = parse_json(text, source)
     return _DOCUMENTS[named or sniffed(document, source)](document, source)
 
 
 def sniffed(document: Any, source: str) -> str:
-    """Return which format a JSON document has.
-
-    Result: one of `_DOCUMENTS`. Raises `SceneError` if it has none of them.
-    """
+    """Return which of `_DOCUMENTS` a JSON document is."""
     by_kind = {"blockmodel": "compas_dem", "problem": "compas_dem", "timbermodel": "compas_timber"}
     if kind(document) in by_kind:
         return by_kind[kind(document)]
@@ -114,3 +112,76 @@ def sniffed(document: Any, source: str) -> str:
     if isinstance(document, list) or keys & {"graph", "node", "blocks", "assembly", "data"}:
         return "compas_assembly"
     raise SceneError(f"{source}: no assembly that is known; give one of {', '.join(FORMATS)}")
+
+
+_NEEDED = ("x", "y", "z", "length", "width", "height")
+_TURNS = ("roll", "pitch", "yaw")
+_COLUMNS = (*_NEEDED, *_TURNS, "name", "support", "density", "course")
+_YES, _NO = ("1", "true", "yes"), ("", "0", "false", "no")
+
+
+def _read_boxes(text: str, source: str) -> Content:
+    """Return the boxes of a table with the columns `_NEEDED`, the centroid and sizes.
+
+    Others of `_COLUMNS` may be there: turns are in degrees about x, then y, then z.
+    """
+    try:
+        reader = csv.DictReader(io.StringIO(text), restval="")
+        rows = [row for row, _ in zip(reader, range(MOST_BLOCKS + 1), strict=False)]
+    except csv.Error as error:
+        raise SceneError(f"{source}: not a readable CSV file: {error}") from error
+    names = [name or "" for name in reader.fieldnames or ()]
+    _check_columns(source, names)
+    if not rows or len(rows) > MOST_BLOCKS:
+        raise SceneError(f"{source}: {len(rows)} rows; give 1 to {MOST_BLOCKS} boxes")
+    return Content(
+        tuple(_box(f"{source}, row {i}", str(i), row) for i, row in enumerate(rows, start=1)),
+        said=("a table of boxes: no faces",),
+    )
+
+
+def _check_columns(source: str, names: list[str]) -> None:
+    missing = [name for name in _NEEDED if name not in names]
+    if missing:
+        raise SceneError(f"{source}: column {missing[0]} is missing; give {', '.join(_NEEDED)}")
+    for name in names:
+        if name not in _COLUMNS or names.count(name) > 1:
+            why = "occurs twice" if name in _COLUMNS else "is not known"
+            raise SceneError(f"{source}: column {short(name)} {why}; give {', '.join(_COLUMNS)}")
+
+
+def _box(where: str, key: str, row: dict[str, str]) -> FileBlock:
+    center = np.array([_number(where, row, name) for name in "xyz"])
+    size = np.array([_number(where, row, name) for name in ("length", "width", "height")])
+    if not size.min() > 0:
+        raise SceneError(f"{where}: its sizes are {size.tolist()}; give positive ones")
+    angles = [_number(where, row, name, "0") for name in _TURNS]
+    frame = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
+    density = _number(where, row, "density", "nan")
+    course = _number(where, row, "course", "nan")
+    return FileBlock(
+        row.get("name", "").strip() or key,
+        center + 0.5 * (BOX_CORNERS * size) @ frame.T,
+        BOX_FACES,
+        support=_flag(where, row),
+        density=None if math.isnan(density) else density,
+        course=None if math.isnan(course) else course,
+    )
+
+
+def _number(where: str, row: dict[str, str], name: str, otherwise: str = "") -> float:
+    text = (row.get(name) or "").strip()
+    try:
+        value = float(text or otherwise)
+    except ValueError:
+        value = math.inf
+    if abs(value) > LARGEST or (text and math.isnan(value)):
+        raise SceneError(f"{where}: {name} is {short(text)}; give a number")
+    return value
+
+
+def _flag(where: str, row: dict[str, str]) -> bool:
+    text = (row.get("support") or "").strip().lower()
+    if text not in (*_YES, *_NO):
+        raise SceneError(f"{where}: support is {short(text)}; give 1 or 0")
+    return text in _YES

@@ -17,26 +17,24 @@ from seqopt.errors import SceneError
 from seqopt.scene.arch import STANDARD_GRAVITY
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.checks import short
-from seqopt.scene.imports.compas_data import Entry, entry, listing, mapping, number, point
-from seqopt.scene.imports.content import Content, FileBlock, FileJoint
+from seqopt.scene.imports.content import (
+    UNITS,
+    Content,
+    Entry,
+    FileBlock,
+    FileJoint,
+    entry,
+    listing,
+    mapping,
+    number,
+    point,
+)
+from seqopt.scene.shape import plane_axes
 
 _UNITS = {"meter": "m", "m": "m", "centimeter": "cm", "cm": "cm", "millimeter": "mm", "mm": "mm"}
-_MEASURES = {
-    "m2": 1.0,
-    "cm2": 1e-4,
-    "mm2": 1e-6,
-    "m4": 1.0,
-    "cm4": 1e-8,
-    "mm4": 1e-12,
-    "kN/m2": 1e3,
-    "kN/cm2": 1e7,
-    "N/mm2": 1e6,
-    "MPa": 1e6,
-    "Pa": 1.0,
-    "kN/m3": 1e3,
-    "N/m3": 1.0,
-    "kN/cm3": 1e9,
-}  # in m, N
+_MEASURES = {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6, "m4": 1.0, "cm4": 1e-8, "mm4": 1e-12}
+_MEASURES |= {"kN/m2": 1e3, "kN/cm2": 1e7, "N/mm2": 1e6, "MPa": 1e6, "Pa": 1.0}
+_MEASURES |= {"kN/m3": 1e3, "N/m3": 1.0, "kN/cm3": 1e9}  # in m, N
 _GROUND = -1
 _LEAST = 1e-30  # area, second moment, modulus or density treated as zero
 
@@ -61,11 +59,10 @@ class _Bar:
 
 
 def read_frame(document: Any, source: str) -> Content:
-    """Return the bars of a frame.
+    """Return the bars of a frame: ``nodes``, ``elements``, ``materials`` and ``cross_secs``.
 
-    ``document``: A JSON document with ``nodes``, ``elements``, ``materials`` and ``cross_secs``.
-    Where it does not name the units of materials and cross-sections, they are kN and m. The density
-    is a weight per volume. Result: in m. Raises `SceneError` if it is no such frame.
+    Where they do not name units, materials and cross-sections are in kN and m. The density is a
+    weight per volume.
     """
     held = mapping(source, document)
     nodes, grounded = _nodes(source, held)
@@ -85,7 +82,6 @@ def _nodes(source: str, held: Entry) -> tuple[Floats, set[int]]:
     unit = held.get("unit", "meter")
     if not isinstance(unit, str) or unit not in _UNITS:
         raise SceneError(f"{source}: unit is {short(unit)}; one of {', '.join(_UNITS)} is expected")
-    factor = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}[_UNITS[unit]]
     rows = listing(f"{source}: nodes", entry(source, held, "nodes"), 20_000)
     places = [
         point(f"{source}: node {i}", entry(f"{source}: node {i}", row, "point"))
@@ -96,7 +92,7 @@ def _nodes(source: str, held: Entry) -> tuple[Floats, set[int]]:
         fixed.add(_index(f"{source}: supports", mapping(source, row).get("node_ind"), len(rows)))
     if not fixed:
         raise SceneError(f"{source}: no node is_grounded; name one")
-    return factor * np.array(places).reshape(-1, 3), fixed
+    return UNITS[_UNITS[unit]] * np.array(places).reshape(-1, 3), fixed
 
 
 def _index(where: str, value: Any, count: int) -> int:
@@ -157,16 +153,10 @@ def _block(place: int, bar: _Bar) -> FileBlock:
     along = bar.ends[1] - bar.ends[0]
     if not bar.length > 0:
         raise SceneError(f"element {place}: its nodes are in one place; move them apart")
-    axes = _axes(along / bar.length)
+    axes = plane_axes(along / bar.length)
     size = np.array([bar.length, math.sqrt(bar.area), math.sqrt(bar.area)])
     corners = bar.ends.mean(axis=0) + 0.5 * (BOX_CORNERS * size) @ axes
     return FileBlock(str(place), corners, BOX_FACES, density=bar.density, course=bar.layer)
-
-
-def _axes(along: Floats) -> Floats:
-    side = np.cross(along, np.eye(3)[int(np.abs(along).argmin())])
-    side /= np.linalg.norm(side)
-    return np.stack([along, side, np.cross(along, side)])
 
 
 def _joints(bars: list[_Bar], grounded: set[int]) -> list[FileJoint]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from typing import Any, get_type_hints
+from dataclasses import dataclass, replace
+from typing import Any
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, did_you_mean
@@ -32,50 +32,36 @@ _VAULT = (
 )
 
 
-def _vault338(arch: Scene) -> Scene:
-    """Return the vault of Bruun et al. as we reconstruct it around their arch.
-
-    ``arch``: ``arch25``.
-    """
+def _vault338(load: Callable[[str], Scene]) -> Scene:
+    """Return the vault of Bruun et al. as we reconstruct it around their arch."""
     shape = VaultShape(
         bricks=338, spacing=0.1327, plan_angle=math.radians(5.1), skew=1.74, widening=0.0234
     )
-    return replace(herringbone_vault(arch, shape, "vault338"), provenance=_VAULT)
+    return replace(herringbone_vault(load("arch25"), shape, "vault338"), provenance=_VAULT)
 
 
-def _dome163() -> Scene:
+def _dome163(_load: Callable[[str], Scene]) -> Scene:
     """Return a dome of the size at which benchmarks of domes are taken."""
     shape = DomeShape(courses=10, around=22, rise=0.7, opening=0.6, thickness=0.06)
     return dome(shape, "dome163")
 
 
-GENERATED: dict[str, Callable[[Callable[[str], Scene]], Scene]] = {
-    "dome163": lambda load: _dome163(),  # noqa: ARG005
-    "vault338": lambda load: _vault338(load("arch25")),
-}  # by name; each takes what loads a scene that is a file
+GENERATED = {"dome163": _dome163, "vault338": _vault338}
+"""Scenes by name; each takes what loads a scene that is a file."""
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """A kind of scene that a few words describe.
-
-    ``about``: what it is, and an example. ``make``: makes the scene. ``shape``: of the numbers that
-    it takes as one value; by default it takes them one by one.
-    """
+    """A kind of scene: what it is with an example, what makes it, and the shape that this takes."""
 
     about: str
     make: Callable[..., Scene]
     shape: type | None = None
 
-    def hints(self) -> dict[str, Any]:
-        """Return the numbers that it takes, by name, and what each is."""
-        names = (
-            [field.name for field in fields(self.shape)]
-            if self.shape is not None
-            else list(inspect.signature(self.make).parameters)
-        )
-        hints = get_type_hints(self.shape or self.make)
-        return {name: hints[name] for name in names if hints[name] in _READ}
+    def numbers(self) -> dict[str, inspect.Parameter]:
+        """Return the numbers that it takes, by name."""
+        given = inspect.signature(self.shape or self.make, eval_str=True).parameters
+        return {name: number for name, number in given.items() if number.annotation in _READ}
 
 
 KINDS = {
@@ -92,62 +78,42 @@ def _vector(text: str) -> Vector:
     return x, y, z
 
 
-_READ: dict[Any, Callable[[str], Any]] = {
-    int: int,
-    int | None: int,
-    float: float,
-    str: str,
-    Vector: _vector,
-}
-_EXAMPLE = {int: "12", int | None: "12", float: "0.5", str: "a word", Vector: "0.2x0.1x0.06"}
+_READ: dict[Any, tuple[Callable[[str], Any], str]] = {
+    int: (int, "12"),
+    int | None: (int, "12"),
+    float: (float, "0.5"),
+    str: (str, "a word"),
+    Vector: (_vector, "0.2x0.1x0.06"),
+}  # by what a number is: how it is read, and an example
 
 
 def scene_by_words(words: str) -> Scene:
-    """Return the scene that a few words describe.
+    """Return the scene of a key of `KINDS`, a colon, and ``name=value`` parted by commas.
 
-    ``words``: a key of `KINDS`, a colon, and ``name=value`` of its numbers, parted by commas; three
-    lengths as ``0.2x0.1x0.06``. Lengths in m, angles in rad, densities in kg/m³. Raises
-    `SceneError` if there is no such kind or number, or it makes no scene.
-
-    Examples
-    --------
-    >>> scene_by_words("wall:columns=4,courses=3")
-    <Scene wall 4 x 3: 12 bricks, 23 joints, 4 ground ends, 3 robots>
+    Three lengths are ``0.2x0.1x0.06``; lengths in m, angles in rad, densities in kg/m³.
     """
     name, _, rest = words.partition(":")
     if (kind := KINDS.get(name)) is None:
         raise SceneError(f"scene {words}: {name!r} is not known; give one of {', '.join(KINDS)}")
-    hints = kind.hints()
+    numbers = kind.numbers()
     given: dict[str, Any] = {}
     for part in filter(None, rest.split(",")):
         key, _, text = part.partition("=")
-        if key not in hints or key in given:
-            hint = did_you_mean(key, hints)
+        if key not in numbers or key in given:
+            hint = did_you_mean(key, numbers)
             what = "is given twice" if key in given else f"is none of its numbers{hint}"
-            raise SceneError(f"scene {words}: {key!r} {what}; give {', '.join(hints)}")
+            raise SceneError(f"scene {words}: {key!r} {what}; give {', '.join(numbers)}")
+        read, example = _READ[numbers[key].annotation]
         try:
-            given[key] = _READ[hints[key]](text)
+            given[key] = read(text)
         except ValueError:
-            raise SceneError(
-                f"scene {words}: {key} is {text!r}; give it as {_EXAMPLE[hints[key]]}"
-            ) from None
+            message = f"scene {words}: {key} is {text!r}; give it as {example}"
+            raise SceneError(message) from None
+    needed = {name for name, number in numbers.items() if number.default is number.empty}
+    if lacking := ", ".join(needed - given.keys()):
+        raise SceneError(f"scene {words}: {lacking} is missing; {kind.about}")
     try:
         scene = kind.make(kind.shape(**given)) if kind.shape else kind.make(**given)
         return replace(scene, provenance=f"{scene.provenance} In words: {words}.")
     except OverflowError as error:
         raise SceneError(f"scene {words}: its numbers are too large; give smaller ones") from error
-    except TypeError as error:  # a number without a default is missing
-        lacking = ", ".join(_required(kind) - given.keys())
-        if not lacking:
-            raise
-        raise SceneError(f"scene {words}: {lacking} is missing; {kind.about}") from error
-
-
-def _required(kind: _Kind) -> set[str]:
-    """Return the numbers that must be given."""
-    parameters = inspect.signature(kind.shape or kind.make).parameters
-    return {
-        name
-        for name, parameter in parameters.items()
-        if parameter.default is inspect.Parameter.empty
-    }

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.boxes import as_vector, require_apart
-from seqopt.scene.checks import positive, short
+from seqopt.scene.checks import positive, short, whole_between
 from seqopt.scene.library.common import (
     MASONRY,
     REPEAT,
@@ -21,14 +21,12 @@ from seqopt.scene.library.common import (
     mobile_robots,
     tiles,
     touching_order,
-    whole_number,
 )
 from seqopt.scene.library.joints import ground_under, joints_between, shares
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
 
 _BONDS = ("running", "herringbone")
-_LENGTHS = ("span", "rise", "opening", "thickness")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,12 +60,14 @@ class DomeShape:
     law: JointLaw = MASONRY
 
     def __post_init__(self) -> None:
-        _set(self, "courses", whole_number("dome: courses", self.courses, 1))
-        _set(self, "around", whole_number("dome: around", self.around, 3))
+        vars(self).update(
+            courses=whole_between("dome: courses", self.courses, 1),
+            around=whole_between("dome: around", self.around, 3),
+        )
         few_enough("dome", self.courses * self.around)
-        for name in _LENGTHS:
-            _set(self, name, positive(f"dome: {name}", getattr(self, name), "m"))
-        _set(self, "gap", joint_width("dome: gap", self.gap))
+        for name in ("span", "rise", "opening", "thickness"):
+            vars(self)[name] = positive(f"dome: {name}", getattr(self, name), "m")
+        vars(self).update(gap=joint_width("dome: gap", self.gap))
         if self.bond not in _BONDS:
             raise SceneError(f"dome: bond is {short(self.bond)}; give one of {', '.join(_BONDS)}")
         if self.bond == "herringbone" and 2 * self.around % REPEAT:
@@ -89,16 +89,9 @@ class DomeShape:
         return (0.25 * self.span**2 + self.rise**2) / (2 * self.rise)
 
     def latitude(self, row: float) -> float:
-        """Return the angle above the horizontal at which a row begins, seen from the center.
-
-        ``row``: from 0 at the ground. Result: rad.
-        """
+        """Return the angle above the horizontal at which a row begins, from the center, rad."""
         first, last = (math.acos(0.5 * d / self.radius) for d in (self.span, self.opening))
         return first + (last - first) * row / self.courses
-
-
-def _set(value: object, name: str, content: object) -> None:
-    object.__setattr__(value, name, content)
 
 
 _LEAST_SHARE = 0.1  # of the smaller face: bricks that share less have no joint
@@ -154,7 +147,9 @@ def _laid(shape: DomeShape) -> tuple[list[_Place], list[tuple[int, int]], Floats
     pairs, normals = _beside(shape, places)
     kept = np.flatnonzero(shares(loose, pairs, normals) >= _LEAST_SHARE)
     pairs, normals = [pairs[k] for k in kept], normals[kept]
-    order = touching_order(len(places), pairs, [i for i, p in enumerate(places) if not p.low])
+    order = touching_order(
+        range(len(places)), pairs, [i for i, p in enumerate(places) if not p.low]
+    )
     if len(order) < len(places):
         raise SceneError(
             f"dome: {len(places) - len(order)} of {len(places)} bricks lie on no other; "
@@ -183,16 +178,14 @@ def _herringbone(shape: DomeShape) -> list[_Place]:
     cell = 0.5 * _TURN / shape.around
     out = []
     for tile in tiles(shape.courses, range(2 * shape.around)):
-        rows, columns = (2, 1) if tile.along else (1, 2)
-        middle = cell * tile.middle[1]
-        out.append(_Place(tile.row, tile.row + rows, middle, 0.5 * columns * cell))
+        rows, half = (2, 0.5 * cell) if tile.along else (1, cell)
+        out.append(_Place(tile.row, tile.row + rows, cell * tile.middle[1], half))
     return sorted(out, key=lambda place: (place.low, place.azimuth))
 
 
 def _beside(shape: DomeShape, places: Sequence[_Place]) -> tuple[list[tuple[int, int]], Floats]:
     """Return which places share an edge, and directions across these, (P, 3)."""
-    low, high = (np.array([getattr(p, name) for p in places]) for name in ("low", "high"))
-    azimuth, half = (np.array([getattr(p, name) for p in places]) for name in ("azimuth", "half"))
+    low, high, azimuth, half = np.array([astuple(place) for place in places]).T
     away = np.abs((azimuth[:, None] - azimuth + 0.5 * _TURN) % _TURN - 0.5 * _TURN)
     shared = half[:, None] + half - away
     above = (high[:, None] == low) & (shared > _NO_SHARE * half)
@@ -208,8 +201,8 @@ def _beside(shape: DomeShape, places: Sequence[_Place]) -> tuple[list[tuple[int,
 def _brick(shape: DomeShape, place: _Place, name: int) -> Brick:
     """Return the largest box in its place, as far as joints leave room.
 
-    Its side faces keep off the planes through the axis that bound the place, its upper and lower
-    ones off the cones from the center; of these the lower one would dip below its cone at the ends.
+    Its faces keep off the planes through the axis and the cones from the center that bound the
+    place; the lower one would else dip below its cone at the ends.
     """
     low, high = (shape.latitude(row) for row in (place.low, place.high))
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
@@ -226,10 +219,11 @@ def _brick(shape: DomeShape, place: _Place, name: int) -> Brick:
             f"{1e3 * tall:.3g} mm high; give fewer around, fewer courses or a larger opening"
         )
     around, up, out = _directions(middle, place.azimuth)
+    center = np.array([0.0, 0.0, shape.rise - shape.radius])  # of the sphere
     flat = wide >= tall
     return Brick(
         name=name,
-        position=as_vector(_center(shape) + shape.radius * out + 0.5 * (start + end) * up),
+        position=as_vector(center + shape.radius * out + 0.5 * (start + end) * up),
         length_axis=as_vector(around if flat else up),
         width_axis=as_vector(up if flat else around),
         dimensions=(max(wide, tall), min(wide, tall), shape.thickness),
@@ -237,11 +231,6 @@ def _brick(shape: DomeShape, place: _Place, name: int) -> Brick:
         nodes=(2 * name - 2, 2 * name - 1),
         placing_node=2 * name - 1,
     )
-
-
-def _center(shape: DomeShape) -> Floats:
-    """Return the center of the sphere, which the surface leaves at z = 0."""
-    return np.array([0.0, 0.0, shape.rise - shape.radius])
 
 
 def _directions(latitude: float, azimuth: float) -> tuple[Floats, Floats, Floats]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SceneError
-from seqopt.scene.boxes import Boxes, as_vector, boxes
+from seqopt.scene.boxes import Boxes, as_vector, boxes, spring_fields
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint
 
@@ -27,17 +27,7 @@ class _ContactAreas(FrozenValue):
 
 
 def contact_areas(first: Floats, second: Floats) -> _ContactAreas:
-    """Return the overlaps of convex polygons.
-
-    ``first``, ``second`` (P, m, 2): corners, counterclockwise, m.
-
-    Examples
-    --------
-    >>> square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]])
-    >>> half = contact_areas(square, square + [0.5, 0.0])
-    >>> half.area, half.centroid
-    (array([0.5]), array([[0.75, 0.5 ]]))
-    """
+    """Return the overlaps of convex polygons (P, m, 2), counterclockwise, m."""
     near = first.mean(axis=1, keepdims=True)
     one, other = first - near, second - near
     slack = _ON_EDGE * np.abs(one).max(initial=0.0)  # an edge that both have is counted once
@@ -59,10 +49,7 @@ def contact_areas(first: Floats, second: Floats) -> _ContactAreas:
 
 
 def _inside(polygon: Floats, other: Floats, slack: float) -> tuple[Floats, Floats]:
-    """Return where the part of each edge that lies in another polygon starts and ends, (P, m, 2).
-
-    A part of no length starts and ends in one point.
-    """
+    """Return where the part of each edge in another polygon starts and ends, each (P, m, 2)."""
     start, step = polygon, np.roll(polygon, -1, axis=1) - polygon
     side = np.roll(other, -1, axis=1) - other
     side = side / np.linalg.norm(side, axis=2, keepdims=True)
@@ -88,11 +75,7 @@ _Pairs = Sequence[tuple[int, int]]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Faces(FrozenValue):
-    """The faces of boxes that look at others.
-
-    ``which``, ``axis`` (P,): box, and the axis across its face; ``out`` (P, 3): unit vectors
-    outward.
-    """
+    """The faces of boxes that look at others: box, axis across the face, unit vectors outward."""
 
     which: Ints
     axis: Ints
@@ -101,11 +84,10 @@ class _Faces(FrozenValue):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Overlaps(FrozenValue):
-    """Where pairs of boxes look at each other.
+    """Where pairs of boxes look at each other, seen along mean normals into the second.
 
-    ``faces``: of the first boxes and of the second. ``along`` (P, 3): mean normals, from the first
-    box to the second. ``sides`` (P, 2, 3): unit vectors across them; the first is most nearly an
-    edge of the first box. ``shared``: overlaps of the faces, seen along the normals.
+    ``sides`` (P, 2, 3): unit vectors across the normals, the first most nearly an edge of the first
+    box.
     """
 
     faces: tuple[_Faces, _Faces]
@@ -115,11 +97,7 @@ class _Overlaps(FrozenValue):
 
 
 def overlaps(shapes: Boxes, pairs: _Pairs, normals: Floats | None = None) -> _Overlaps:
-    """Return where boxes look at each other.
-
-    ``pairs`` (int, int): at least one. ``normals`` (P, 3): about at right angles to the faces; by
-    default these are the ones that look at each other most.
-    """
+    """Return where boxes look at each other, by default with the faces that do so most."""
     a, b = np.array(pairs, dtype=np.int64).T
     step = shapes.place[b] - shapes.place[a]
     axes = _facing(shapes, a, b) if normals is None else _across(shapes, a, b, normals)
@@ -133,11 +111,7 @@ def overlaps(shapes: Boxes, pairs: _Pairs, normals: Floats | None = None) -> _Ov
 
 
 def shares(bricks: Sequence[Brick], pairs: _Pairs, normals: Floats) -> Floats:
-    """Return how much of the smaller of two faces the other one covers.
-
-    ``pairs`` (int, int): which of them may touch; ``normals`` (P, 3): about at right angles to the
-    faces. Result (P,): from 0 to 1.
-    """
+    """Return how much of the smaller of two faces the other covers, (P,), from 0 to 1."""
     if not pairs:
         return np.zeros(0)
     shapes = boxes(bricks)
@@ -152,10 +126,9 @@ def shares(bricks: Sequence[Brick], pairs: _Pairs, normals: Floats) -> Floats:
 
 
 def _widths(shapes: Boxes, found: _Overlaps) -> tuple[Floats, Floats, Floats]:
-    """Return where faces are along the normals, in the middle of their overlaps.
+    """Return where first and second faces are along the normals, in the middle of overlaps, m.
 
-    Results: ``start``, ``end`` (P,): of the first faces and of the second, m from the origin's
-    plane; ``taper`` (P,): how much farther apart they are at the ends of the overlap, m, at most.
+    The third is how much farther apart they are at the ends of the overlap, at most.
     """
     middle = (found.shared.centroid[:, None, :] @ found.sides)[:, 0]
     start, end = (_height(shapes, face, found.along, middle) for face in found.faces)
@@ -177,8 +150,8 @@ def _across(shapes: Boxes, a: Ints, b: Ints, normals: Floats) -> tuple[Ints, Int
 def _facing(shapes: Boxes, a: Ints, b: Ints) -> tuple[Ints, Ints]:
     """Return the axes across the faces of first and second boxes that look at each other.
 
-    Of the three faces of the first that look at the second, each with the one of the second that is
-    most nearly parallel to it, it is those beyond which the other box lies farthest, in its size.
+    Of the first's faces, each with the most nearly parallel one of the second, it is those beyond
+    which the other box lies farthest, in its size.
     """
     turned = shapes.frame[a] @ shapes.frame[b].transpose(0, 2, 1)
     partner = np.abs(turned).argmax(axis=2)
@@ -236,63 +209,13 @@ def joints_between(
 ) -> tuple[Joint, ...]:
     """Return the joints of bricks, each where the faces that look at each other overlap.
 
-    ``pairs`` (int, int): which of them touch. ``normals`` (P, 3): about at right angles to the
-    faces; by default these are the ones that look at each other most. Result: each in the middle of
-    the overlap and halfway between the faces; its axes are the mean normal of the faces, from the
-    first brick to the second, and that edge of the first that is most nearly at right angles to it.
-    One that is thick where the faces are farthest apart says so. Raises `SceneError` if faces do
-    not overlap where they look at each other.
+    They are in the middle of the overlap, halfway between the faces; axes are the faces' mean
+    normal and the edge of the first brick that is most nearly across it. One that is thick says so.
     """
     if not pairs:
         return ()
     shapes = boxes(bricks)
     found = overlaps(shapes, pairs, normals)
-    _require_overlap(bricks, pairs, found)
-    place, thick = _between(shapes, pairs, found)
-    faces = zip(found.shared.area.tolist(), found.shared.moments.tolist(), strict=True)
-    stiff = [law.stiffness(area, (about, across)) for area, (about, across) in faces]
-    rows = zip(pairs, place, found.along, found.sides[:, 0], stiff, thick, strict=True)
-    return tuple(
-        Joint(
-            bricks=(bricks[i].name, bricks[j].name),
-            position=as_vector(at),
-            along=as_vector(normal),
-            across=as_vector(side),
-            translational_stiffness=shift,
-            rotational_stiffness=turn,
-            thickness=width or None,
-        )
-        for (i, j), at, normal, side, (shift, turn), width in rows
-    )
-
-
-def ground_under(brick: Brick, down: Floats, law: JointLaw, stub: float = _STUB) -> Ground:
-    """Return the ground end on the face of a brick that looks down most.
-
-    ``down`` (3,): direction to the ground; ``stub``: distance from the face to the fixed point
-    behind it, m. Result: in the middle of the face; its normal points into the brick.
-    """
-    shapes = boxes([brick])
-    frame, half = shapes.frame[0], shapes.half[0]
-    i = int(np.abs(frame @ down).argmax())
-    out = np.sign(frame[i] @ down) * frame[i]
-    place = shapes.place[0] + half[i] * out
-    wide, deep = 2 * float(half[(i + 1) % 3]), 2 * float(half[(i + 2) % 3])
-    area = wide * deep
-    shift, turn = law.stiffness(area, (area * deep**2 / 12, area * wide**2 / 12))
-    return Ground(
-        brick=brick.name,
-        position=as_vector(place),
-        along=as_vector(-out),
-        across=as_vector(frame[(i + 1) % 3]),
-        translational_stiffness=shift,
-        rotational_stiffness=turn,
-        anchor=as_vector(place + stub * out),
-    )
-
-
-def _require_overlap(bricks: Sequence[Brick], pairs: _Pairs, found: _Overlaps) -> None:
-    """Raise an error that names the first two bricks whose faces share nothing."""
     apart = np.flatnonzero(found.shared.area == 0)
     if len(apart):
         i, j = pairs[apart[0]]
@@ -300,6 +223,26 @@ def _require_overlap(bricks: Sequence[Brick], pairs: _Pairs, found: _Overlaps) -
             f"joint ({bricks[i].name}, {bricks[j].name}): the faces of its bricks do not overlap; "
             "move the bricks to each other"
         )
+    place, thick = _between(shapes, pairs, found)
+    stiff = map(law.stiffness, found.shared.area.tolist(), found.shared.moments.tolist())
+    fields = map(spring_fields, place, found.along, found.sides[:, 0], stiff)
+    return tuple(
+        Joint(bricks=(bricks[i].name, bricks[j].name), thickness=width or None, **held)
+        for (i, j), held, width in zip(pairs, fields, thick, strict=True)
+    )
+
+
+def ground_under(brick: Brick, down: Floats, law: JointLaw, stub: float = _STUB) -> Ground:
+    """Return the ground end in the middle of the face of a brick that looks down (3,) most."""
+    shapes = boxes([brick])
+    frame, half = shapes.frame[0], shapes.half[0]
+    i = int(np.abs(frame @ down).argmax())
+    out = np.sign(frame[i] @ down) * frame[i]
+    place = shapes.place[0] + half[i] * out
+    side, other = (i + 1) % 3, (i + 2) % 3
+    stiff = law.over_rectangle(2 * float(half[side]), 2 * float(half[other]))
+    fields = spring_fields(place, -out, frame[side], stiff)
+    return Ground(brick=brick.name, anchor=as_vector(place + stub * out), **fields)
 
 
 def _between(shapes: Boxes, pairs: _Pairs, found: _Overlaps) -> tuple[Floats, list[float]]:

@@ -1,27 +1,24 @@
 """Herringbone vaults around a central arch, over a skewed plan.
 
-The arch stands in the columns' middle. Its line, moved along rulings that are turned in plan and
-spread toward the free edges, is the surface; the pattern continues on it from the arch's own
-bricks. Of all places on it those are filled that lie nearest to a middle line, which runs at an
-angle from one foot of the vault to the other: so the plan is skewed, and every brick has its
-neighbors.
+The arch's line, moved along rulings, is the surface, on which the pattern continues from the arch.
+Places are filled that lie nearest to a middle line, at an angle from foot to foot.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.boxes import as_vector, require_apart
-from seqopt.scene.checks import finite, positive
+from seqopt.scene.checks import finite, positive, whole_between
 from seqopt.scene.library.common import (
     JointLaw,
     Tile,
@@ -29,7 +26,6 @@ from seqopt.scene.library.common import (
     neighbors,
     tiles,
     touching_order,
-    whole_number,
 )
 from seqopt.scene.library.joints import ground_under, joints_between
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
@@ -39,16 +35,13 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 
+_Pose = tuple[Floats, Floats, Floats]
 _TILES = ((2, 0, True), (1, 0, False), (1, -1, False))  # rows, column, along: the pattern VLR
 
 
 @dataclass(frozen=True)
 class _ArchLine:
-    """The bricks of an arch, the tiles of a herringbone that they cover, and its line.
-
-    ``bricks``: in build order; ``grounds``: under the first brick and the last; ``tiles``: of every
-    brick.
-    """
+    """The bricks of an arch in build order, the tiles that they cover, and its line."""
 
     bricks: tuple[Brick, ...]
     joints: tuple[Joint, ...]
@@ -69,11 +62,7 @@ class _ArchLine:
         return CubicSpline([*row, self.rows], [point.position for point in points])
 
     def point(self, row: Floats) -> Floats:
-        """Return points of the line.
-
-        ``row`` (n,): from 0 at the first ground end; a joint lies at every row where a brick
-        begins. Result (n, 3): m.
-        """
+        """Return points (n, 3) of the line at rows (n,), from 0 at the first ground end, m."""
         return np.asarray(self._curve(row))
 
     def share(self, row: float) -> float:
@@ -82,7 +71,7 @@ class _ArchLine:
         return float((here - start) / (end - start) - 0.5)
 
     def speed(self, row: Floats) -> Floats:
-        """Return the derivatives of the line. ``row`` (n,). Result (n, 3): m per row."""
+        """Return the derivatives (n, 3) of the line at rows (n,), m per row."""
         return np.asarray(self._curve(row, 1))
 
     @property
@@ -101,11 +90,7 @@ class _ArchLine:
 
 
 def _arch_line(arch: Scene) -> _ArchLine:
-    """Return the line of an arch.
-
-    Raises `SceneError` if it is no closed chain of equal bricks along, to the left, to the right
-    and so on, whose first and last lie along.
-    """
+    """Return the line of a closed chain of equal bricks in the pattern VLR."""
     if not isinstance(arch, Scene):
         raise SceneError(f"vault: a {type(arch).__name__} is not an arch; give a Scene")
     bricks = arch.placed
@@ -158,10 +143,10 @@ class VaultShape:
     drift: float = 1.3
 
     def __post_init__(self) -> None:
-        _set(self, "bricks", whole_number("vault: bricks", self.bricks, 1))
+        vars(self).update(bricks=whole_between("vault: bricks", self.bricks, 1))
         positive("vault: spacing", self.spacing, "m")
         for name in ("plan_angle", "skew", "widening", "drift"):
-            _set(self, name, finite(f"vault: {name}", getattr(self, name)))
+            vars(self)[name] = finite(f"vault: {name}", getattr(self, name))
         if abs(self.plan_angle) > 0.25 * math.pi:
             raise SceneError(
                 f"vault: plan_angle is {self.plan_angle:g} rad; give at most 0.785, half a right "
@@ -169,20 +154,10 @@ class VaultShape:
             )
 
 
-class _Pose(NamedTuple):
-    """Where a brick lies; three arrays (3,): its middle, m, and two unit vectors."""
-
-    center: Floats
-    forward: Floats
-    left: Floats
-
-
-def _poses(line: _ArchLine, shape: VaultShape, places: Sequence[Tile]) -> list[_Pose]:
-    """Return where bricks lie. ``line``: of the arch in the middle. Result: one for every tile."""
-    if not places:
-        return []
-    row, column = np.array([tile.middle for tile in places]).T
-    along = np.array([tile.along for tile in places])
+def _poses(line: _ArchLine, shape: VaultShape, places: Sequence[Tile]) -> Iterator[_Pose]:
+    """Yield where the bricks on tiles lie: their middles, m, and unit vectors forward and left."""
+    row, column = np.array([tile.middle for tile in places]).reshape(-1, 2).T
+    along = np.array([tile.along for tile in places], dtype=bool)
     beside = column * shape.spacing
     half = np.where(along, 1.0, 0.5)
     start, end, middle = (
@@ -199,7 +174,7 @@ def _poses(line: _ArchLine, shape: VaultShape, places: Sequence[Tile]) -> list[_
         np.where(flush, _unit(left - forward * _dot(forward, left)), left),
     )
     center = np.where(flush, middle, 0.5 * (start + end))
-    return [_Pose(*pose) for pose in zip(center, forward, left, strict=True)]
+    return zip(center, forward, left, strict=True)
 
 
 def _surface(line: _ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> Floats:
@@ -231,10 +206,6 @@ def _unit(vectors: Floats) -> Floats:
 
 def _dot(first: Floats, second: Floats) -> Floats:
     return np.asarray((first * second).sum(axis=1, keepdims=True))
-
-
-def _set(value: object, name: str, content: object) -> None:
-    object.__setattr__(value, name, content)
 
 
 def herringbone_vault(
@@ -303,7 +274,7 @@ def _chosen(line: _ArchLine, shape: VaultShape) -> list[Tile]:
 
     layered = [*line.tiles, *sorted(sorted(places, key=aside)[:rest], key=turn)]
     grounded = [i for i, t in enumerate(layered) if _feet(line, t) and i >= len(own)]
-    order = touching_order(len(layered), neighbors(layered), [0, *grounded])
+    order = touching_order(range(len(layered)), neighbors(layered), [0, *grounded])
     if len(order) < len(layered):
         lost = len(layered) - len(order)
         raise SceneError(
@@ -315,8 +286,7 @@ def _chosen(line: _ArchLine, shape: VaultShape) -> list[Tile]:
 
 def _layer(tile: Tile) -> tuple[int, bool]:
     """Return which layer a tile belongs to, counted from the arch, and whether on the left."""
-    reaches_back = not tile.along and tile.column < 0
-    column = tile.column + reaches_back
+    column = tile.column + (not tile.along and tile.column < 0)  # one that reaches back
     return abs(column), tile.column >= 0
 
 
@@ -333,17 +303,18 @@ def _bricks(line: _ArchLine, shape: VaultShape, chosen: Sequence[Tile]) -> list[
     name = max(brick.name for brick in line.bricks)
     node = max(node for brick in line.bricks for node in brick.nodes)
     new = {}
-    for tile, pose in zip(places, _poses(line, shape, places), strict=True):
+    poses = _poses(line, shape, places)
+    for tile, (center, forward, left) in zip(places, poses, strict=True):
         outward = _layer(tile)[1]
         upward = outward == (shape.skew < 0)
-        axes = (pose.forward if upward else -pose.forward, pose.left)
+        axes = (forward if upward else -forward, left)
         if not tile.along:
-            axes = (pose.left if outward else -pose.left, pose.forward)
+            axes = (left if outward else -left, forward)
         name, node = name + 1, node + 2
         new[tile] = replace(
             line.bricks[0],
             name=name,
-            position=as_vector(pose.center),
+            position=as_vector(center),
             length_axis=as_vector(axes[0]),
             width_axis=as_vector(axes[1]),
             nodes=(node - 1, node),
@@ -368,8 +339,7 @@ def _grounds(
     for tile, brick in zip(chosen[len(line.bricks) :], bricks[len(line.bricks) :], strict=True):
         foot = _feet(line, tile)
         if foot:
-            frame = np.array([brick.length_axis, brick.width_axis])
-            forward = frame[0 if tile.along else 1]
+            forward = np.array(brick.length_axis if tile.along else brick.width_axis)
             forward = forward * np.sign(forward @ line.speed(np.array([tile.middle[0]]))[0])
             out.append(ground_under(brick, foot * forward, line.law, line.stub))
     return tuple(out)

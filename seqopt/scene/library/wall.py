@@ -9,15 +9,8 @@ import numpy as np
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import finite, positive, vector
-from seqopt.scene.library.common import (
-    MASONRY,
-    JointLaw,
-    few_enough,
-    joint_width,
-    mobile_robots,
-    whole_number,
-)
+from seqopt.scene.checks import finite, sizes, whole_between
+from seqopt.scene.library.common import MASONRY, JointLaw, few_enough, joint_width, mobile_robots
 from seqopt.scene.library.joints import ground_under, joints_between
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
@@ -50,18 +43,16 @@ class WallShape:
 
     def __post_init__(self) -> None:
         for name in ("columns", "courses"):
-            _set(self, name, whole_number(f"wall: {name}", getattr(self, name), 1))
+            vars(self)[name] = whole_between(f"wall: {name}", getattr(self, name), 1)
         few_enough("wall", self.columns * self.courses)
-        _set(self, "dimensions", vector("wall: dimensions", self.dimensions))
-        for length in self.dimensions:
-            positive("wall: dimensions", length, "m")
-        _set(self, "gap", joint_width("wall: gap", self.gap))
+        dimensions = sizes("wall: dimensions", self.dimensions)
+        vars(self).update(dimensions=dimensions, gap=joint_width("wall: gap", self.gap))
         if self.gap >= 0.5 * self.dimensions[0]:
             raise SceneError(
                 f"wall: gap is {self.gap:g} m, half a brick or more; give less than "
                 f"{0.5 * self.dimensions[0]:g}"
             )
-        _set(self, "corbel", finite("wall: corbel", self.corbel))
+        vars(self).update(corbel=finite("wall: corbel", self.corbel))
         if abs(self.corbel) >= self.dimensions[1]:
             raise SceneError(
                 f"wall: corbel is {self.corbel:g} m, a brick's width or more, and courses would "
@@ -123,7 +114,3 @@ def _touching(shape: WallShape, i: int) -> list[tuple[int, int]]:
     under = i - column - shape.columns
     found = [(under + c, i) for c in below if course and 0 <= c < shape.columns]
     return [*found, (i - 1, i)] if column else found
-
-
-def _set(value: object, name: str, content: object) -> None:
-    object.__setattr__(value, name, content)

@@ -19,8 +19,8 @@ from seqopt.errors import StepError
 from seqopt.files import read_text
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.imports.building import block_numbers
-from seqopt.scene.imports.compas_data import by_guid, entry, kind, parse_json, payload
-from seqopt.scene.imports.compas_models import assembly_graph
+from seqopt.scene.imports.compas_models import assembly_graph, by_guid, kind, payload
+from seqopt.scene.imports.content import entry, parse_json
 from seqopt.scene.imports.formats import read_content, sniffed
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene

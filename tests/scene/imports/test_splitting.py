@@ -13,8 +13,7 @@ from seqopt.errors import SceneError, SceneWarning
 from seqopt.scene.boxes import as_vectors
 from seqopt.scene.imports.content import Given
 from seqopt.scene.imports.formats import import_scene, read_content
-from seqopt.scene.imports.meshes import read_obj
-from seqopt.scene.imports.repair import repair_shape
+from seqopt.scene.imports.meshes import read_obj, repair_shape
 from seqopt.scene.scene_file import load_scene
 from seqopt.scene.shape import Polyhedron
 from tests.blocks import box
