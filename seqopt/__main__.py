@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable
 from types import FrameType
 
-INTERRUPTED, FAILED = 130, 4  # as seqopt.cli.status has it, which may not be there yet
+INTERRUPTED, FAILED = 130, 4  # as seqopt.cli.answer has it, which may not be there yet
 LEAST = 400e6  # bytes of addresses with which a program starts
 AGAIN = 0.05  # s after which an interrupt that was lost is raised again
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 import seqopt
-from seqopt.cli.words.values import parse_options
+from seqopt.cli.values import parse_options
 from seqopt.engines.auto import AutoEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine

@@ -1,11 +1,10 @@
 """The command line: ``seqopt compare | optimize | pareto | analyze | assess | report | …``.
 
-`seqopt.cli.main.main` runs a command as the shell does and returns its exit status, as
-`seqopt.cli.status` lists them. `seqopt.cli.arguments` names the commands, each of which is a module
-with its arguments, its help and ``run``, which returns a `seqopt.cli.saying.answer.Answer`: printed
-as text, as the paths of what is written, or as JSON. `seqopt.cli.saying.terminal` writes to the
-terminal, `seqopt.cli.saying.watcher` shows there how far a command is. The room exports nothing, so
-that ``seqopt.cli.main`` stays the module.
+`seqopt.cli.main.main` runs a command as the shell does and returns its exit status, a
+`seqopt.cli.answer.Status`. `seqopt.cli.arguments` names the commands, each of which is a module
+with its arguments, its help and ``run``, which returns a `seqopt.cli.answer.Answer`: printed as
+text, as the paths of what is written, or as JSON. The room exports nothing, so that
+``seqopt.cli.main`` stays the module.
 
 >>> from seqopt.cli.main import main
 >>> int(main(["scene", "arch25"]))  # doctest: +ELLIPSIS

@@ -11,8 +11,8 @@ from importlib.metadata import version
 from types import ModuleType
 from typing import Any, NoReturn
 
-from seqopt.cli.saying.terminal import columns, complain, show, wrapped
-from seqopt.cli.status import Status
+from seqopt.cli.answer import Status
+from seqopt.cli.terminal import columns, complain, show, wrapped
 from seqopt.errors import did_you_mean
 
 EXAMPLES = """Three examples:
@@ -141,7 +141,7 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
 
     ``asked``: the one command whose arguments it takes, so that nothing else is loaded; by default
     all. Result: ``command`` names what is to be run. A wrong word ends the program with status
-    `seqopt.cli.status.Status.BAD_INPUT`.
+    `seqopt.cli.answer.Status.BAD_INPUT`.
     """
     whole = _Parser(
         prog="seqopt",

@@ -6,10 +6,9 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 
+from seqopt.cli.answer import Answer, Status, print_answer, status_of
 from seqopt.cli.arguments import COMMANDS, EXAMPLES, asked_command, parser
-from seqopt.cli.saying.answer import Answer, print_answer
-from seqopt.cli.saying.terminal import flush, quiet_numbers, show, silence
-from seqopt.cli.status import Status, status_of
+from seqopt.cli.terminal import flush, quiet_numbers, show, silence
 from seqopt.errors import SeqoptError
 
 
@@ -17,7 +16,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command.
 
     ``arguments``: the words after ``seqopt``; by default those of the shell. Result: the exit
-    status, a `seqopt.cli.status.Status`. An error is one line on standard error.
+    status, a `seqopt.cli.answer.Status`. An error is one line on standard error.
     """
     try:
         status = _run(sys.argv[1:] if arguments is None else arguments)
@@ -41,7 +40,7 @@ def load(words: Sequence[str]) -> None:
     if asked in COMMANDS:
         import jsonschema  # noqa: F401, PLC0415  # scene files need it
 
-        import seqopt.cli.saying.watcher  # noqa: F401, PLC0415  # of which help needs nothing
+        import seqopt.cli.watcher  # noqa: F401, PLC0415  # of which help needs nothing
 
         COMMANDS[asked].load()
 
@@ -54,7 +53,7 @@ def _run(words: Sequence[str]) -> int:
         options = parser(asked_command(words)).parse_args(words)
     except SystemExit as stop:  # the parser has said why, or printed its help
         return int(stop.code or 0)
-    from seqopt.cli.saying.watcher import Watcher  # noqa: PLC0415  # of which help needs nothing
+    from seqopt.cli.watcher import Watcher  # noqa: PLC0415  # of which help needs nothing
 
     with quiet_numbers(quiet=options.quiet), Watcher(shows=not options.quiet) as options.tell:
         answer: Answer = COMMANDS[options.command].load().run(options)

@@ -381,6 +381,14 @@ def _free_plan(
         return None, f"{FREE}: {error}"
 
 
+def fixed_methods(engine: Engine) -> dict[str, pd.DataFrame]:
+    """Return the responses of every method without open grips, as `method_tables`; or of none."""
+    try:
+        return method_tables(engine)[0]
+    except StepError:
+        return {}
+
+
 def _free_row(plan: Plan) -> dict[str, object]:
     """Return what a free schedule is worth, for a row: its objective is its worst step."""
     assert isinstance(plan.selection, StatePath)  # of states

@@ -10,11 +10,11 @@ from pathlib import Path
 import pandas as pd
 
 from seqopt.engines.interface import Engine
-from seqopt.errors import FileError, ProblemError, StepError
+from seqopt.errors import FileError, ProblemError
 from seqopt.files import csv_text
 from seqopt.plan.build import ShownBuild
 from seqopt.problem.requirements import overloads
-from seqopt.report.comparison import CLOSED, LARGEST, Comparison, largest, method_tables
+from seqopt.report.comparison import CLOSED, LARGEST, Comparison, fixed_methods, largest
 from seqopt.report.page import Build, Scatter, report_page
 from seqopt.responses.quantities import length_text, number_text
 from seqopt.responses.table import OUTSIDE, REMEDY, Departure, LinearRange, analyze, builds_in_words
@@ -132,7 +132,7 @@ def plan_page(  # a plan, what there is to say about it, and what is beside it
     scene = engine.network.scene
     tables = {name: table, **(others or {})}
     if len(scene.bricks) <= SMALL:
-        tables |= {key: each for key, each in _methods(engine).items() if key not in tables}
+        tables |= {key: each for key, each in fixed_methods(engine).items() if key not in tables}
     first, *rest = _builds(scene, tables, LinearRange(engine).of_builds(tables))
     first = replace(first, stands=stands)
     robots = int(sum(table[f"{robot.name}_node"].notna().any() for robot in scene.robots))
@@ -227,13 +227,6 @@ def _in_words(table: pd.DataFrame) -> pd.DataFrame:
     lengths = [name for name in words.values() if name.endswith("1e-3 mm")]
     shown = table.rename(columns=words)
     return shown.assign(**{name: 1e6 * shown[name] for name in lengths})
-
-
-def _methods(engine: Engine) -> dict[str, pd.DataFrame]:
-    try:
-        return method_tables(engine)[0]
-    except StepError:
-        return {}
 
 
 def build_page(plan: ShownBuild, *others: ShownBuild) -> Page:

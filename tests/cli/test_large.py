@@ -14,7 +14,7 @@ from functools import partial
 import pytest
 
 from seqopt.cli.main import main
-from seqopt.cli.words.values import parse_size
+from seqopt.cli.values import parse_size
 from seqopt.errors import ProblemError
 from seqopt.plan import layers
 from seqopt.scene.scene_file import save_scene

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from seqopt.cli.main import main
-from seqopt.cli.saying.outputs import _plain
+from seqopt.cli.outputs import _plain
 from seqopt.scene.scene_file import save_scene
 from tests.builders import six_bricks
 

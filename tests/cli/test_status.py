@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from seqopt.cli.answer import Status
 from seqopt.cli.main import main
-from seqopt.cli.status import Status
 from seqopt.scene.scene_file import load_scene, save_scene
 from tests.builders import ROOT
 

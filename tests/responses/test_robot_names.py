@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seqopt.cli.main import main
-from seqopt.cli.words.values import parse_criterion, parse_limits
+from seqopt.cli.values import parse_criterion, parse_limits
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import candidate_layers, robot_use
 from seqopt.network.build import build_network

@@ -3,43 +3,40 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
-from pathlib import Path
+import time
+from collections.abc import Iterable, Iterator, Sequence
 
-import pandas as pd
-
-from seqopt.cli.saying.answer import Answer
-from seqopt.cli.saying.outputs import keep_apart
-from seqopt.cli.status import Status
-from seqopt.cli.words.asked import (
+from seqopt.cli.answer import Answer, Status
+from seqopt.cli.asked import (
     asked_engine,
     asked_scene,
+    asked_steps,
     exceeded,
     idle_notes,
     level_notes,
     scene_facts,
-    step_answers,
     strictly,
-    timely,
 )
-from seqopt.cli.words.common_arguments import (
-    asked_steps,
-    engine_arguments,
-    form_arguments,
-    group,
-    scene_argument,
-    steps_arguments,
-    strict_argument,
-    time_argument,
+from seqopt.cli.options import (
+    CSV_OUT,
+    declare,
+    engine_options,
+    form_options,
+    scene_options,
+    steps_options,
 )
-from seqopt.cli.words.values import parse_time_limit
-from seqopt.engines.interface import Fields
+from seqopt.cli.outputs import keep_apart, put_table
+from seqopt.cli.values import parse_time_limit
+from seqopt.engines.interface import Engine, Fields
 from seqopt.engines.registry import provenance
-from seqopt.files import csv_text, write_bytes, write_csv
+from seqopt.errors import SceneError
+from seqopt.files import write_bytes
+from seqopt.interrupts import ending
 from seqopt.network.build import build_network
 from seqopt.responses.staged import Placing, staged_fields
-from seqopt.responses.table import LinearRange, archive, response_table
+from seqopt.responses.table import LinearRange, archive, response_table, step_fields
 from seqopt.sequence.steps import Step
+from seqopt.work.progress import told
 
 DESCRIPTION = (
     "Compute how the structure responds in every step of one sequence, and write a table with the "
@@ -56,16 +53,16 @@ EXAMPLES = (
 )
 
 
+UNITS = "in the name of each column: N, Nm, 1e-3mm"
+
+
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``analyze``."""
-    basic = group(command, "what is analyzed")
-    scene_argument(basic)
-    steps_arguments(basic)
-    basic.add_argument(
-        "--out", type=Path, metavar="FILE", help="CSV file to write (default: standard output)"
-    )
-    how = group(command, "how responses are computed (advanced)")
-    engine_arguments(how)
+    basic = command.add_argument_group("what is analyzed")
+    scene_options(basic)
+    steps_options(basic)
+    declare(basic, CSV_OUT)
+    how = engine_options(command)
     how.add_argument(
         "--staged",
         choices=tuple(way.value for way in Placing),
@@ -73,30 +70,23 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "scratch: bricks come without stress, fitted to the deformed structure or set down where "
         "they are planned, and grips close where they find their nodes",
     )
-    how.add_argument(
-        "--fields",
-        type=Path,
-        metavar="FILE",
-        help="also write every edge force, node displacement and reaction, as a NumPy archive "
-        "(.npz)",
-    )
-    time_argument(how, "stop after it, with the steps that were computed by then")
-    form = group(command, "what is printed")
-    strict_argument(form)
-    form_arguments(form)
+    about = {
+        "--fields FILE": "also write every edge force, node displacement and reaction, as a NumPy "
+        "archive (.npz)",
+        "--time-limit SECONDS": "stop after it, with the steps that were computed by then",
+    }
+    declare(how, about)
+    form_options(command, strict=True)
 
 
 def run(options: argparse.Namespace) -> Answer:
-    """Analyze every step of a sequence.
-
-    ``options``: of the command.
-    """
+    """Analyze every step of a sequence."""
     keep_apart(options, options.out, options.fields)
     scene = asked_scene(options)
     network = build_network(scene)
-    engine, steps = asked_engine(options, network), asked_steps(scene, options)
+    engine, steps = asked_engine(options, network), asked_steps(options, scene)
     limit = parse_time_limit(options.time_limit)
-    answers: Iterable[tuple[Step, Fields]] = timely(step_answers(options, engine, steps), limit)
+    answers: Iterable[tuple[Step, Fields]] = _timely(_step_answers(options, engine, steps), limit)
     if options.fields is not None:
         answers = list(answers)
     table = response_table(network, answers)
@@ -106,19 +96,17 @@ def run(options: argparse.Namespace) -> Answer:
     within, computed = LinearRange(engine), steps[: len(table)]
     staged = None if options.staged is None else staged_fields(network, computed, options.staged)
     outside = within.departures(table, staged)
-    written = [path for path in (options.out, options.fields) if path is not None]
     if options.fields is not None:
         write_bytes(options.fields, archive(network, answers))
-    if options.out is not None:
-        write_csv(options.out, table)
+    said = put_table(options.out, table, f"{len(table)} steps")
+    if options.fields is not None:
+        said["written"] = (*said.get("written", ()), options.fields)
     answer = Answer(
         facts={"scene": scene_facts(scene), "units": UNITS, "steps": table, **provenance(engine)},
-        text="" if options.out is None else _said(table, options.out),
-        data=csv_text(table) if options.out is None else "",
-        written=tuple(written),
         notes=(*level_notes(engine), *within.unchecked, *idle_notes(scene, steps)),
         failures=late,
         status=Status.FAILED if late else Status.DONE,
+        **said,
     )
     return strictly(answer, options, exceeded(scene, table), outside)
 
@@ -133,8 +121,32 @@ def _late(options: argparse.Namespace, computed: int, steps: int) -> tuple[str, 
     )
 
 
-def _said(table: pd.DataFrame, path: Path) -> str:
-    return f"{len(table)} steps written to {path}"
+def _step_answers(
+    options: argparse.Namespace, engine: Engine, steps: Sequence[Step]
+) -> Iterator[tuple[Step, Fields]]:
+    """Return steps with their fields, each from scratch or with what earlier ones lock in."""
+    each = told("steps", steps, options.tell)
+    if options.staged is None:
+        return ((step, step_fields(engine, step)) for step in each)
+    if options.engine != "compliance":
+        raise SceneError(
+            f"--engine {options.engine}: --staged goes with exactly rigid bricks alone; "
+            "give --engine compliance"
+        )
+    return zip(each, staged_fields(engine.network, steps, options.staged), strict=True)
 
 
-UNITS = "in the name of each column: N, Nm, 1e-3mm"
+def _timely(
+    answers: Iterator[tuple[Step, Fields]], seconds: float
+) -> Iterator[tuple[Step, Fields]]:
+    """Yield the answers that come in time, from the first one that is asked for."""
+    end = time.perf_counter() + seconds
+    while True:
+        try:
+            with ending(end - time.perf_counter()):
+                answer = next(answers, None)
+        except TimeoutError:
+            return
+        if answer is None:
+            return
+        yield answer

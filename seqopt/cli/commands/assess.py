@@ -4,24 +4,14 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
-from pathlib import Path
 
-from seqopt.cli.saying.answer import Answer
-from seqopt.cli.saying.outputs import keep_apart
-from seqopt.cli.status import Status
-from seqopt.cli.words.asked import asked_scene, scene_facts
-from seqopt.cli.words.common_arguments import (
-    Takes,
-    asked_steps,
-    form_arguments,
-    group,
-    scene_argument,
-    steps_arguments,
-)
-from seqopt.cli.words.values import parse_mortar
+from seqopt.cli.answer import Answer, Status
+from seqopt.cli.asked import asked_scene, asked_steps, scene_facts
+from seqopt.cli.options import CSV_OUT, declare, form_options, scene_options, steps_options
+from seqopt.cli.outputs import keep_apart, put_table
+from seqopt.cli.values import asked_mortar
 from seqopt.contact.mortar import MORTARS
 from seqopt.engines.registry import versions
-from seqopt.files import csv_text, write_csv
 from seqopt.network.build import build_network
 from seqopt.stability.assessment import Verdict, assess_steps, format_verdicts, stability_table
 
@@ -40,11 +30,19 @@ EXAMPLES = (
 )
 
 
+STRENGTH = {
+    "--friction F": "coefficient of friction, in place of the mortar's own",
+    "--tensile-strength PA": "what a joint holds in tension, Pa, in place of the mortar's own",
+    "--cohesion PA": "what a joint holds in shear without any pressure, Pa, in place of the "
+    "mortar's own",
+}
+
+
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``assess``."""
-    basic = group(command, "what is assessed")
-    scene_argument(basic)
-    steps_arguments(basic)
+    basic = command.add_argument_group("what is assessed")
+    scene_options(basic)
+    steps_options(basic)
     basic.add_argument(
         "--mortar",
         choices=tuple(MORTARS),
@@ -52,36 +50,20 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="what is in the joints: the epoxy of Bruun et al. (25°, 3 MPa, 2 MPa) or nothing "
         "(default: %(default)s)",
     )
-    basic.add_argument(
-        "--out", type=Path, metavar="FILE", help="CSV file to write (default: standard output)"
-    )
-    _strength(group(command, "a mortar of your own (advanced)"))
-    form_arguments(group(command, "what is printed"))
-
-
-def _strength(takes: Takes) -> None:
-    for name, metavar, text in (
-        ("--friction", "F", "coefficient of friction"),
-        ("--tensile-strength", "PA", "what a joint holds in tension, Pa"),
-        ("--cohesion", "PA", "what a joint holds in shear without any pressure, Pa"),
-    ):
-        takes.add_argument(name, metavar=metavar, help=f"{text}, in place of the mortar's own")
+    declare(basic, CSV_OUT)
+    declare(command.add_argument_group("a mortar of your own (advanced)"), STRENGTH)
+    form_options(command)
 
 
 def run(options: argparse.Namespace) -> Answer:
-    """Assess every step of a sequence; the table is written whatever the verdicts.
-
-    ``options``: of the command.
-    """
+    """Assess every step of a sequence; the table is written whatever the verdicts."""
     keep_apart(options, options.out)
     scene = asked_scene(options)
-    mortar = parse_mortar(options)
+    mortar = asked_mortar(options)
     network = build_network(scene)
-    steps = asked_steps(scene, options)
+    steps = asked_steps(options, scene)
     results = assess_steps(network, steps, mortar, options.tell)
     table = stability_table(steps, results)
-    if options.out is not None:
-        write_csv(options.out, table)
     verdicts = [result.verdict for result in results]
     unsure = [s.number for s, v in zip(steps, verdicts, strict=True) if v is Verdict.UNDECIDED]
     said = f"steps {', '.join(map(str, unsure))} are undecided; this says nothing about them"
@@ -94,9 +76,7 @@ def run(options: argparse.Namespace) -> Answer:
             "verdicts": {verdict.value: verdicts.count(verdict) for verdict in Verdict},
             "steps": table,
         },
-        text="" if options.out is None else f"{format_verdicts(results)}; written to {options.out}",
-        data=csv_text(table) if options.out is None else "",
-        written=() if options.out is None else (options.out,),
+        **put_table(options.out, table, f"{format_verdicts(results)};"),
         failures=(f"seqopt: solver failed: {said}",) if unsure else (),
         status=Status.FAILED if unsure else status,
     )

@@ -10,12 +10,13 @@ import argparse
 import re
 from collections.abc import Iterable, Iterator
 from hashlib import sha256
+from typing import Any
 
 import shtab
 
+from seqopt.cli.answer import Answer
 from seqopt.cli.arguments import COMMANDS, parser
-from seqopt.cli.saying.answer import Answer
-from seqopt.cli.words.values import RULES
+from seqopt.cli.values import RULES
 from seqopt.plan.calling.formulation import formulation_names
 from seqopt.responses.choices import CHOICE_RESPONSES
 from seqopt.scene.library.by_words import KINDS
@@ -47,35 +48,27 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> Answer:
-    """Return the script with which a shell completes words of seqopt.
-
-    ``options``: of the command.
-    """
-    script = shtab.complete(completed(parser()), options.shell)
+    """Return the script with which a shell completes words of seqopt."""
+    script = shtab.complete(_completed(parser()), options.shell)
     return Answer(facts={"shell": options.shell, "script": script}, data=script + "\n")
 
 
-def completed(whole: argparse.ArgumentParser) -> argparse.ArgumentParser:
-    """Return a parser whose arguments know what may follow them.
-
-    ``whole``: of all commands; it is changed.
-    """
+def _completed(whole: argparse.ArgumentParser) -> argparse.ArgumentParser:
+    """Return the parser of all commands, changed: its arguments know what may follow them."""
     known = {name: words(names) for name, names in _names().items()}
     known |= {
         "scene": words([*builtin_scenes(), *(f"{kind}:" for kind in KINDS)], files=True),
         "schedule": words([*SCHEDULES, FREE], files=True),
     }
+    paths: dict[Any, object] = dict.fromkeys(("DIR", "PLAN_DIR"), shtab.DIRECTORY)
+    paths["FILE"] = shtab.FILE
     for command in _commands(whole):
         command.description = COMMANDS[command.prog.split()[-1]].about
-    for action in _actions(whole):
-        if action.dest in known:
-            action.complete = known[action.dest]  # type: ignore[attr-defined]
-        elif action.metavar in ("DIR", "PLAN_DIR"):
-            action.complete = shtab.DIRECTORY  # type: ignore[attr-defined]
-        elif action.metavar == "FILE":
-            action.complete = shtab.FILE  # type: ignore[attr-defined]
-        if action.help and action.help != argparse.SUPPRESS:
-            action.help = SHORT.split(action.help)[0]
+        for action in command._actions:
+            if found := known.get(action.dest, paths.get(action.metavar)):
+                action.complete = found  # type: ignore[attr-defined]
+            if action.help and action.help != argparse.SUPPRESS:
+                action.help = SHORT.split(action.help)[0]
     return whole
 
 
@@ -84,12 +77,6 @@ def _commands(whole: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParse
     for action in whole._actions:
         if isinstance(action, argparse._SubParsersAction):
             yield from action.choices.values()
-
-
-def _actions(whole: argparse.ArgumentParser) -> Iterator[argparse.Action]:
-    """Yield the arguments of all commands."""
-    for command in _commands(whole):
-        yield from command._actions
 
 
 def _names() -> dict[str, list[str]]:
@@ -113,11 +100,7 @@ def _names() -> dict[str, list[str]]:
 
 
 def words(names: Iterable[str], *, files: bool = False) -> dict[str, object]:
-    """Return how each shell completes one of some words, as shtab takes it.
-
-    ``names``: without blanks; ``files``: whether the path of a file will do too. Result: by shell,
-    with functions for bash and zsh as its ``preamble``.
-    """
+    """Return how each shell completes one of some words, or the path of a file too, for shtab."""
     listed = " ".join(names)
     name = f"_seqopt_{sha256(listed.encode()).hexdigest()[:8]}"
     more = '; compgen -f -- "$1"' if files else ""

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from seqopt.cli.saying.answer import Answer
-from seqopt.cli.words.asked import scene_facts
-from seqopt.cli.words.common_arguments import form_arguments, group
+from seqopt.cli.answer import Answer
+from seqopt.cli.asked import scene_facts
+from seqopt.cli.options import declare, form_options
 from seqopt.files import require_apart, write_text
 from seqopt.sequence.exports.formats import EXPORTS, export_plan, read_folder
 
@@ -18,27 +17,24 @@ DESCRIPTION = (
 EXAMPLES = ("seqopt export best --format csv --out blocks.csv",)
 
 
+SOURCE = {
+    "--source FILE": "with a format of COMPAS: the file that was imported, to name its elements or "
+    "to write the plan into"
+}
+
+
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``export``."""
-    basic = group(command, "what is written")
-    basic.add_argument("folder", type=Path, metavar="PLAN_DIR", help="folder of a plan")
+    basic = command.add_argument_group("what is written")
+    declare(basic, {"folder PLAN_DIR": "folder of a plan"})
     basic.add_argument("--format", choices=tuple(EXPORTS), required=True, help="what to write")
-    basic.add_argument("--out", type=Path, required=True, metavar="FILE", help="file to write")
-    basic.add_argument(
-        "--source",
-        type=Path,
-        metavar="FILE",
-        help="with a format of COMPAS: the file that was imported, to name its elements or to "
-        "write the plan into",
-    )
-    form_arguments(group(command, "what is printed"))
+    declare(basic, {"--out FILE": "file to write"}, required=True)
+    declare(basic, SOURCE)
+    form_options(command)
 
 
 def run(options: argparse.Namespace) -> Answer:
-    """Write the plan of a folder in a format of others.
-
-    ``options``: of the command.
-    """
+    """Write the plan of a folder in a format of others."""
     inputs = [options.folder / name for name in ("scene.json", "plan.csv")]
     require_apart([options.out], [*inputs, *filter(None, [options.source])])
     scene, steps = read_folder(options.folder)

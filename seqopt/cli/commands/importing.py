@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
-from seqopt.cli.saying.answer import Answer
-from seqopt.cli.words.asked import scene_facts
-from seqopt.cli.words.common_arguments import form_arguments, group
-from seqopt.cli.words.values import number_word
+from seqopt.cli.answer import Answer
+from seqopt.cli.asked import scene_facts
+from seqopt.cli.options import declare, form_options
+from seqopt.cli.values import count_word, number_word
 from seqopt.errors import ProblemError
 from seqopt.files import require_apart, write_text
 from seqopt.scene.imports.content import UNITS, UPS, Given
 from seqopt.scene.imports.formats import FORMATS, import_scene
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene_file import dump_scene
-from seqopt.work.progress import Tell
 
 MOST_ROBOTS = 100
 DESCRIPTION = (
@@ -29,58 +27,43 @@ EXAMPLES = (
 )
 
 
+KEYS = {
+    "--density KG/M3": "of blocks for which the file has none, kg/m³",
+    "--supports KEY,KEY": "blocks that are the ground, by their keys in the file (default: those "
+    "that it marks, else what stands at the lowest level)",
+}
+JOINTS = {
+    "--stiffness NORMAL,TANGENTIAL": "of joints by area, N/m³, in place of that of the file "
+    "(default: 1.5e9,1.5e8)",
+    "--gap M": "most that may lie between faces that touch (default: a twentieth of the thinnest "
+    "block)",
+    "--detect": "look for faces although the file has some",
+}
+
+
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``import``."""
-    basic = group(command, "what is read and written")
-    basic.add_argument("file", type=Path, metavar="FILE", help="what to read")
-    basic.add_argument(
-        "--out", type=Path, required=True, metavar="FILE", help="scene to write, JSON"
-    )
+    basic = command.add_argument_group("what is read and written")
+    declare(basic, {"file FILE": "what to read"})
+    declare(basic, {"--out FILE": "scene to write, JSON"}, required=True)
     basic.add_argument(
         "--format", choices=FORMATS, help="what the file is (default: what it looks like)"
     )
-    basic.add_argument("--name", help="of the scene (default: that of the file)")
-    said = group(command, "what the file does not say")
+    declare(basic, {"--name NAME": "of the scene (default: that of the file)"})
+    said = command.add_argument_group("what the file does not say")
     said.add_argument("--unit", choices=UNITS, help="unit of length, where the file has none")
     said.add_argument("--up", choices=UPS, default="z", help="axis that is up (default: z)")
-    said.add_argument(
-        "--density", metavar="KG/M3", help="of blocks for which the file has none, kg/m³"
-    )
-    said.add_argument(
-        "--supports",
-        metavar="KEY,KEY",
-        help="blocks that are the ground, by their keys in the file (default: those that it "
-        "marks, else what stands at the lowest level)",
-    )
-    said.add_argument(
-        "--robots", default="3", metavar="N", help="mobile robots that reach all (default: 3)"
-    )
-    joints = group(command, "joints (advanced)")
-    joints.add_argument(
-        "--stiffness",
-        metavar="NORMAL,TANGENTIAL",
-        help="of joints by area, N/m³, in place of that of the file (default: 1.5e9,1.5e8)",
-    )
-    joints.add_argument(
-        "--gap",
-        metavar="M",
-        help="most that may lie between faces that touch (default: a twentieth of the thinnest "
-        "block)",
-    )
-    joints.add_argument(
-        "--detect", action="store_true", help="look for faces although the file has some"
-    )
-    form_arguments(group(command, "what is printed"))
+    declare(said, KEYS)
+    declare(said, {"--robots N": "mobile robots that reach all (default: 3)"}, default="3")
+    declare(command.add_argument_group("joints (advanced)"), JOINTS)
+    form_options(command)
 
 
 def run(options: argparse.Namespace) -> Answer:
-    """Read an assembly of others, and write it as a scene.
-
-    ``options``: of the command.
-    """
+    """Read an assembly of others, and write it as a scene."""
     require_apart([options.out], [options.file])
     options.tell("reading the file")
-    scene = import_scene(options.file, options.format, _given(options, options.tell))
+    scene = import_scene(options.file, options.format, _given(options))
     write_text(options.out, dump_scene(scene))
     assumed = scene.provenance.splitlines()
     said = (
@@ -94,7 +77,7 @@ def run(options: argparse.Namespace) -> Answer:
     )
 
 
-def _given(options: argparse.Namespace, tell: Tell) -> Given:
+def _given(options: argparse.Namespace) -> Given:
     """Return what the words say where the file does not."""
     keys = options.supports
     return Given(
@@ -105,9 +88,9 @@ def _given(options: argparse.Namespace, tell: Tell) -> Given:
         law=_law(options.stiffness),
         gap=_positive("--gap", options.gap),
         detect=options.detect,
-        robots=_robots(options.robots),
+        robots=count_word(options.robots, "--robots", MOST_ROBOTS),
         name=options.name,
-        progress=tell,
+        progress=options.tell,
     )
 
 
@@ -123,9 +106,3 @@ def _law(text: str | None) -> JointLaw | None:
         raise ProblemError(f"--stiffness {text}: give two numbers, as 1.5e9,1.5e8")
     along, across = (number_word(word, f"--stiffness {text}") for word in words)
     return JointLaw(translational=(along, across, across))
-
-
-def _robots(text: str) -> int:
-    if not text.isascii() or not text.isdigit() or not 1 <= int(text[:9]) <= MOST_ROBOTS:
-        raise ProblemError(f"--robots {text}: give a whole number from 1 to {MOST_ROBOTS}")
-    return int(text)

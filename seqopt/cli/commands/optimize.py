@@ -8,21 +8,34 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from seqopt.cli.saying.answer import Answer
-from seqopt.cli.saying.outputs import plan_files, write_outputs, written_to
-from seqopt.cli.saying.terminal import wrapped
-from seqopt.cli.status import Status
-from seqopt.cli.words import optimize_arguments
-from seqopt.cli.words.asked import exceeded, idle_notes, posed_notes, scene_facts, strictly
-from seqopt.cli.words.posing import Asked, asked_problem
-from seqopt.cli.words.values import parse_options, parse_size, parse_time_limit
+from seqopt.cli.answer import Answer, Status
+from seqopt.cli.asked import exceeded, idle_notes, level_notes, scene_facts, strictly
+from seqopt.cli.options import (
+    LIMIT,
+    RULE,
+    STANDING,
+    criterion_options,
+    declare,
+    engine_options,
+    form_options,
+    robots_option,
+    scene_options,
+)
+from seqopt.cli.outputs import plan_files, write_outputs, written_to
+from seqopt.cli.posing import Asked, asked_problem
+from seqopt.cli.terminal import wrapped
+from seqopt.cli.values import parse_options, parse_size, parse_time_limit
 from seqopt.errors import ProblemError
 from seqopt.graph.states.states import States
-from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation
+from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation, formulation_names
 from seqopt.plan.out_of_sample import Trial, judge_unseen, worst_values
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve, usual
+from seqopt.problem.problem import Problem
+from seqopt.problem.requirements import OWN
+from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.study.published import paper_models
 from seqopt.work.progress import within
 
@@ -44,7 +57,93 @@ EXAMPLES = (
     "seqopt optimize arch25 --robust worst-peak --out robust",
 )
 INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
-add_arguments = optimize_arguments.add_arguments
+BUDGET = {
+    "--budget BUDGET ...": "cap on a total over the build, with the formulations labels, "
+    "lagrangian, overlap_mip and overlap_lp: travel=0.8 (of what the optimum without budgets "
+    "travels), travel=3.5m, steps_over:F_largest=250:10 (at most 10 open steps over 250 N), "
+    "robot_use:rob1=100:5 (at most 5 in which rob1 carries over 100 N); with --aim or --schedule "
+    "free: steps=N, regrips=N, travel=METERS or sum(RESPONSE)=VALUE"
+}
+AIM = {
+    "--aim NAME,NAME": "what is to be as small as possible, the most important first: minmax (the "
+    "worst step by the criterion, by default worst-ratio), sum, steps, regrips, travel, bond, "
+    "friction, tilt, a response, or sum(RESPONSE) (free: by default minmax; other schedules: by "
+    "default the total of what their moves cost); with --order search, the best order of the "
+    "bricks is found too"
+}
+SEARCH = {
+    "--option NAME=VALUE ...": "option of the formulation, as horizon=2 or width=10",
+    "--no-proof": "with cascade or rank_search: compute only the responses that the search meets, "
+    "about a fifth; how far the choice is from the optimum stays unknown",
+    "--lazy": "with an exact formulation: compute only the responses that the proof needs; stopped "
+    "before it is done, it leaves its best choice and a bound; with --aim or --schedule free it is "
+    "done at any rate",
+    "--candidates RULE": "look at fewer nodes per move: near:12 for those at most 12 joints from "
+    "the newest bricks, within:1.5 for those at most 1.5 m from them; makes any formulation a "
+    "heuristic (free: of grips on bricks that stand; what is proven holds among these)",
+}
+ROBUST = {
+    "--robust AIM": "what is to be as small as possible over all scenarios, in place of "
+    "--formulation: worst-peak (the largest cost of any step), worst-total (the largest total), or "
+    "cvar=0.9 (the mean total of the worst tenth)",
+    "--scenarios N": "how many samples of the scene (default: 30)",
+    "--unseen N": "how many other samples, of the next seed, judge the plan (default: as many)",
+    "--seed N": "which samples are drawn (default: 0)",
+    "--vary NAME=VALUE ...": "how far samples are from the scene: stiffness=3 (of each joint, by a "
+    "factor up to it, up or down), density=0.1 (of each brick, up to this share), position=0.002 "
+    "(of each brick and joint, up to so many m); these are the defaults",
+}
+TIME = {
+    "--time-limit SECONDS": "stop choosing after it, with the best choice so far and a bound; with "
+    "--no-proof, where choosing and computing are one, with the moves that were chosen by then"
+}
+WORKERS = {
+    "--workers N": "processes to share the work among; pays from about ten seconds (default: "
+    "%(default)s)"
+}
+MEMORY = {
+    "--cache DIR": "keep answers there and use what is there: a run that was ended goes on",
+    "--max-memory SIZE": "what responses and costs may take, as 500MB or 2GB (default: four fifths "
+    "of what is free); of a free schedule states and moves, with a bound where it ends",
+}
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``optimize``, those of a first use before those of an expert."""
+    _basic(command)
+    declare(command.add_argument_group("what is allowed"), LIMIT | BUDGET)
+    form_options(command, strict=True)
+    states = "what plans are compared by, state after state, with any schedule"
+    declare(command.add_argument_group(states), AIM | STANDING)
+    declare(command.add_argument_group("with --schedule free"), RULE)
+    criterion_options(command)
+    engine_options(command)
+    declare(command.add_argument_group("how far the search goes (advanced)"), SEARCH)
+    scenarios = "a plan that is good in many scenarios (advanced)"
+    declare(command.add_argument_group(scenarios), ROBUST)
+    means = command.add_argument_group("time and memory (advanced)")
+    declare(means, TIME)
+    declare(means, WORKERS, default="1")
+    declare(means, MEMORY)
+
+
+def _basic(command: argparse.ArgumentParser) -> None:
+    takes = command.add_argument_group("what is built, and how grips are chosen")
+    about = {
+        "--formulation NAME": "which mathematical program chooses: "
+        f"{', '.join(formulation_names())} (default: overlap_dp, which is exact and the fastest, "
+        "labels with --budget, minimax with --robust worst-peak, scenario_search with other aims "
+        "over scenarios; schedule_search with --aim, --stands or --schedule free, order_search "
+        "with --order search)",
+        "--schedule NAME|FILE": f"which sequence has the open grips: {', '.join(SCHEDULES)} (of "
+        "all robots), a CSV file of steps in which open grips are marked ?, or "
+        f"{FREE}: any robot may release, hold or place next (default: the loop of three robots, or "
+        "of two where there is no third)",
+    }
+    scene_options(takes)
+    declare(takes, about)
+    robots_option(takes, "a loop, or a schedule that is named")
+    declare(takes, {"--out DIR": "folder to write plan, tables, summary and page to"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +221,7 @@ def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]
         facts={**facts, "plan": table},
         text="\n".join([*lines, *(f"payload exceeded: {excess}" for excess in over)]),
         written=written,
-        notes=(*posed_notes(found.asked.problem), *idle_notes(scene, plan.steps)),
+        notes=(*_posed_notes(found.asked.problem), *idle_notes(scene, plan.steps)),
         failures=(INTERRUPTED,) if stopped else (),
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )
@@ -148,6 +247,14 @@ def _said(found: _Found) -> str:
         counts = f"{len(plan.steps)} steps, {plan.regrips} regrips, {counts}"
         return f"{how}: {plan.worth}; {counts}"
     return f"{how}: {plan.worth}, {counts}"
+
+
+def _posed_notes(problem: Problem) -> tuple[str, ...]:
+    """Return which levels the engine took, and whether scales are not those of fixed methods."""
+    said, name = level_notes(problem.engine), problem.criterion.name
+    if not name.endswith(OWN):
+        return said
+    return (*said, f"criterion: {name}: no fixed method builds this scene to take scales from")
 
 
 def _paper_count(plan: Plan) -> dict[str, int] | None:

@@ -5,36 +5,34 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import pandas as pd
 
-from seqopt.cli.saying.answer import Answer
-from seqopt.cli.saying.outputs import figure_notes, write_outputs, written_to
-from seqopt.cli.words.asked import level_notes, marked, scene_facts, scene_file
-from seqopt.cli.words.common_arguments import (
-    Takes,
-    add_rules,
-    add_standing,
-    engine_arguments,
-    form_arguments,
-    group,
-    limit_argument,
-    scene_argument,
+from seqopt.cli.answer import Answer
+from seqopt.cli.asked import level_notes, marked, scene_facts
+from seqopt.cli.options import (
+    LIMIT,
+    RULE,
+    STANDING,
+    declare,
+    engine_options,
+    form_options,
+    scene_options,
 )
-from seqopt.cli.words.posing import asked_problem
-from seqopt.cli.words.values import parse_numbers
-from seqopt.engines.interface import Engine
+from seqopt.cli.outputs import figure_notes, write_outputs, written_to
+from seqopt.cli.posing import asked_problem
+from seqopt.cli.values import parse_numbers
 from seqopt.engines.registry import provenance
-from seqopt.errors import ProblemError, StepError, did_you_mean
+from seqopt.errors import ProblemError, did_you_mean
 from seqopt.files import csv_text, require_folder
 from seqopt.graph.states.states import States
 from seqopt.plan.front import Front, find_front, pick
 from seqopt.plan.solving import states_of
 from seqopt.problem.problem import judged_by
-from seqopt.report.comparison import method_tables, shown_table, worst_of
+from seqopt.report.comparison import fixed_methods, shown_table, worst_of
 from seqopt.report.pages import PAGE, front_page
 from seqopt.responses.table import LinearRange, analyze, builds_in_words
+from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import SCHEDULES
@@ -52,81 +50,53 @@ EXAMPLES = (
     "seqopt pareto arch25 --pick D_max --under F_largest=250 --out front",
     "seqopt pareto arch25 --aim D_max,steps --seconds 60 --out front",
 )
+AIM = {
+    "--aim NAME,NAME": "what is to be small: responses and, of the free schedule, steps and "
+    "regrips (default: %(default)s)"
+}
+SCHEDULE = {
+    "--schedule NAME|FILE": f"{FREE} (default): any robot may place, hold or release next; or a "
+    f"sequence with open grips: {', '.join(SCHEDULES)}, or a CSV file"
+}
+ROBOTS = {"--robots N|NAME,NAME": "how many robots (further ones are mobile), or which take part"}
+CHOICE = {
+    "--pick NAME": "also write the plan with the least of a column of the table",
+    "--round NAME=STEP ...": "round a number up to multiples of a step (SI units)",
+    "--under BOUND ...": "for --pick: only plans below it: NAME=VALUE (SI units), or a method that "
+    "is to be beaten in everything: sequential, cantilever, published",
+}
+SECONDS = {"--seconds S": "end the search after so long"}
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``pareto``."""
-    basic = group(command, "what is built, and what is to be small")
-    scene_argument(basic)
-    basic.add_argument(
-        "--aim",
-        default=FOUR,
-        metavar="NAME,NAME",
-        help="what is to be small: responses and, of the free schedule, steps and regrips "
-        "(default: %(default)s)",
-    )
-    basic.add_argument(
-        "--schedule",
-        default=FREE,
-        metavar="NAME|FILE",
-        help=f"{FREE} (default): any robot may place, hold or release next; or a sequence with "
-        f"open grips: {', '.join(SCHEDULES)}, or a CSV file",
-    )
-    basic.add_argument(
-        "--robots",
-        default="",
-        metavar="N|NAME,NAME",
-        help="how many robots (further ones are mobile), or which take part",
-    )
-    limit_argument(basic)
-    basic.add_argument("--out", type=Path, metavar="DIR", required=True, help="folder to write")
-    _choice(group(command, "which plan is picked, and when the search ends"))
-    form_arguments(group(command, "what is printed"))
-    free = group(command, "with --schedule free")
-    add_rules(free)
-    add_standing(free)
-    engine_arguments(group(command, "how responses are computed (advanced)"))
+    basic = command.add_argument_group("what is built, and what is to be small")
+    scene_options(basic)
+    declare(basic, AIM, default=FOUR)
+    declare(basic, SCHEDULE, default=FREE)
+    declare(basic, ROBOTS, default="")
+    declare(basic, LIMIT)
+    declare(basic, {"--out DIR": "folder to write"}, required=True)
+    choice = command.add_argument_group("which plan is picked, and when the search ends")
+    declare(choice, CHOICE)
+    declare(choice, SECONDS, default="inf", type=float)
+    form_options(command)
+    declare(command.add_argument_group("with --schedule free"), RULE | STANDING)
+    engine_options(command)
     command.set_defaults(criteria=None, crown=None)
 
 
-def _choice(takes: Takes) -> None:
-    takes.add_argument(
-        "--pick", metavar="NAME", help="also write the plan with the least of a column of the table"
-    )
-    takes.add_argument(
-        "--round",
-        action="append",
-        default=[],
-        metavar="NAME=STEP",
-        help="round a number up to multiples of a step (SI units); may be repeated",
-    )
-    takes.add_argument(
-        "--under",
-        action="append",
-        default=[],
-        metavar="BOUND",
-        help="for --pick: only plans below it: NAME=VALUE (SI units), or a method that is to be "
-        "beaten in everything: sequential, cantilever, published; may be repeated",
-    )
-    takes.add_argument(
-        "--seconds", default="inf", type=float, metavar="S", help="end the search after so long"
-    )
-
-
 def run(options: argparse.Namespace) -> Answer:
-    """Find all plans that no other beats in every aim, and write them.
-
-    ``options``: of the command.
-    """
+    """Find all plans that no other beats in every aim, and write them."""
     require_folder(options.out)
     asked = asked_problem(options)
     scene, free = asked.scene, states_of(asked.problem)
-    rounding = parse_numbers("--round", options.round, dict.fromkeys(map(str, free.goals)))
+    rounding = parse_numbers("--round", options.round, [str(goal) for goal in free.goals])
     seconds = float(options.seconds)
     front = find_front(
         asked.problem, rounding=rounding, seconds=seconds, progress=within(options.tell, seconds)
     )
-    methods = _methods(free.engine)
+    methods = fixed_methods(free.engine)
     files, left = _front_files(front, free, methods, options)
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
@@ -137,7 +107,7 @@ def run(options: argparse.Namespace) -> Answer:
         picked = {"point": chosen + 1, **values}
         row = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
         said += f"; picked row {chosen + 1}: {row}"
-    write_outputs(options, lambda: files | scene_file(scene))
+    write_outputs(options, lambda: files | {"scene.json": dump_scene(scene)})
     answer = Answer(
         facts={
             "scene": scene_facts(scene),
@@ -151,13 +121,6 @@ def run(options: argparse.Namespace) -> Answer:
         notes=(*level_notes(free.engine), *figure_notes()),
     )
     return marked(answer, left)
-
-
-def _methods(engine: Engine) -> dict[str, pd.DataFrame]:
-    try:
-        return method_tables(engine)[0]
-    except StepError:
-        return {}
 
 
 def _front_files(

@@ -5,15 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from seqopt.cli.saying.answer import Answer
-from seqopt.cli.saying.outputs import figure_notes, keep_apart
-from seqopt.cli.words.asked import asked_engine, asked_scene, scene_facts
-from seqopt.cli.words.common_arguments import (
-    engine_arguments,
-    form_arguments,
-    group,
-    scene_argument,
-)
+from seqopt.cli.answer import Answer
+from seqopt.cli.asked import asked_engine, asked_scene, scene_facts
+from seqopt.cli.options import declare, engine_options, form_options, scene_options
+from seqopt.cli.outputs import figure_notes, keep_apart
 from seqopt.files import require_folder, write_folder, write_text
 from seqopt.network.build import build_network
 from seqopt.report.pages import PAGE, folder_builds, folder_page
@@ -30,30 +25,25 @@ EXAMPLES = (
 )
 
 
+SHOWN = {
+    "folder DIR": "folder that holds plans as CSV",
+    "--out FILE": f"page to write (default: {PAGE} in DIR)",
+    "--figures FOLDER": "also write figures there as PNG and SVG: steps, who holds what when, and "
+    "responses along the build (needs matplotlib)",
+}
+
+
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``report``."""
-    basic = group(command, "what is shown")
-    scene_argument(basic)
-    basic.add_argument("folder", type=Path, metavar="DIR", help="folder that holds plans as CSV")
-    basic.add_argument(
-        "--out", type=Path, metavar="FILE", help=f"page to write (default: {PAGE} in DIR)"
-    )
-    basic.add_argument(
-        "--figures",
-        type=Path,
-        metavar="FOLDER",
-        help="also write figures there as PNG and SVG: steps, who holds what when, and responses "
-        "along the build (needs matplotlib)",
-    )
-    engine_arguments(group(command, "how responses are computed (advanced)"))
-    form_arguments(group(command, "what is printed"))
+    basic = command.add_argument_group("what is shown")
+    scene_options(basic)
+    declare(basic, SHOWN)
+    engine_options(command)
+    form_options(command)
 
 
 def run(options: argparse.Namespace) -> Answer:
-    """Write the page of the plans in a folder.
-
-    ``options``: of the command.
-    """
+    """Write the page of the plans in a folder."""
     own = options.folder / "scene.json"
     if own.is_file():  # plans go with the scene that stands beside them
         options.scene = str(own)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from pathlib import Path
 
-from seqopt.cli.saying.answer import Answer
-from seqopt.cli.saying.outputs import keep_apart
-from seqopt.cli.words.asked import asked_scene, network_facts, scene_facts
-from seqopt.cli.words.common_arguments import form_arguments, group, scene_argument
+import numpy as np
+
+from seqopt.cli.answer import Answer
+from seqopt.cli.asked import asked_scene, scene_facts
+from seqopt.cli.options import declare, form_options, scene_options
+from seqopt.cli.outputs import keep_apart
 from seqopt.files import write_text
 from seqopt.network.build import build_network
+from seqopt.network.network import Network
 from seqopt.scene.library.by_words import KINDS
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import about, builtin_scenes, dump_scene, load_scene
@@ -28,30 +30,27 @@ EXAMPLES = (
 )
 
 
+WHAT = {
+    "--list": "name all built-in scenes, and the words that make others",
+    "--export FILE": "JSON file to write",
+}
+
+
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``scene``."""
-    basic = group(command, "which scene")
-    scene_argument(basic)
-    what = basic.add_mutually_exclusive_group()
-    what.add_argument(
-        "--list",
-        action="store_true",
-        help="name all built-in scenes, and the words that make others",
-    )
-    what.add_argument("--export", type=Path, metavar="FILE", help="JSON file to write")
-    form_arguments(group(command, "what is printed"))
+    basic = command.add_argument_group("which scene")
+    scene_options(basic)
+    declare(basic.add_mutually_exclusive_group(), WHAT)
+    form_options(command)
 
 
 def run(options: argparse.Namespace) -> Answer:
-    """Describe a scene and export it, or list all that there are.
-
-    ``options``: of the command.
-    """
+    """Describe a scene and export it, or list all that there are."""
     if options.list:
         return _list(options)
     keep_apart(options, options.export)
     scene = asked_scene(options)
-    facts = {**scene_facts(scene), **network_facts(build_network(scene))}
+    facts = {**scene_facts(scene), **_network_facts(build_network(scene))}
     lines = [*_described(scene, facts)]
     if options.export is not None:
         write_text(options.export, dump_scene(scene))
@@ -62,6 +61,20 @@ def run(options: argparse.Namespace) -> Answer:
         headings=(lines[0],),
         written=() if options.export is None else (options.export,),
     )
+
+
+def _network_facts(network: Network) -> dict[str, object]:
+    """Return how large the network of a scene is, what it weighs, and what its robots can do."""
+    scene = network.scene
+    count = len(scene.bricks)
+    return {
+        "nodes": network.count_nodes(count),
+        "edges": network.count_edges(count),
+        "weight_N": float(np.linalg.norm(network.weight.sum(axis=0))),
+        "payloads_N": {robot.name: robot.payload for robot in scene.robots},
+        "reaches": {robot.name: type(robot.reach).__name__.lower() for robot in scene.robots},
+        "provenance": scene.provenance,
+    }
 
 
 def _list(options: argparse.Namespace) -> Answer:

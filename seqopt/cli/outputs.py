@@ -8,10 +8,11 @@ import math
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
-from seqopt.files import csv_text, require_apart, require_folder, write_folder
+from seqopt.files import csv_text, require_apart, require_folder, write_csv, write_folder
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.states.states import States
 from seqopt.plan.calling.formulation import trace_rows
@@ -30,10 +31,7 @@ def figure_notes() -> tuple[str, ...]:
 
 
 def comparison_files(result: Comparison) -> dict[str, bytes | str]:
-    """Return the tables of a comparison by file name, and its figures if they can be drawn.
-
-    Result (dict of str to (bytes or str)).
-    """
+    """Return the tables of a comparison by file name, and its figures if they can be drawn."""
     files: dict[str, bytes | str] = {
         "comparison.csv": result.table.to_csv(float_format="%.6g"),
         **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
@@ -53,10 +51,9 @@ def comparison_files(result: Comparison) -> dict[str, bytes | str]:
 def plan_files(
     plan: Plan, report: Mapping[str, object], trial: Trial | None = None
 ) -> dict[str, bytes | str]:
-    """Return the tables of a plan, its summary, its scene and its page, by file name.
+    """Return the tables of a plan, its summary, scene and page, by file name.
 
-    ``report``: the summary; numbers that are not finite are written as null; ``trial``: the plan in
-    other scenarios. Result (dict of str to (bytes or str)).
+    The trial is of the plan in other scenarios.
     """
     table = plan.responses()
     files: dict[str, bytes | str] = {
@@ -90,6 +87,14 @@ def _plain(value: object) -> object:
     return value
 
 
+def put_table(path: Path | None, table: pd.DataFrame, said: str) -> dict[str, Any]:
+    """Write a table, and return what an answer says of it: without a file it is the data."""
+    if path is None:
+        return {"data": csv_text(table)}
+    write_csv(path, table)
+    return {"text": f"{said} written to {path}", "written": (path,)}
+
+
 def written_to(folder: Path | None) -> str:
     """Return where a folder with a page was written, and what shows it, or how to have one."""
     if folder is None:
@@ -100,44 +105,32 @@ def written_to(folder: Path | None) -> str:
 def write_outputs(
     options: argparse.Namespace, files: Callable[[], Mapping[str, bytes | str]]
 ) -> tuple[Path, ...]:
-    """Write the folder that a command was asked for, whole, if it was asked for one.
+    """Write the folder that a command was asked for, whole, if it was asked for one; return it.
 
-    ``options``: with ``out``, the folder or None, ``tell``, and what the command reads; ``files``:
-    returns contents by file name. Result: the folder, or nothing. Raises `FileError` if one would
-    overwrite what the command reads, or the folder cannot be written.
+    Raises `FileError` if a file would overwrite what the command reads, or cannot be written.
     """
     if options.out is None:
         return ()
     options.tell("writing the plan")
     made = files()
-    require_apart([options.out / name for name in made], inputs(options))
+    require_apart([options.out / name for name in made], _inputs(options))
     write_folder(options.out, made)
     return (options.out,)
 
 
 def require_out(options: argparse.Namespace) -> None:
-    """Raise an error, before anything is computed, if the folder asked for cannot be written.
-
-    ``options``: with ``out``, the folder or None. Raises `FileError`, naming it.
-    """
+    """Raise `FileError`, before anything is computed, if the folder asked for cannot be made."""
     if options.out is not None:
         require_folder(options.out)
 
 
 def keep_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
-    """Raise an error if outputs are one file, or one that the command reads.
-
-    ``options``: of the command; ``*outputs``: what it is to write. Raises `FileError`, naming the
-    file.
-    """
-    require_apart([path for path in outputs if path is not None], inputs(options))
+    """Raise `FileError` if outputs are one file, or one that the command reads."""
+    require_apart([path for path in outputs if path is not None], _inputs(options))
 
 
-def inputs(options: argparse.Namespace) -> list[Path]:
-    """Return the files that a command reads.
-
-    ``options``: of the command.
-    """
+def _inputs(options: argparse.Namespace) -> list[Path]:
+    """Return the files that a command reads."""
     scene = None if options.scene in builtin_scenes() else options.scene
     named = (scene, getattr(options, "plan", None), getattr(options, "schedule", None))
     return [Path(name) for name in named if name is not None]

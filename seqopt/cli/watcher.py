@@ -8,7 +8,7 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from seqopt.cli.saying.terminal import columns, harmless, is_terminal
+from seqopt.cli.terminal import columns, harmless, is_terminal
 from seqopt.work.progress import Stage, duration
 
 if TYPE_CHECKING:

@@ -20,22 +20,23 @@ from seqopt.errors import FileError, SceneWarning
 
 NARROWEST, WIDEST = 40, 100  # columns that text is wrapped to
 STYLES = {"heading": "1", "bad": "1;31", "doubt": "33"}  # of terminals: bold, bold red, yellow
+CLEAR = "\r\033[K"  # of a terminal: the line it is on
+LONGEST = 2000  # characters of a line on standard error
+BEGIN = re.compile(
+    r"seqopt: (error|warning|solver failed|time is over|out of memory|payload exceeded)(?=:)"
+)
 
 
 def columns() -> int:
-    """Return how many columns text may take: those of the terminal, 80 where there is none.
-
-    Result: ``COLUMNS`` of the environment wins; no less than 40 and no more than 100.
-    """
+    """Return how many columns text may take: those of ``COLUMNS`` or the terminal, else 80."""
     return min(max(shutil.get_terminal_size((80, 24)).columns, NARROWEST), WIDEST)
 
 
 def wrapped(text: str, width: int | None = None, first: str = "", rest: str | None = None) -> str:
-    """Return a text as lines that fit the terminal.
+    """Return a text as lines that fit the terminal; words longer than a line stay whole.
 
-    ``width``: columns; those of the terminal by default; ``first``, ``rest``: what the first line
-    and all others begin with; the latter by default blanks as wide as the former. Result: words
-    longer than a line, as paths, stay whole.
+    ``first`` and ``rest`` are what the first line and all others begin with; the latter by default
+    blanks as wide as the former.
 
     Examples
     --------
@@ -62,11 +63,7 @@ def is_terminal(stream: TextIO | None) -> bool:
 
 
 def colored(stream: TextIO | None) -> bool:
-    """Return whether a stream takes colors.
-
-    Result: not where ``NO_COLOR`` is set in the environment; where ``FORCE_COLOR`` is; else if it
-    is a terminal that can.
-    """
+    """Return whether a stream takes colors: ``NO_COLOR`` and ``FORCE_COLOR`` go before it."""
     if os.environ.get("NO_COLOR"):
         return False
     if os.environ.get("FORCE_COLOR"):
@@ -75,29 +72,12 @@ def colored(stream: TextIO | None) -> bool:
 
 
 def painted(text: str, style: str, stream: TextIO | None) -> str:
-    r"""Return text in a style where a stream takes colors, else as it is.
-
-    ``style``: a key of `STYLES`; ``stream``: to which it will be written.
-
-    Examples
-    --------
-    >>> painted("unsafe", "bad", None)
-    'unsafe'
-    """
+    """Return text in one of `STYLES` where the stream that it goes to takes colors."""
     return f"\033[{STYLES[style]}m{text}\033[0m" if colored(stream) else text
 
 
-CLEAR = "\r\033[K"  # of a terminal: the line it is on
-LONGEST = 2000  # characters of a line on standard error
-BEGIN = re.compile(
-    r"seqopt: (error|warning|solver failed|time is over|out of memory|payload exceeded)(?=:)"
-)
-
-
 def harmless(text: str, kept: str = "") -> str:
-    r"""Return text in which what steers a terminal is replaced by its code.
-
-    ``kept``: controls that stay.
+    r"""Return text in which what steers a terminal, save what is kept, is replaced by its code.
 
     Examples
     --------
@@ -112,9 +92,9 @@ def harmless(text: str, kept: str = "") -> str:
 
 
 def show(text: str) -> None:
-    """Write a result to standard output.
+    """Write a result to standard output, its last end of line too.
 
-    ``text``: with the end of its last line. Raises `FileError` if standard output is closed.
+    Raises `FileError` if standard output is closed.
     """
     if sys.stdout is None:
         raise FileError("standard output is closed, and there is a result to write; open it")
@@ -122,11 +102,9 @@ def show(text: str) -> None:
 
 
 def show_text(text: str, headings: Sequence[str] = ()) -> None:
-    """Write lines for people to standard output.
+    """Write lines for people to standard output, some as headings; a terminal has them wrapped.
 
-    ``text``: a line or several, without the end of the last; a terminal has long ones wrapped;
-    ``headings``: lines of it that stand out on a terminal. Raises `FileError` if standard output is
-    closed.
+    Raises `FileError` if standard output is closed.
     """
     if is_terminal(sys.stdout):
         fits = columns()
@@ -139,20 +117,8 @@ def show_text(text: str, headings: Sequence[str] = ()) -> None:
             show(line + "\n")
 
 
-def complain(text: str) -> None:
-    """Print what went wrong on standard error, or nothing where that is closed or full.
-
-    ``text``: one line, which stays one unless a person looks at it: a terminal has it wrapped.
-    """
-    _write_line(text, "bad")
-
-
-def note(text: str) -> None:
-    """Print what is worth knowing on standard error; else as `complain`."""
-    _write_line(text, "doubt")
-
-
-def _write_line(text: str, style: str) -> None:
+def complain(text: str, style: str = "bad") -> None:
+    """Print a line on standard error, or nothing where that is closed or full."""
     if len(text) > LONGEST:
         text = f"{text[: LONGEST // 2]} … {text[-LONGEST // 4 :]}"
     text = harmless(text)
@@ -162,6 +128,11 @@ def _write_line(text: str, style: str) -> None:
             print(clear + _for_people(text, style), file=sys.stderr, flush=True)
     except OSError:
         silence(sys.stderr)
+
+
+def note(text: str) -> None:
+    """Print what is worth knowing on standard error; else as `complain`."""
+    complain(text, "doubt")
 
 
 def _for_people(text: str, style: str) -> str:
@@ -194,9 +165,9 @@ def silence(stream: TextIO) -> None:
 
 @contextmanager
 def quiet_numbers(*, quiet: bool = False) -> Iterator[None]:
-    """Print warnings about a scene as a line each; what is not finite is an error of its own.
+    """Print warnings about a scene as a line each, or leave them out if it is to be quiet.
 
-    ``quiet``: whether to leave out warnings about a scene too.
+    What is not finite is an error of its own.
     """
     import numpy as np  # noqa: PLC0415  # help needs none of it
 

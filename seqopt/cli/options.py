@@ -1,0 +1,155 @@
+"""Options of the command line: how they are declared, and those that several commands share."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from seqopt.contact.mortar import MORTARS
+from seqopt.engines.registry import ENGINES
+from seqopt.problem.criteria import Among, Ranked
+from seqopt.scene.scene import ORDERS
+from seqopt.scene.scene_file import builtin_scenes
+from seqopt.sequence.two_robots import METHODS
+from seqopt.study.published import CRITERIA, PUBLISHED
+from seqopt.workflow import Defaults
+
+Takes: TypeAlias = argparse._ActionsContainer  # a parser, or a group of its arguments
+PATHS = ("FILE", "DIR", "FOLDER", "PLAN_DIR")
+MANY, AGAIN = " ...", "; may be repeated"
+
+
+def declare(takes: Takes, about: Mapping[str, str], **more: Any) -> None:
+    """Add options, each as a usage line has it, with its help.
+
+    One without a value is a switch, the value of `PATHS` is a path, and what ends in `MANY` may be
+    repeated; the rest are text. ``more`` is of `argparse.ArgumentParser.add_argument`, for all.
+    """
+    for words, text in about.items():
+        name, _, value = words.partition(" ")
+        how: dict[str, Any] = {"metavar": value.removesuffix(MANY)}
+        if not value:
+            how = {"action": "store_true"}
+        elif value.endswith(MANY):
+            how |= {"action": "append", "default": []}
+        elif value in PATHS:
+            how["type"] = Path
+        takes.add_argument(name, help=text + AGAIN * value.endswith(MANY), **how, **more)
+
+
+LIMIT = {
+    "--limit LIMIT ...": "no step may exceed it, whether or not a grip is open in it: payload (of "
+    "every robot), or RESPONSE=VALUE in SI units, as F_largest=300"
+}
+RULE = {
+    "--rule NAME=VALUE ...": "what robots may do: least_grips=N (2; from the second brick on), "
+    "newest=either|placing|free (where the newest brick is held), regrips=N|any (between two "
+    "bricks), placers=NAME,NAME|any, payload=kept|ignored, ending=held|released|one-by-one (how "
+    "robots leave the finished structure), candidates=near:JOINTS|within:METERS|all (as "
+    "--candidates)"
+}
+STANDING = {
+    "--stands MORTAR": "every state must be proven to stand, robots within payload: dry, epoxy or "
+    "bond=STRENGTH (Pa)",
+    "--friction F": "with --stands: coefficient of friction",
+    "--tilt DEG": "with --stands: tilt that every state must survive",
+}
+STRICT = {
+    "--strict": "end with exit status 1 if a robot would exceed its payload in a step, or results "
+    "leave the linear range"
+}
+CSV_OUT = {"--out FILE": "CSV file to write (default: standard output)"}
+
+
+def scene_options(takes: Takes) -> None:
+    """Add what says what is built, and in which order."""
+    known = f"a built-in scene ({', '.join(builtin_scenes())}), a JSON file, or a few words such "
+    how = "as arch:span=2,rise=0.8 (seqopt scene --list shows all; default: %(default)s)"
+    declare(takes, {"scene SCENE": known + how}, nargs="?", default="arch25")
+    order = (
+        "in which order bricks are placed, if not in the scene's own: "
+        f"{', '.join(ORDERS)} (from all ground ends at once), or the names of all bricks, as "
+        "1..12,25..13"
+    )
+    declare(takes, {"--order ORDER": order})
+
+
+def engine_options(command: argparse.ArgumentParser) -> Takes:
+    """Return the group of what says what computes responses, added to a command."""
+    takes = command.add_argument_group("how responses are computed (advanced)")
+    takes.add_argument(
+        "--engine",
+        choices=tuple(ENGINES),
+        default=Defaults.engine,
+        help="what computes responses (default: %(default)s): compliance: exactly rigid bricks, "
+        "fast; planar: the same with three unknowns per brick, where all lies in a plane; frame: "
+        "stiff bars, a slow independent check; discrete: joints that open and slip; auto: the "
+        "cheapest of planar, compliance and discrete that is enough",
+    )
+    takes.add_argument(
+        "--mortar",
+        choices=tuple(MORTARS),
+        help="what holds the joints of the engines auto and discrete: the epoxy of Bruun et al. "
+        "(default), or dry, nothing",
+    )
+    return takes
+
+
+def form_options(command: argparse.ArgumentParser, *, strict: bool = False) -> None:
+    """Add what says in which form the answer is printed, and whether ``--strict`` is taken."""
+    takes = command.add_argument_group("what is printed")
+    declare(takes, STRICT if strict else {})
+    forms = {
+        "--quiet": "print errors and the paths of what is written, nothing else",
+        "--json": "print one JSON document, for scripts",
+    }
+    declare(takes.add_mutually_exclusive_group(), forms, default=argparse.SUPPRESS)
+
+
+def robots_option(takes: Takes, whose: str) -> None:
+    """Add the option that names robots; the help says what they take part in."""
+    said = (
+        f"robots that take part in {whose}, in the order in which they place their first bricks "
+        "(default: the first of the scene whose reach allows the build)"
+    )
+    declare(takes, {"--robots NAME,NAME[,NAME]": said}, default="")
+
+
+def criterion_options(command: argparse.ArgumentParser) -> None:
+    """Add what says what a step costs."""
+    takes = command.add_argument_group("what a step costs (advanced)")
+    about = {
+        "--criteria NAME": f"what a step costs: {', '.join(CRITERIA)}, or responses to rank with "
+        "weights, as T_max,M_sup=2,F_move (default: equations (2) and (3) of Bruun et al.)",
+        "--crown BRICKS": "for criteria of ranks: how many bricks are placed at the crown of an "
+        "arch, or none (default: derived from the scene)",
+    }
+    declare(takes, about)
+    takes.add_argument(
+        "--ranked",
+        choices=[ranked.value for ranked in Ranked],
+        help="for criteria of ranks: rank a step that two moves share over all pairs of their "
+        "candidates, or only over those that go with the earlier choice (default: pairs)",
+    )
+    takes.add_argument(
+        "--among",
+        choices=[among.value for among in Among],
+        help="for criteria of ranks: rank candidates of a move among all, or among those possible "
+        "after the choice before (default: all)",
+    )
+
+
+def steps_options(takes: Takes) -> None:
+    """Add what names a closed sequence of steps."""
+    steps = takes.add_mutually_exclusive_group(required=True)
+    steps.add_argument(
+        "--method",
+        choices=(*METHODS, PUBLISHED),
+        help=f"how it is built: by two robots, or {PUBLISHED}, the three-robot plan that Bruun et "
+        "al. print for arch25",
+    )
+    plan = "CSV file of the steps: step, type, bricks, and NAME_node for each robot"
+    declare(steps, {"--plan FILE": plan})
+    robots_option(takes, "--method")

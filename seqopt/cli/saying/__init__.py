@@ -1,1 +1,0 @@
-"""What commands answer: text, JSON, files, and how far they are."""
