@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cvxpy as cp
 import numpy as np
 
 from formulations.solvers import minimize_whole
-from seqopt.arrays import Floats
+from seqopt.arrays import Floats, Terse
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection, Watch
 from seqopt.plan.calling.priced_paths import stopped
@@ -33,8 +33,8 @@ class WholeProgram:
     feasible: bool = True
 
 
-@dataclass(frozen=True)
-class IntegerProgram:
+@dataclass(frozen=True, repr=False)
+class IntegerProgram(Terse):
     """The ``solve`` of a formulation that is an integer program.
 
     ``aim``: what it minimizes; ``write``: returns the program of a problem; raises
@@ -42,7 +42,7 @@ class IntegerProgram:
     """
 
     aim: Aim
-    write: Callable[[PlacementProblem], WholeProgram]
+    write: Callable[[PlacementProblem], WholeProgram] = field(repr=False)
 
     def __call__(self, problem: PlacementProblem, *, watch: Watch | None = None) -> Selection:
         """Return the choice that the program finds, with a bound.

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from operator import le
 from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Ints
+from seqopt.arrays import Ints, Terse
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, TimeUpError
 from seqopt.graph.budgets import Within, within_budgets
 from seqopt.graph.explore import Explorer, Visited
@@ -57,12 +57,12 @@ class StopError(Exception):
     """Time or memory that was given is used up; says which."""
 
 
-@dataclass(frozen=True)
-class _OnGraph:
+@dataclass(frozen=True, repr=False)
+class _OnGraph(Terse):
     """The ``solve`` of a formulation that chooses a path through the graph of states."""
 
     name: str
-    choose: Callable[[Graph, Watch], Choice]
+    choose: Callable[[Graph, Watch], Choice] = field(repr=False)
 
     def __call__(
         self,
