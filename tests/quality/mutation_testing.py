@@ -80,7 +80,8 @@ MODULES = {
     "seqopt.graph.layers.costs": ("graph/test_costs", "plan/test_values"),
     **PROOFS,
     "seqopt.problem.criteria": (
-        *("problem/test_criteria", "graph/test_layers", "problem/test_scales"),
+        *("problem/test_criteria", "problem/test_own_criterion", "problem/test_scales"),
+        "graph/test_layers",
     ),
     "seqopt.plan.calling.priced_paths": ("plan/test_flow", "plan/test_values", *CHOSEN),
     "formulations.layers.beam": CHOSEN,

@@ -140,7 +140,7 @@ except RuntimeError as error:
 @pytest.mark.slow
 def test_what_becomes_of_a_module_that_is_changed():
     """As it is, one that raises, is wrong, never ends, dies, cannot be imported, is never used."""
-    before = (ROOT / "seqopt" / "problem" / "ranks.py").read_text(encoding="utf-8")
+    before = (ROOT / "seqopt" / "problem" / "criteria.py").read_text(encoding="utf-8")
     words = [sys.executable, "-W", "error", "-c", OUTCOMES]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -148,4 +148,4 @@ def test_what_becomes_of_a_module_that_is_changed():
         *("survived", "killed", "killed", "timed out", "ended", "killed"),
         *("no test imports seqopt.report.draw", ""),
     ]
-    assert (ROOT / "seqopt" / "problem" / "ranks.py").read_text(encoding="utf-8") == before
+    assert (ROOT / "seqopt" / "problem" / "criteria.py").read_text(encoding="utf-8") == before
