@@ -24,6 +24,12 @@ def steers(sign: str) -> bool:
     return code < 0x20 or 0x7F <= code < 0xA0 or 0xD800 <= code < 0xE000 or code in _TURNS
 
 
+def settle(value: object, **content: object) -> None:
+    """Set fields of a frozen value; its dictionary, if asked for, would slow every later access."""
+    for name, part in content.items():
+        object.__setattr__(value, name, part)
+
+
 def printable(where: str, value: str) -> str:
     """Return a name that can be printed and written, without what steers a terminal."""
     if not isinstance(value, str) or any(map(steers, value)):

@@ -14,7 +14,17 @@ import numpy as np
 
 from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import positive, printable, rows, short, sizes, vector, whole, wholes
+from seqopt.scene.checks import (
+    positive,
+    printable,
+    rows,
+    settle,
+    short,
+    sizes,
+    vector,
+    whole,
+    wholes,
+)
 from seqopt.scene.shape import Polyhedron
 
 _UNIT = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
@@ -26,16 +36,12 @@ def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _unit_axes(where: str, **given: Vector) -> dict[str, Vector]:
-    """Return two unit vectors at right angles, by their names."""
-    found = {name: vector(f"{where}: {' and '.join(given)}", axis) for name, axis in given.items()}
-    a, b = found.values()
+def _unit_axes(where: str, first: Vector, second: Vector) -> tuple[Vector, Vector]:
+    """Return two unit vectors at right angles."""
+    a, b = vector(where, first), vector(where, second)
     if max(abs(_dot(a, a) - 1), abs(_dot(b, b) - 1), abs(_dot(a, b))) > _UNIT:
-        raise SceneError(
-            f"{where}: {' and '.join(given)} are {list(a)} and {list(b)}; "
-            "give perpendicular unit vectors"
-        )
-    return found
+        raise SceneError(f"{where} are {list(a)} and {list(b)}; give perpendicular unit vectors")
+    return a, b
 
 
 def _two_points(where: str, given: Iterable[Iterable[float]]) -> tuple[Vector, Vector]:
@@ -89,8 +95,10 @@ class Side:
     point: Vector
 
     def __post_init__(self) -> None:
-        vars(self).update(
-            toward=vector("reach: toward", self.toward), point=vector("reach: point", self.point)
+        settle(
+            self,
+            toward=vector("reach: toward", self.toward),
+            point=vector("reach: point", self.point),
         )
         if abs(_dot(self.toward, self.toward) - 1) > _UNIT:
             raise SceneError(f"reach: toward is {list(self.toward)}; give a unit vector")
@@ -128,7 +136,7 @@ class Sphere:
 
     def __post_init__(self) -> None:
         center = vector("reach: center", self.center)
-        vars(self).update(center=center, radius=positive("reach: radius", self.radius, "m"))
+        settle(self, center=center, radius=positive("reach: radius", self.radius, "m"))
 
     def covers(self, point: Vector) -> bool:
         """Return whether a point is within reach."""
@@ -193,12 +201,19 @@ class Brick(Terse):
     node_offsets: tuple[Vector, Vector] | None = None
 
     def __post_init__(self) -> None:
-        vars(self).update(name=whole("brick: its name", self.name))
+        settle(self, name=whole("brick: its name", self.name))
         where = f"brick {self.name}"
-        vars(self).update(
+        settle(
+            self,
             position=vector(f"{where}: position", self.position),
             dimensions=sizes(f"{where}: dimensions", self.dimensions),
-            **_unit_axes(where, length_axis=self.length_axis, width_axis=self.width_axis),
+        )
+        name = f"{where}: length_axis and width_axis"
+        length, width = _unit_axes(name, self.length_axis, self.width_axis)
+        settle(
+            self,
+            length_axis=length,
+            width_axis=width,
             density=positive(f"{where}: density", self.density, "kg/m³"),
             nodes=wholes(f"{where}: nodes", self.nodes),
             placing_node=whole(f"{where}: placing_node", self.placing_node),
@@ -212,7 +227,7 @@ class Brick(Terse):
             )
         if self.node_offsets is not None:
             offsets = _two_points(f"{where}: node_offsets", self.node_offsets)
-            vars(self).update(node_offsets=offsets)
+            settle(self, node_offsets=offsets)
         if self.shape is not None:
             self._check_shape(where, self.shape)
 
@@ -252,11 +267,12 @@ class Brick(Terse):
 
     def node_position(self, node: int) -> Vector:
         """Return where one of the brick's inner nodes lies. ``node``: one of ``nodes``."""
-        step = (-0.25 if node == self.nodes[0] else 0.25) * self.dimensions[0]
-        away = [step * a for a in self.length_axis]
         if self.node_offsets is not None:
-            away = [*self.node_offsets[self.nodes.index(node)]]
-        x, y, z = (p + d for p, d in zip(self.position, away, strict=True))
+            away = self.node_offsets[self.nodes.index(node)]
+            x, y, z = (p + d for p, d in zip(self.position, away, strict=True))
+            return x, y, z
+        step = (-0.25 if node == self.nodes[0] else 0.25) * self.dimensions[0]
+        x, y, z = (p + step * a for p, a in zip(self.position, self.length_axis, strict=True))
         return x, y, z
 
 
@@ -280,16 +296,24 @@ class Spring(Terse):
     face: tuple[tuple[float, float], ...] | None = None
 
     def _check(self, where: str) -> None:
-        vars(self).update(
-            position=vector(f"{where}: position", self.position),
-            **_unit_axes(where, along=self.along, across=self.across),
+        position = vector(f"{where}: position", self.position)
+        along, across = _unit_axes(f"{where}: along and across", self.along, self.across)
+        settle(
+            self,
+            position=position,
+            along=along,
+            across=across,
+            translational_stiffness=vector(
+                f"{where}: translational_stiffness", self.translational_stiffness, 0.0
+            ),
+            rotational_stiffness=vector(
+                f"{where}: rotational_stiffness", self.rotational_stiffness, 0.0
+            ),
         )
-        for name in ("translational_stiffness", "rotational_stiffness"):
-            vars(self)[name] = vector(f"{where}: {name}", getattr(self, name), at_least=0.0)
         if self.thickness is not None:
-            vars(self).update(thickness=positive(f"{where}: thickness", self.thickness, "m"))
+            settle(self, thickness=positive(f"{where}: thickness", self.thickness, "m"))
         if self.face is not None:
-            vars(self).update(face=_convex_polygon(f"{where}: face", self.face))
+            settle(self, face=_convex_polygon(f"{where}: face", self.face))
 
     @property
     def corners(self) -> tuple[Vector, ...] | None:
@@ -319,7 +343,7 @@ class Joint(Spring):
     bricks: tuple[int, int]
 
     def __post_init__(self) -> None:
-        vars(self).update(bricks=wholes("joint: bricks", self.bricks))
+        settle(self, bricks=wholes("joint: bricks", self.bricks))
         if len(set(self.bricks)) != 2 or len(self.bricks) != 2:
             raise SceneError(f"{self.label}: name two different bricks")
         self._check(self.label)
@@ -359,12 +383,12 @@ class Ground(Spring):
     closes_with: int | None = None
 
     def __post_init__(self) -> None:
-        vars(self).update(brick=whole("ground end: brick", self.brick))
+        settle(self, brick=whole("ground end: brick", self.brick))
         where = self.label
         if self.closes_with is not None:
-            vars(self).update(closes_with=whole(f"{where}: closes_with", self.closes_with))
+            settle(self, closes_with=whole(f"{where}: closes_with", self.closes_with))
         self._check(where)
-        vars(self).update(anchor=vector(f"{where}: anchor", self.anchor))
+        settle(self, anchor=vector(f"{where}: anchor", self.anchor))
         if self.anchor == self.position:
             raise SceneError(f"{where}: anchor and position are one point; give the stub a length")
 
@@ -411,7 +435,8 @@ class Robot:
 
     def __post_init__(self) -> None:
         printable("robot", self.name)
-        vars(self).update(
+        settle(
+            self,
             reach=_as_reach(f"robot {self.name}: reach", self.reach),
             payload=positive(f"robot {self.name}: payload", self.payload, "N"),
         )

@@ -29,15 +29,16 @@ def stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene:
     """Return a scene stiffer by factors (J + G,), one for every joint, then every ground end."""
 
     def stiffer(spring: _End, shift: float, turn: float) -> _End:
+        (x, y, z), (a, b, c) = spring.translational_stiffness, spring.rotational_stiffness
         return replace(
             spring,
-            translational_stiffness=as_vector(shift * np.array(spring.translational_stiffness)),
-            rotational_stiffness=as_vector(turn * np.array(spring.rotational_stiffness)),
+            translational_stiffness=(shift * x, shift * y, shift * z),
+            rotational_stiffness=(turn * a, turn * b, turn * c),
         )
 
-    count = len(scene.joints)
-    joints = map(stiffer, scene.joints, translational[:count], rotational[:count])
-    grounds = map(stiffer, scene.grounds, translational[count:], rotational[count:])
+    shift, turn, count = translational.tolist(), rotational.tolist(), len(scene.joints)
+    joints = map(stiffer, scene.joints, shift[:count], turn[:count])
+    grounds = map(stiffer, scene.grounds, shift[count:], turn[count:])
     return replace(scene, joints=tuple(joints), grounds=tuple(grounds))
 
 
@@ -55,8 +56,9 @@ def shifted(scene: Scene, size: float, rng: np.random.Generator) -> Scene:
 
     def moved(part: _Part) -> _Part:
         step = rng.uniform(-size, size, 3)
-        names = [name for name in ("position", "anchor") if hasattr(part, name)]
-        new: dict[str, Any] = {n: as_vector(np.array(getattr(part, n)) + step) for n in names}
+        new: dict[str, Any] = {"position": as_vector(np.array(part.position) + step)}
+        if isinstance(part, Ground):
+            new["anchor"] = as_vector(np.array(part.anchor) + step)
         return replace(part, **new)
 
     grounds = tuple(map(moved, scene.grounds))  # the first to draw

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import printable, short, vector, wholes
+from seqopt.scene.checks import printable, settle, short, vector, wholes
 from seqopt.scene.parts import Brick, Ground, Joint, Reach, Robot
 from seqopt.showing import Shown, display
 
@@ -57,8 +57,10 @@ def _check_springs(springs: Sequence[Joint | Ground], bricks: Mapping[int, Brick
     """Require joints and ground ends whose edges have a length. ``bricks``: by name."""
     farthest = _FAR * max(max(brick.dimensions) for brick in bricks.values())
     for spring in springs:
-        points = {"position": spring.position, "anchor": getattr(spring, "anchor", spring.position)}
-        for name, point in points.items():
+        points = [("position", spring.position)]
+        if isinstance(spring, Ground):
+            points.append(("anchor", spring.anchor))
+        for name, point in points:
             if max(map(abs, point)) > farthest:
                 raise SceneError(f"{spring.label}: {name} is {list(point)}; move it to its bricks")
         stiffness = (*spring.translational_stiffness, *spring.rotational_stiffness)
@@ -75,15 +77,17 @@ def _check_springs(springs: Sequence[Joint | Ground], bricks: Mapping[int, Brick
 
 def _check_edges(spring: Joint | Ground, brick: Brick) -> None:
     """Require a joint off the nodes of a brick, and a stub with a length."""
-    where, near = spring.label, _AT_NODE * brick.dimensions[0]
+    near = _AT_NODE * brick.dimensions[0]
     for node in brick.nodes:
         if math.dist(brick.node_position(node), spring.position) <= near:
             raise SceneError(
-                f"{where}: position is that of node {node} of brick {brick.name}; "
+                f"{spring.label}: position is that of node {node} of brick {brick.name}; "
                 "give a point between the faces that it joins"
             )
     if isinstance(spring, Ground) and math.dist(spring.anchor, spring.position) <= near:
-        raise SceneError(f"{where}: anchor and position are one point; give the stub a length")
+        raise SceneError(
+            f"{spring.label}: anchor and position are one point; give the stub a length"
+        )
 
 
 _KINDS = {"bricks": Brick, "joints": Joint, "grounds": Ground, "robots": Robot}
@@ -136,9 +140,10 @@ class Scene(Shown):
 
     def __post_init__(self) -> None:
         for name, kind in _KINDS.items():
-            vars(self)[name] = _parts(f"scene: {name}", getattr(self, name), kind)
+            settle(self, **{name: _parts(f"scene: {name}", getattr(self, name), kind)})
         where = f"scene {printable('scene', self.name)}"
-        vars(self).update(
+        settle(
+            self,
             build_order=wholes(f"{where}: build_order", self.build_order),
             blocked_nodes=wholes(f"{where}: blocked_nodes", self.blocked_nodes),
             gravity=vector(f"{where}: gravity", self.gravity),

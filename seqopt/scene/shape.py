@@ -11,7 +11,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frozen
 from seqopt.errors import SceneError
-from seqopt.scene.checks import rows, short, vector, wholes
+from seqopt.scene.checks import rows, settle, short, vector, wholes
 
 FLAT = 1e-4  # by how much a face may leave its plane, over the size of the block
 _EVEN = 1e-12  # share of the second moments by which axes of equal length are told apart
@@ -43,7 +43,7 @@ class Polyhedron:
         faces = rows("shape: faces", self.faces, "a list of lists")
         points = tuple(vector("shape: a vertex", row) for row in vertices)
         faces = tuple(wholes("shape: a face", row) for row in faces)
-        vars(self).update(vertices=points, faces=faces)
+        settle(self, vertices=points, faces=faces)
         _require_corners(len(points), faces)
         _require_closed(faces)
         size = float(np.ptp(self.points, axis=0).max(initial=0.0))

@@ -25,9 +25,8 @@ from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.scene.imports.content import Given
 from seqopt.scene.imports.formats import import_scene
-from seqopt.scene.library.by_words import ABOUT
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import load_scene
+from seqopt.scene.scene_file import ABOUT, load_scene
 from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import METHODS
 from tests.dense_bodies import dense_fields

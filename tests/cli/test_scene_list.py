@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from seqopt.cli.main import main
-from seqopt.scene.library.by_words import KINDS
-from seqopt.scene.scene_file import about, builtin_scenes, load_scene
+from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, load_scene
 
 
 def test_all_built_in_scenes_are_listed_a_line_each(capsys):
@@ -21,7 +20,7 @@ def test_all_built_in_scenes_are_listed_a_line_each(capsys):
     for line, name in zip(lines, builtin_scenes(), strict=True):
         scene = load_scene(name)
         assert f"{len(scene.bricks)} bricks, {len(scene.joints)} joints" in line
-        assert line.endswith(about(name))
+        assert line.endswith(ABOUT[name])
 
 
 def test_a_list_and_an_export_are_two_things(capsys, tmp_path):

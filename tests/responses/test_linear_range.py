@@ -17,8 +17,7 @@ from seqopt.network.build import build_network
 from seqopt.report.notebook import card
 from seqopt.responses.staged import staged_fields
 from seqopt.responses.table import _STRAIN, LinearRange, analyze, response_table
-from seqopt.scene.library.by_words import scene_by_words
-from seqopt.scene.scene_file import save_scene
+from seqopt.scene.scene_file import save_scene, scene_by_words
 from seqopt.sequence.two_robots import cantilever, sequential
 from seqopt.study.published import published_plan
 from seqopt.workflow import optimize

@@ -19,9 +19,8 @@ from seqopt.cli.arguments import COMMANDS, parser
 from seqopt.cli.values import RULES
 from seqopt.plan.calling.formulation import formulation_names
 from seqopt.responses.choices import CHOICE_RESPONSES
-from seqopt.scene.library.by_words import KINDS
 from seqopt.scene.scene import ORDERS
-from seqopt.scene.scene_file import builtin_scenes
+from seqopt.scene.scene_file import KINDS, builtin_scenes
 from seqopt.sequence.free_rules import FREE
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.sequence.two_robots import METHODS

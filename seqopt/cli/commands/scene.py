@@ -14,9 +14,8 @@ from seqopt.cli.outputs import keep_apart
 from seqopt.files import write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.scene.library.by_words import KINDS
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import about, builtin_scenes, dump_scene, load_scene
+from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, dump_scene, load_scene
 from seqopt.work.progress import told
 
 DESCRIPTION = (
@@ -83,10 +82,10 @@ def _list(options: argparse.Namespace) -> Answer:
         name: load_scene(name)
         for name in told("reading built-in scenes", builtin_scenes(), options.tell)
     }
-    lines = [f"{name}: {_size(scene)}; {about(name)}" for name, scene in found.items()]
+    lines = [f"{name}: {_size(scene)}; {ABOUT[name]}" for name, scene in found.items()]
     lines += [kind.about for kind in KINDS.values()]
     facts = {
-        "scenes": [{**scene_facts(scene), "about": about(name)} for name, scene in found.items()],
+        "scenes": [{**scene_facts(scene), "about": ABOUT[name]} for name, scene in found.items()],
         "kinds": {name: kind.about for name, kind in KINDS.items()},
     }
     return Answer(facts=facts, text="\n".join(lines))

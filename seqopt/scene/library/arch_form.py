@@ -14,7 +14,7 @@ from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
 from seqopt.scene.arch import LETTERS, ArchShape, arch_scene
 from seqopt.scene.boxes import require_apart
-from seqopt.scene.checks import positive, short, sizes, whole_between
+from seqopt.scene.checks import positive, settle, short, sizes, whole_between
 from seqopt.scene.library.common import MASONRY, JointLaw, few_enough, joint_width
 from seqopt.scene.parts import THICKEST, Robot
 from seqopt.scene.scene import Scene
@@ -130,19 +130,19 @@ class ArchForm:
 
     def __post_init__(self) -> None:
         for name, unit in (("span", "m"), ("rise", "m"), ("density", "kg/m³")):
-            vars(self)[name] = positive(f"arch: {name}", getattr(self, name), unit)
+            settle(self, **{name: positive(f"arch: {name}", getattr(self, name), unit)})
         if self.curve not in _CURVES:
             raise SceneError(
                 f"arch: curve is {short(self.curve)}; give one of {', '.join(_CURVES)}"
             )
         if self.bricks is not None:
-            vars(self).update(bricks=whole_between("arch: bricks", self.bricks, 2))
+            settle(self, bricks=whole_between("arch: bricks", self.bricks, 2))
         if not isinstance(self.pattern, str) or not self.pattern or {*self.pattern} - {*LETTERS}:
             raise SceneError(
                 f"arch: pattern is {short(self.pattern)}; give letters of {', '.join(LETTERS)}"
             )
         dimensions = sizes("arch: dimensions", self.dimensions)
-        vars(self).update(dimensions=dimensions, gap=joint_width("arch: gap", self.gap))
+        settle(self, dimensions=dimensions, gap=joint_width("arch: gap", self.gap))
 
     @property
     def line(self) -> _Line:

@@ -9,7 +9,7 @@ from heapq import heapify, heappop, heappush
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import MOST_BRICKS, positive, vector
+from seqopt.scene.checks import MOST_BRICKS, positive, settle, vector
 from seqopt.scene.parts import Brick, Robot
 
 
@@ -35,7 +35,7 @@ class JointLaw:
     def __post_init__(self) -> None:
         for name in ("translational", "rotational"):
             if (values := getattr(self, name)) is not None:
-                vars(self)[name] = vector(f"joint law: {name}", values, at_least=0.0)
+                settle(self, **{name: vector(f"joint law: {name}", values, at_least=0.0)})
 
     def stiffness(self, area: float, moments: tuple[float, float]) -> tuple[Vector, Vector]:
         """Return the stiffness of a joint over a face, N/m and N m/rad.

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.boxes import as_vector, require_apart
-from seqopt.scene.checks import positive, short, whole_between
+from seqopt.scene.checks import positive, settle, short, whole_between
 from seqopt.scene.library.common import (
     MASONRY,
     REPEAT,
@@ -60,14 +61,15 @@ class DomeShape:
     law: JointLaw = MASONRY
 
     def __post_init__(self) -> None:
-        vars(self).update(
+        settle(
+            self,
             courses=whole_between("dome: courses", self.courses, 1),
             around=whole_between("dome: around", self.around, 3),
         )
         few_enough("dome", self.courses * self.around)
         for name in ("span", "rise", "opening", "thickness"):
-            vars(self)[name] = positive(f"dome: {name}", getattr(self, name), "m")
-        vars(self).update(gap=joint_width("dome: gap", self.gap))
+            settle(self, **{name: positive(f"dome: {name}", getattr(self, name), "m")})
+        settle(self, gap=joint_width("dome: gap", self.gap))
         if self.bond not in _BONDS:
             raise SceneError(f"dome: bond is {short(self.bond)}; give one of {', '.join(_BONDS)}")
         if self.bond == "herringbone" and 2 * self.around % REPEAT:
@@ -99,8 +101,7 @@ _NO_SHARE = 1e-6  # of an angle: places that share less only meet at a corner
 _TURN = 2 * math.pi
 
 
-@dataclass(frozen=True)
-class _Place:
+class _Place(NamedTuple):
     """The place of a brick: from one row to another, and how far around on either side."""
 
     low: int  # rows
@@ -185,7 +186,7 @@ def _herringbone(shape: DomeShape) -> list[_Place]:
 
 def _beside(shape: DomeShape, places: Sequence[_Place]) -> tuple[list[tuple[int, int]], Floats]:
     """Return which places share an edge, and directions across these, (P, 3)."""
-    low, high, azimuth, half = np.array([astuple(place) for place in places]).T
+    low, high, azimuth, half = np.array(places).T
     away = np.abs((azimuth[:, None] - azimuth + 0.5 * _TURN) % _TURN - 0.5 * _TURN)
     shared = half[:, None] + half - away
     above = (high[:, None] == low) & (shared > _NO_SHARE * half)

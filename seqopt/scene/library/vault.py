@@ -18,7 +18,7 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.boxes import as_vector, require_apart
-from seqopt.scene.checks import finite, positive, whole_between
+from seqopt.scene.checks import finite, positive, settle, whole_between
 from seqopt.scene.library.common import (
     JointLaw,
     Tile,
@@ -143,10 +143,10 @@ class VaultShape:
     drift: float = 1.3
 
     def __post_init__(self) -> None:
-        vars(self).update(bricks=whole_between("vault: bricks", self.bricks, 1))
+        settle(self, bricks=whole_between("vault: bricks", self.bricks, 1))
         positive("vault: spacing", self.spacing, "m")
         for name in ("plan_angle", "skew", "widening", "drift"):
-            vars(self)[name] = finite(f"vault: {name}", getattr(self, name))
+            settle(self, **{name: finite(f"vault: {name}", getattr(self, name))})
         if abs(self.plan_angle) > 0.25 * math.pi:
             raise SceneError(
                 f"vault: plan_angle is {self.plan_angle:g} rad; give at most 0.785, half a right "

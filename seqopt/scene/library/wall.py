@@ -9,7 +9,7 @@ import numpy as np
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import finite, sizes, whole_between
+from seqopt.scene.checks import finite, settle, sizes, whole_between
 from seqopt.scene.library.common import MASONRY, JointLaw, few_enough, joint_width, mobile_robots
 from seqopt.scene.library.joints import ground_under, joints_between
 from seqopt.scene.parts import Brick, Robot
@@ -43,16 +43,16 @@ class WallShape:
 
     def __post_init__(self) -> None:
         for name in ("columns", "courses"):
-            vars(self)[name] = whole_between(f"wall: {name}", getattr(self, name), 1)
+            settle(self, **{name: whole_between(f"wall: {name}", getattr(self, name), 1)})
         few_enough("wall", self.columns * self.courses)
         dimensions = sizes("wall: dimensions", self.dimensions)
-        vars(self).update(dimensions=dimensions, gap=joint_width("wall: gap", self.gap))
+        settle(self, dimensions=dimensions, gap=joint_width("wall: gap", self.gap))
         if self.gap >= 0.5 * self.dimensions[0]:
             raise SceneError(
                 f"wall: gap is {self.gap:g} m, half a brick or more; give less than "
                 f"{0.5 * self.dimensions[0]:g}"
             )
-        vars(self).update(corbel=finite("wall: corbel", self.corbel))
+        settle(self, corbel=finite("wall: corbel", self.corbel))
         if abs(self.corbel) >= self.dimensions[1]:
             raise SceneError(
                 f"wall: corbel is {self.corbel:g} m, a brick's width or more, and courses would "

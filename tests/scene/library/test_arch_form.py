@@ -22,8 +22,7 @@ from seqopt.scene.library import (
     dome,
     wall,
 )
-from seqopt.scene.library.by_words import KINDS, scene_by_words
-from seqopt.scene.scene_file import dump_scene, load_scene, parse_scene
+from seqopt.scene.scene_file import KINDS, dump_scene, load_scene, parse_scene, scene_by_words
 
 
 def off_circle(x, z, span, rise):

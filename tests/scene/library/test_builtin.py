@@ -16,7 +16,7 @@ from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.boxes import boxes, separations
 from seqopt.scene.scene_file import (
-    about,
+    ABOUT,
     builtin_scenes,
     dump_scene,
     find_warnings,
@@ -54,8 +54,8 @@ def test_every_built_in_scene_is_named_drawn_from_text_and_not_odd(name):
     assert scene.name == name
     assert scene.provenance
     assert find_warnings(scene) == ()
-    assert about(name)
-    assert "\n" not in about(name)
+    assert ABOUT[name]
+    assert "\n" not in ABOUT[name]
     assert parse_scene(dump_scene(scene)) == scene
     assert load_scene(name) == scene
 

@@ -30,9 +30,8 @@ from seqopt.scene.library import (
     herringbone_vault,
     wall,
 )
-from seqopt.scene.library.by_words import scene_by_words
 from seqopt.scene.library.joints import joints_between
-from seqopt.scene.scene_file import find_warnings, load_scene
+from seqopt.scene.scene_file import find_warnings, load_scene, scene_by_words
 from seqopt.sequence.schedule import islands
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import cantilever, sequential
