@@ -21,114 +21,40 @@ formulation solves the problem, and the plan is the checked answer.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from seqopt.contact.mortar import DRY, EPOXY
-    from seqopt.engines.interface import Engine
-    from seqopt.engines.registry import make_engine
-    from seqopt.errors import SeqoptError
-    from seqopt.network.build import build_network
-    from seqopt.network.network import Network
-    from seqopt.plan.build import GivenSequence
-    from seqopt.plan.calling.formulation import Formulation, formulations
-    from seqopt.plan.judge.certificate import Certificate
-    from seqopt.plan.plan import Plan
-    from seqopt.plan.solving import pose, solve
-    from seqopt.problem.criteria import StepCost
-    from seqopt.problem.problem import Problem
-    from seqopt.problem.requirements import Limit
-    from seqopt.responses.table import analyze
-    from seqopt.scene.arch import ArchShape, arch_scene
-    from seqopt.scene.parts import Robot, Sphere
-    from seqopt.scene.scenarios import scenarios
-    from seqopt.scene.scene import Scene
-    from seqopt.scene.scene_file import load_scene, save_scene
-    from seqopt.sequence.free_rules import FreeRules
-    from seqopt.sequence.schedule import Schedule
-    from seqopt.sequence.schedule_file import read_plan, read_schedule
-    from seqopt.sequence.steps import Step
-    from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
-    from seqopt.sequence.two_robots import cantilever, sequential
-    from seqopt.stability.assessment import Stability, assess_steps
-    from seqopt.study.published import CRITERIA
-    from seqopt.workflow import optimize
 
 _HOMES = {
-    "contact.mortar": ("DRY", "EPOXY"),
+    "scene.scene": ("Scene",),
+    "scene.parts": ("Robot", "Sphere"),
+    "scene.scene_file": ("load_scene", "save_scene"),
+    "scene.arch": ("ArchShape", "arch_scene"),
+    "network.network": ("Network",),
+    "network.build": ("build_network",),
+    "sequence.steps": ("Step",),
+    "sequence.schedule": ("Schedule",),
+    "sequence.two_robots": ("sequential", "cantilever"),
+    "sequence.three_robots": ("three_robot_loop", "modified_sequential"),
+    "sequence.schedule_file": ("read_plan", "read_schedule"),
     "engines.interface": ("Engine",),
     "engines.registry": ("make_engine",),
-    "errors": ("SeqoptError",),
-    "network.build": ("build_network",),
-    "network.network": ("Network",),
+    "responses.table": ("analyze",),
+    "study.published": ("CRITERIA",),
+    "problem.criteria": ("StepCost",),
+    "problem.requirements": ("Limit",),
+    "problem.problem": ("Problem",),
     "plan.calling.formulation": ("Formulation", "formulations"),
+    "sequence.free_rules": ("FreeRules",),
+    "plan.solving": ("pose", "solve"),
+    "workflow": ("optimize",),
+    "scene.scenarios": ("scenarios",),
+    "plan.plan": ("Plan",),
     "plan.build": ("GivenSequence",),
     "plan.judge.certificate": ("Certificate",),
-    "plan.plan": ("Plan",),
-    "plan.solving": ("pose", "solve"),
-    "problem.criteria": ("StepCost",),
-    "problem.problem": ("Problem",),
-    "problem.requirements": ("Limit",),
-    "responses.table": ("analyze",),
-    "scene.arch": ("ArchShape", "arch_scene"),
-    "scene.parts": ("Robot", "Sphere"),
-    "scene.scenarios": ("scenarios",),
-    "scene.scene": ("Scene",),
-    "scene.scene_file": ("load_scene", "save_scene"),
-    "sequence.free_rules": ("FreeRules",),
-    "sequence.schedule": ("Schedule",),
-    "sequence.schedule_file": ("read_plan", "read_schedule"),
-    "sequence.steps": ("Step",),
-    "sequence.three_robots": ("modified_sequential", "three_robot_loop"),
-    "sequence.two_robots": ("cantilever", "sequential"),
-    "stability.assessment": ("Stability", "assess_steps"),
-    "study.published": ("CRITERIA",),
-    "workflow": ("optimize",),
-}
+    "contact.mortar": ("DRY", "EPOXY"),
+    "stability.assessment": ("assess_steps", "Stability"),
+    "errors": ("SeqoptError",),
+}  # in the order in which they are met; type checkers read them in __init__.pyi
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
-
-__all__ = [  # noqa: RUF022  # in the order in which they are met
-    "Scene",
-    "Robot",
-    "Sphere",
-    "load_scene",
-    "save_scene",
-    "ArchShape",
-    "arch_scene",
-    "Network",
-    "build_network",
-    "Step",
-    "Schedule",
-    "sequential",
-    "cantilever",
-    "three_robot_loop",
-    "modified_sequential",
-    "read_plan",
-    "read_schedule",
-    "Engine",
-    "make_engine",
-    "analyze",
-    "CRITERIA",
-    "StepCost",
-    "Limit",
-    "Problem",
-    "pose",
-    "Formulation",
-    "formulations",
-    "FreeRules",
-    "solve",
-    "optimize",
-    "scenarios",
-    "Plan",
-    "GivenSequence",
-    "Certificate",
-    "DRY",
-    "EPOXY",
-    "assess_steps",
-    "Stability",
-    "SeqoptError",
-    "__version__",
-]
+__all__ = [*_HOME_OF, "__version__"]  # noqa: PLE0604  # they are strings
 
 
 def __getattr__(name: str) -> object:

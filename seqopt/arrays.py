@@ -23,9 +23,7 @@ _COMPRESSED = (sparse.csr_array, sparse.csc_array)
 
 
 def skew(vectors: Floats) -> Floats:
-    """Return the matrices that take the cross product with vectors from the left.
-
-    ``vectors`` (..., 3). Result (..., 3, 3).
+    """Return the matrices (..., 3, 3) that take the cross product with vectors (..., 3).
 
     Examples
     --------
@@ -93,10 +91,7 @@ class FrozenValue(Terse):
 
 
 def frozen(content: _Content) -> _Content:
-    """Return read-only arrays and sparse arrays, also within tuples and mappings.
-
-    ``content``: other contents are returned as they are. Result: the same object.
-    """
+    """Return the same content, arrays and sparse ones also within tuples and mappings read-only."""
     if isinstance(content, np.ndarray):
         content.flags.writeable = False
     elif isinstance(content, _COMPRESSED):

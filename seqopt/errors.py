@@ -13,9 +13,7 @@ _Places = tuple[tuple[str, int], ...]
 
 
 def plugins(group: str) -> dict[str, EntryPoint]:
-    """Return the entry points of a group by name.
-
-    Result: also of packages that were installed since Python started.
+    """Return the entry points of a group by name, also of packages installed since Python started.
 
     Examples
     --------
@@ -82,11 +80,9 @@ class InfeasibleError(ProblemError):
 
 
 class MechanismError(SeqoptError, ArithmeticError):
-    """Bricks, joints and grips leave a motion that nothing resists.
+    """Bricks, joints and grips leave a motion that nothing resists; the text names a brick.
 
-    ``message``: one line that names the brick which moves most. ``mode`` (int, tuple of 6 float):
-    the unresisted motion: per brick its name and (translation, rotation), the largest component of
-    all scaled to 1.
+    Its ``mode`` has the name and (translation, rotation) of every brick, the largest component 1.
     """
 
     def __init__(self, message: str, mode: tuple[tuple[int, tuple[float, ...]], ...] = ()) -> None:
@@ -119,10 +115,7 @@ class SceneWarning(UserWarning):
 
 
 def did_you_mean(given: object, known: Iterable[str]) -> str:
-    """Return a hint at the word that was probably meant.
-
-    ``given``: a word that does not exist; there is no hint at anything else. ``known``: the words
-    that exist. Result: to be put after the word; empty if none is near, or two are equally near.
+    """Return a hint at the word that was probably meant, or nothing where none or two are near.
 
     Examples
     --------

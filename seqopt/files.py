@@ -18,10 +18,7 @@ _MARK = "'"
 
 
 def harmless(text: str) -> str:
-    """Return a cell that spreadsheets show as it is.
-
-    ``text``: that begins with a name, of a robot for example. Result: after an apostrophe where a
-    formula could begin; `plain` takes it away again.
+    """Return a cell that spreadsheets show as it is, after an apostrophe if need be.
 
     Examples
     --------
@@ -53,8 +50,7 @@ HIDDEN = ".seqopt-"  # start of the names of what is not complete yet
 def read_text(path: Path) -> str:
     """Return the text of a UTF-8 file.
 
-    Raises `FileError` if the file cannot be read, is a pipe or device, is too large, or
-    is not UTF-8.
+    Raises `FileError` if it cannot be read, is a pipe or device, is too large, or is not UTF-8.
     """
     try:
         return read_bytes(path).decode("utf-8-sig")  # spreadsheets start text with a mark
@@ -80,49 +76,35 @@ def read_bytes(path: Path) -> bytes:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a UTF-8 file whole: it appears under its name only once complete.
-
-    Raises `FileError` if the file cannot be written.
-    """
+    """Write a UTF-8 file; else as `write_bytes`."""
     _write(path, text)
 
 
 def csv_text(table: pd.DataFrame) -> str:
-    """Return a table as CSV, without its index, numbers with six digits.
-
-    Result: a line per row, after one with the names of the columns; no text begins as a formula.
-    """
+    """Return a table as CSV, without its index, six digits a number; no text begins a formula."""
     safe = _harmless_table(table)
     return str(safe.to_csv(index=False, float_format="%.6g", lineterminator="\n"))
 
 
 def write_csv(path: Path, table: pd.DataFrame) -> None:
-    """Write a table as a CSV file, whole.
-
-    ``table``: written as `csv_text` does, and as `write_text` does.
-    """
+    """Write a table as a CSV file, as `csv_text` and `write_bytes` do."""
     write_text(path, csv_text(table))
 
 
 def write_bytes(path: Path, content: bytes) -> None:
     """Write a file whole: it appears under its name only once complete.
 
-    A link is followed to its target; a file that is there keeps its mode.
-
-    Raises `FileError` if the file cannot be written, or what is there is no regular file: a device,
-    say.
+    A link is followed to its target; a file that is there keeps its mode. Raises `FileError` if it
+    cannot be written, or what is there is no regular file: a device, say.
     """
     _write(path, content)
 
 
 def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
-    """Write files into a folder, all of them or none.
+    """Write files by name into a folder, which is made, all of them or none.
 
     A new folder appears under its name with all of its files at once. In one that is there all
-    files are complete beside their places before the first is put in its place.
-
-    ``folder``: those above it are made too; ``files``: content by name. Raises `FileError` if a
-    file or the folder cannot be written.
+    files are complete beside their places before the first is put in its place. Raises `FileError`.
     """
     target = Path(os.path.realpath(folder))
     try:
@@ -151,11 +133,7 @@ def require_apart(outputs: Sequence[Path], inputs: Sequence[Path] = ()) -> None:
 
 
 def require_folder(path: Path) -> None:
-    """Raise an error, before anything is computed, if a folder cannot be written.
-
-    ``path``: it need not be there. Raises `FileError` if it, or what is above it, is no folder or
-    cannot be written.
-    """
+    """Raise `FileError`, before anything is computed, if a folder cannot be made or written."""
     there = Path(os.path.realpath(path))
     while not os.path.lexists(there) and there != there.parent:
         there = there.parent
@@ -165,10 +143,7 @@ def require_folder(path: Path) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder, and those above it, unless it is there.
-
-    Raises `FileError` if the folder cannot be made.
-    """
+    """Make a folder, and those above it, unless it is there. Raises `FileError`."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -47,9 +47,8 @@ def undisturbed() -> Iterator[None]:
 def answered(told: Callable[[], object]) -> Iterator[None]:
     """Answer the first of the signals that end a program by a call; a second one ends as before.
 
-    Signals that somebody else answers in a way of his own are left to him.
-
-    ``told``: called between two instructions of the main thread: it only takes note.
+    Signals that somebody else answers are left to him. The call comes between two instructions of
+    the main thread, and only takes note.
     """
     mine = threading.current_thread() is threading.main_thread()
     numbers = [n for n in _ENDS if mine and signal.getsignal(n) is signal.default_int_handler]
@@ -72,12 +71,9 @@ def answered(told: Callable[[], object]) -> Iterator[None]:
 
 @contextmanager
 def ending(seconds: float) -> Iterator[None]:
-    """Raise `TimeoutError` where a block of code takes longer than it may.
+    """Raise `TimeoutError` between two instructions of a block that takes longer than it may.
 
-    In the main thread alone, which is interrupted; elsewhere a block takes as long as it takes.
-
-    ``seconds``: infinite for no end. Raises `TimeoutError`: between two instructions of the block;
-    before the first one where no time is left.
+    In the main thread alone; elsewhere a block takes as long as it takes.
     """
     if seconds <= 0:
         raise TimeoutError

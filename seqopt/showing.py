@@ -1,8 +1,7 @@
 """How values find the functions that draw them, although they may not import these.
 
-A scene or a plan has methods that draw it. Pictures are made in `seqopt.report`, which imports the
-modules of scenes and plans, so these cannot import it in turn. They call `display` instead, which
-loads the function when a picture is needed. `DISPLAYS` lists every function that is found this way.
+Pictures are made in `seqopt.report`, which imports scenes and plans, so these cannot import it in
+turn: they call `display`, which loads the function when a picture is needed.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ DISPLAYS = {
     "network_picture": "seqopt.report.pictures",
     "steps_picture": "seqopt.report.pictures",
     "tilt_picture": "seqopt.report.pictures",
-    "gantt_picture": "seqopt.report.gantt",
+    "gantt_picture": "seqopt.report.pictures",
     "Film": "seqopt.report.pictures",
     "build_page": "seqopt.report.pages",
 }
@@ -33,10 +32,9 @@ DISPLAYS = {
 
 
 def display(name: str) -> Callable[..., Any]:
-    """Return a function that draws, loaded when it is first asked for.
+    """Return a function of `DISPLAYS`, loaded when it is first asked for.
 
-    ``name``: a key of `DISPLAYS`. Raises `ExtraError` if it needs matplotlib and that is not
-    installed.
+    Raises `ExtraError` if it needs matplotlib and that is not installed.
     """
     try:
         found: Callable[..., Any] = getattr(import_module(DISPLAYS[name]), name)
@@ -83,10 +81,7 @@ class Page:
         return Path(path)
 
     def open(self, path: str | Path | None = None) -> Path:
-        """Write the page to a file and show it in a browser.
-
-        ``path``: by default a new file in the folder for temporary ones.
-        """
+        """Write the page to a file, or a temporary one, and show it in a browser."""
         written = self.save(path or Path(tempfile.mkdtemp(prefix="seqopt-")) / "report.html")
         webbrowser.open(written.resolve().as_uri())
         return written

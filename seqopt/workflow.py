@@ -42,10 +42,7 @@ SHARING = ("workers", "executor", "cache")
 
 @dataclass(frozen=True)
 class Defaults:
-    """What is taken where nothing is asked for, in Python and on the command line alike.
-
-    ``criterion``: what a step costs; ``aim``: what is to be small, where states are chosen.
-    """
+    """What is taken where nothing is asked for, in Python and on the command line alike."""
 
     criterion: Criterion
     aim: str = ""
@@ -119,7 +116,8 @@ def _asked(
     found = load_scene(scene) if isinstance(scene, str | Path) else scene
     order = options.pop("order", None)
     sought = isinstance(order, str) and order == SEARCH
-    made, free = in_order(found, None if sought else order), _is_free(schedule)
+    made = in_order(found, None if sought else order)
+    free = isinstance(schedule, str) and schedule == FREE
     if free and isinstance(options.get("robots"), int):
         made = with_robots(made, options.pop("robots"))
     if not free:
@@ -146,19 +144,11 @@ def posed(
     formulation: str | None = None,
     **asked: Any,
 ) -> Problem:
-    """Return the problem of a build, by what people say of it.
-
-    ``criterion``: as of `optimize`; ``aim``: what is to be as small as possible; ``formulation``:
-    what is to solve it, if it is said; ``**asked``: of `seqopt.pose`.
-    """
+    """Return the problem of a build, by what people say of it: as of `optimize`, `seqopt.pose`."""
     states = _of_states(moves, {**asked, "aim": aim}, formulation)
     usual = DEFAULTS[FREE if states else "any other"]
     chosen = find_criterion(criterion or usual.criterion)
     return pose(engine, moves, chosen, aim or usual.aim or (), **asked)
-
-
-def _is_free(schedule: object) -> bool:
-    return isinstance(schedule, str) and schedule == FREE
 
 
 def _of_states(moves: Schedule | FreeRules, asked: dict[str, Any], formulation: str | None) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import version
@@ -31,16 +31,14 @@ UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
 MISSING = "the following arguments are required"
 
 
-def nearest(message: str, options: Iterable[str]) -> str:
-    """Return a hint at the word that was probably meant, or nothing.
-
-    ``message``: of the parser; ``options``: that its commands have.
+def _nearest(message: str, options: Iterable[str]) -> str:
+    """Return a hint at the word that a message of the parser is about, or nothing.
 
     Examples
     --------
-    >>> nearest("unrecognized arguments: --formulaton=beam", ["--formulation", "--out"])
+    >>> _nearest("unrecognized arguments: --formulaton=beam", ["--formulation", "--out"])
     ' (did you mean --formulation?)'
-    >>> nearest("invalid choice: 'optimise' (choose from 'optimize', 'scene')", [])
+    >>> _nearest("invalid choice: 'optimise' (choose from 'optimize', 'scene')", [])
     ' (did you mean optimize?)'
     """
     if found := WRONG_CHOICE.search(message):
@@ -51,19 +49,16 @@ def nearest(message: str, options: Iterable[str]) -> str:
     known = {option.lstrip("-"): option for option in options}
     if found[1] in known.values():
         return " (options stand after the command)"
-    hint = did_you_mean(found[1].lstrip("-"), known)
-    return hint.replace("mean ", "mean --") if hint else ""
+    return did_you_mean(found[1].lstrip("-"), known).replace("mean ", "mean --")
 
 
-def first_wrong(message: str, given: Sequence[str], options: Sequence[str]) -> str:
+def _first_wrong(message: str, given: Sequence[str], options: Sequence[str]) -> str:
     """Return a message about a missing argument, or one about a mistyped option that explains it.
-
-    ``message``: of the parser; ``given``: the words that it was given; ``options``: that it has.
 
     Examples
     --------
     >>> given = ["arch25", "--ot", "best"]
-    >>> first_wrong("the following arguments are required: --out", given, ["--out"])
+    >>> _first_wrong("the following arguments are required: --out", given, ["--out"])
     'unrecognized arguments: --ot'
     """
     if not message.startswith(MISSING) or message.endswith("COMMAND"):
@@ -80,12 +75,11 @@ def _layout(prog: str) -> argparse.HelpFormatter:
 
 
 @dataclass(frozen=True)
-class Command:
-    """A command, whose module is loaded when it is asked for.
+class _Command:
+    """A command in a few words, and its module of `seqopt.cli`, loaded when it is asked for.
 
-    ``about``: what it does, in a few words; ``module``: of `seqopt.cli`: it has ``add_arguments``,
-    ``run``, ``DESCRIPTION``, ``EXAMPLES``, and ``USAGE`` where it has more options than a reader
-    takes in at once.
+    That has ``add_arguments``, ``run``, ``DESCRIPTION``, ``EXAMPLES``, and ``USAGE`` where it has
+    more options than a reader takes in at once.
     """
 
     about: str
@@ -97,18 +91,18 @@ class Command:
 
 
 COMMANDS = {
-    "compare": Command("show all ways to build a scene side by side", "commands.compare"),
-    "optimize": Command("choose where robots hold, and write the plan", "commands.optimize"),
-    "pareto": Command("find all plans that no other one beats in every aim", "commands.pareto"),
-    "analyze": Command("compute forces and displacements in every step", "commands.analyze"),
-    "assess": Command("prove which steps stand, and with what margins", "commands.assess"),
-    "report": Command("make a page that shows plans step by step", "commands.report"),
-    "scene": Command("check, describe, export or list scenes", "commands.scene"),
-    "import": Command(
+    "compare": _Command("show all ways to build a scene side by side", "commands.compare"),
+    "optimize": _Command("choose where robots hold, and write the plan", "commands.optimize"),
+    "pareto": _Command("find all plans that no other one beats in every aim", "commands.pareto"),
+    "analyze": _Command("compute forces and displacements in every step", "commands.analyze"),
+    "assess": _Command("prove which steps stand, and with what margins", "commands.assess"),
+    "report": _Command("make a page that shows plans step by step", "commands.report"),
+    "scene": _Command("check, describe, export or list scenes", "commands.scene"),
+    "import": _Command(
         "make a scene of an assembly of COMPAS, a mesh or a table", "commands.importing"
     ),
-    "export": Command("write a plan in a format of others", "commands.exporting"),
-    "completion": Command("let the shell complete words of seqopt", "commands.completion"),
+    "export": _Command("write a plan in a format of others", "commands.exporting"),
+    "completion": _Command("let the shell complete words of seqopt", "commands.completion"),
 }
 
 
@@ -129,19 +123,17 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         own = tuple(self._option_string_actions)
-        message = first_wrong(message, self.given, own)
-        hint = nearest(message, self.spoken or own)
+        message = _first_wrong(message, self.given, own)
+        hint = _nearest(message, self.spoken or own)
         where = f"{self.prog} {self.asked}".rstrip()
         complain(f"{self.prog}: error: {message}{hint} (see {where} --help)")
         self.exit(Status.BAD_INPUT)
 
 
 def parser(asked: str | None = None) -> argparse.ArgumentParser:
-    """Return the parser of the command line.
+    """Return the parser of the command line, or of the one command that is asked for.
 
-    ``asked``: the one command whose arguments it takes, so that nothing else is loaded; by default
-    all. Result: ``command`` names what is to be run. A wrong word ends the program with status
-    `seqopt.cli.answer.Status.BAD_INPUT`.
+    ``command`` names what is to be run. A wrong word ends the program with `Status.BAD_INPUT`.
     """
     whole = _Parser(
         prog="seqopt",
@@ -169,16 +161,12 @@ def _fill(command: argparse.ArgumentParser, module: ModuleType) -> None:
     """Give a command what its module says."""
     if usages := getattr(module, "USAGE", ()):
         command.usage = "\n       ".join(f"{command.prog} {usage}" for usage in usages)
-    add: Callable[[argparse.ArgumentParser], None] = module.add_arguments
     lines = "\n".join(f"  {example}" for example in module.EXAMPLES)
     command.description = wrapped(module.DESCRIPTION)
     command.epilog = f"example{'s' * (len(module.EXAMPLES) > 1)}:\n{lines}"
-    add(command)
+    module.add_arguments(command)
 
 
 def asked_command(words: Sequence[str]) -> str:
-    """Return the command that words ask for.
-
-    ``words``: after ``seqopt``. Result: empty if there is none.
-    """
+    """Return the command that words after ``seqopt`` ask for, empty if there is none."""
     return next((word for word in words if not word.startswith("-")), "")

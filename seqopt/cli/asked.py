@@ -19,11 +19,12 @@ from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.problem.requirements import overloads
+from seqopt.report.comparison import idle_note
 from seqopt.responses.table import OUTSIDE, REMEDY
 from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule_file import read_plan
-from seqopt.sequence.steps import AnyStep, Step, idle_robots
+from seqopt.sequence.steps import AnyStep, Step
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import PUBLISHED, is_reference_arch, published_plan
 
@@ -94,8 +95,7 @@ def level_notes(engine: Engine) -> tuple[str, ...]:
 
 def idle_notes(scene: Scene, steps: Sequence[AnyStep]) -> tuple[str, ...]:
     """Return the robots that never grip, in words."""
-    idle = idle_robots(scene, steps)
-    return (f"robots: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}",) if idle else ()
+    return tuple(idle_note(scene, "robots", steps))
 
 
 def exceeded(scene: Scene, *tables: pd.DataFrame) -> tuple[str, ...]:

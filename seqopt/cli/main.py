@@ -13,10 +13,9 @@ from seqopt.errors import SeqoptError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command.
+    """Run one command, by its words or those of the shell, and return its `Status`.
 
-    ``arguments``: the words after ``seqopt``; by default those of the shell. Result: the exit
-    status, a `seqopt.cli.answer.Status`. An error is one line on standard error.
+    An error is one line on standard error.
     """
     try:
         status = _run(sys.argv[1:] if arguments is None else arguments)
@@ -32,9 +31,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def load(words: Sequence[str]) -> None:
-    """Load the libraries of a command, which would meet its interrupts if they came later.
+    """Load the libraries of the command that words ask for, if they ask for one.
 
-    ``words``: after ``seqopt``; where they name no command nothing is loaded.
+    They would meet its interrupts if they came later.
     """
     asked = asked_command(words)
     if asked in COMMANDS:

@@ -54,7 +54,7 @@ def count_word(text: str, where: str, most: int, least: int = 1) -> int:
     return int(text)
 
 
-def known_word(
+def _known_word(
     name: str,
     known: Iterable[str],
     where: str,
@@ -103,7 +103,7 @@ def parse_numbers(
     for text in texts:
         name, value = _split_word(text)
         if known is not None:
-            known_word(name, known, f"{where} {text}", advice=advice)
+            _known_word(name, known, f"{where} {text}", advice=advice)
         out[name] = number_word(value, f"{where} {text}", zero=zero)
     return out
 
@@ -176,7 +176,7 @@ def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:
     given: dict[str, object] = {"robots": robots}
     for text in texts:
         name, _, value = text.partition("=")
-        known_word(name, RULES, f"--rule {text}", StepError)
+        _known_word(name, RULES, f"--rule {text}", StepError)
         given[name] = value
         if name in COUNTS and value.isdecimal():
             given[name] = int(value)

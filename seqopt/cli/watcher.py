@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 from seqopt.cli.terminal import columns, harmless, is_terminal
@@ -25,8 +24,6 @@ class Watcher:
 
     A stage whose share is known has a bar and the time left; of any other the time that it took so
     far is shown. Nothing is shown unless standard error is a terminal, nor in the first second.
-
-    ``shows``: False to show nothing at all.
 
     Examples
     --------
@@ -49,12 +46,7 @@ class Watcher:
             self._clock.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """Clear the line, also where an error or an interrupt ends the command."""
         self._over.set()
         self._shows = False
@@ -63,10 +55,7 @@ class Watcher:
             self._lock.release()
 
     def __call__(self, told: object) -> None:
-        """Take note of what is being done.
-
-        ``told``: a stage with its share, or words.
-        """
+        """Take note of what is being done: a stage with its share, or words."""
         if not self._shows:
             return
         with self._lock:

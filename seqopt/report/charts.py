@@ -16,9 +16,8 @@ from seqopt.engines.interface import Engine
 from seqopt.plan.front import Front
 from seqopt.plan.plan import Plan
 from seqopt.report.comparison import LARGEST, Comparison, in_shown_unit, worst_of
-from seqopt.report.gantt import gantt_picture
 from seqopt.report.page import Build
-from seqopt.report.pictures import steps_picture
+from seqopt.report.pictures import gantt_picture, steps_picture
 from seqopt.report.style import (
     BLUE,
     GRAY,
@@ -144,9 +143,8 @@ def _gaps(result: Comparison) -> Figure:
         panel.plot(values, rows, "o", color=BLUE, ms=5, clip_on=False)
         for row, value in enumerate(values):
             words = "none" if value < EXACT and panel is panels[0] else text.format(value)
-            panel.annotate(
-                words, (value, row), (6, 0), textcoords="offset points", va="center", fontsize=SMALL
-            )
+            beside: Any = {"textcoords": "offset points", "va": "center", "fontsize": SMALL}
+            panel.annotate(words, (value, row), (6, 0), **beside)
         panel.set_title(title)
         panel.spines[["top", "right"]].set_visible(False)
         panel.tick_params(axis="y", length=0, pad=8)
@@ -168,17 +166,13 @@ def trace_figure(plans: Sequence[Plan]) -> Figure:
         name = plan.formulation.name
         trace = plan.trace
         seconds = np.array([found.seconds for found in trace])
+        bounds: dict[str, Any] = {"mfc": "white", "lw": 0.8}
         for values, more in (
             ([found.objective for found in trace], {"label": typed(name)}),
-            ([found.bound for found in trace], {"mfc": "white", "lw": 0.8}),
+            ([found.bound for found in trace], bounds),
         ):
-            known = np.isfinite(values)
-            axes.step(
-                seconds[known],
-                np.array(values)[known],
-                where="post",
-                **(known_by[name].line() | more),
-            )
+            known, look = np.isfinite(values), known_by[name].line() | more
+            axes.step(seconds[known], np.array(values)[known], where="post", **look)
     axes.plot([], [], "o-", color=GRAY, mfc="white", lw=0.8, label="lower bound")
     axes.set(xscale="log", xlabel="time [s]", ylabel="objective, and what bounds it below")
     dress(axes)
@@ -198,16 +192,9 @@ def draw_responses(
     for axis, (column, label) in zip(axes, columns.items(), strict=True):
         for number, (name, table) in enumerate(tables.items()):
             every = max(1, len(table) // MARKS)
-            axis.plot(
-                ended[name],
-                table[column],
-                label=name,
-                lw=1.2,
-                ms=4.5,
-                mfc="white",
-                markevery=(number % every, every),
-                **styles[name].line(),
-            )
+            look = styles[name].line() | {"lw": 1.2, "ms": 4.5, "mfc": "white"}
+            look |= {"markevery": (number % every, every), "label": name}
+            axis.plot(ended[name], table[column], **look)
         axis.set_ylabel(label)
         dress(axis)
     axes[-1].set_xlabel("bricks placed")

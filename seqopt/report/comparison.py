@@ -46,18 +46,8 @@ from seqopt.work.progress import Stage, Tell
 
 LARGEST = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "1e-3 mm"}
 RANKS = ["pairs", "conditional", "short_sight", "change_of_objective"]
-COLUMNS = [
-    "problem",
-    "objective",
-    "gap",
-    *RANKS,
-    *LARGEST,
-    "overloaded",
-    "outside",
-    "models",
-    "seconds",
-    "solve_seconds",
-]
+MARKS, COST = ["overloaded", "outside"], ["models", "seconds", "solve_seconds"]
+COLUMNS = ["problem", "objective", "gap", *RANKS, *LARGEST, *MARKS, *COST]
 CLOSED = "no choice"  # the problem of a sequence without open grips
 PATIENCE = 10.0  # s, after which the best plan so far is the row
 
@@ -165,7 +155,7 @@ def compare(
     if free is not None:
         tables[FREE], rows[FREE] = free.responses(), _free_row(free)
     if problem is not None:
-        notes += _idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
+        notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
     left = LinearRange(engine).of_builds(tables)
     table = _table(rows, left)
@@ -243,10 +233,8 @@ def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
         By the names of `LARGEST`, in its units; ``F_rob`` is the largest force of any grip.
     """
     forces = table[[force_column(robot) for robot in scene.robots]].abs()
-    out = {"F_rob": float(np.nanmax(forces.to_numpy(float)))}
-    for name in ("M_sup", "T_max", "D_max"):
-        out[name] = float(table[RESPONSES[name].column].max())
-    return out
+    worst = {name: float(table[RESPONSES[name].column].max()) for name in [*LARGEST][1:]}
+    return {"F_rob": float(np.nanmax(forces.to_numpy(float))), **worst}
 
 
 def _quantities(scene: Scene, table: pd.DataFrame) -> pd.Series[float]:
@@ -254,10 +242,9 @@ def _quantities(scene: Scene, table: pd.DataFrame) -> pd.Series[float]:
     values = {
         f"{robot_response(r.name)} [N]": table[force_column(r)].abs().max() for r in scene.robots
     }
-    rest = largest(scene, table)
-    return pd.Series(
-        values | {f"{name} [{LARGEST[name]}]": rest[name] for name in rest if name != "F_rob"}
-    )
+    for name, value in largest(scene, table).items():
+        values |= {} if name == "F_rob" else {f"{name} [{LARGEST[name]}]": value}
+    return pd.Series(values)
 
 
 def _row(plan: Plan) -> dict[str, object]:
@@ -337,7 +324,7 @@ def method_tables(
         tables[name] = analyze(engine, steps)
         why = degeneration(engine.network, name)
         notes += [f"{name}: {why}"] if why else []
-        notes += _idle_note(scene, name, steps)
+        notes += idle_note(scene, name, steps)
     if not tables:
         raise next(iter(refused.values()))
     if is_reference_arch(scene):
@@ -346,7 +333,7 @@ def method_tables(
     return tables, refusals + notes
 
 
-def _idle_note(scene: Scene, name: str, steps: Iterable[AnyStep]) -> list[str]:
+def idle_note(scene: Scene, name: str, steps: Iterable[AnyStep]) -> list[str]:
     """Return a note that names the robots which never grip, or none."""
     idle = idle_robots(scene, steps)
     return [f"{name}: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}"] if idle else []
@@ -360,11 +347,10 @@ def _free_criterion(criterion: Criterion, rows: Sequence[Mapping[str, float]]) -
     """
     if not isinstance(criterion, RankSum):
         return criterion
-    names = {"F_largest": "F_rob", "M_sup": "M_sup", "T_max": "T_max", "D_max": "D_max"}
     units = {"D_max": 1e-6}  # m of 1e-3 mm
     least = {
-        name: units.get(name, 1.0) * min(row[shown] for row in rows) or 1.0
-        for name, shown in names.items()
+        name.replace("F_rob", "F_largest"): units.get(name, 1.0) * min(r[name] for r in rows) or 1.0
+        for name in LARGEST
     }
     return WorstRatio("worst-ratio-to-rows", tuple(least.items()))
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -34,6 +34,7 @@ SHARE = 0.026  # of the picture's size that this is, about
 WIDE = 1.5  # of a number over its height
 ANGLES = np.radians(np.arange(0, 360, 15))
 EDGES = ((0, 4), (0, 2), (0, 1))  # corners of a box along its length, width and thickness
+PAIRS = ((0, 1), (0, 2), (1, 2))  # of these
 EVEN = 1e-9  # share of a direction toward the viewer that is none
 TOUCH = 1e-6  # share of a box's size up to which boxes that touch are parted
 INK, TENSION, COMPRESSION = "#2b2b2b", VERMILION, BLUE
@@ -86,8 +87,7 @@ def aside(marks: Floats, segments: Sequence[Floats]) -> list[tuple[float, float]
         spots = mark + reach * around
         room = _from_lines(spots, ends)
         for other in placed:
-            apart = np.linalg.norm((spots - other) / [WIDE, 1.0], axis=1)
-            room = np.minimum(room, apart)
+            room = np.minimum(room, np.linalg.norm((spots - other) / [WIDE, 1.0], axis=1))
         best = int(room.argmax())
         placed.append(spots[best])
         x, y = (POINTS * around[best]).tolist()
@@ -161,9 +161,7 @@ def _in_front(seen: Floats, pairs: Ints) -> Ints:
     """Return 1 where the second box of a pair lies in front of the first, -1 behind it, else 0."""
     a, b = pairs.T
     edges = np.stack([seen[:, j] - seen[:, i] for i, j in EDGES], axis=1)
-    normals = np.stack(
-        [np.cross(edges[:, i], edges[:, j]) for i, j in combinations(range(3), 2)], 1
-    )
+    normals = np.stack([np.cross(edges[:, i], edges[:, j]) for i, j in PAIRS], axis=1)
     across = np.cross(edges[a][:, :, None], edges[b][:, None]).reshape(-1, 9, 3)
     axes = np.concatenate([normals[a], normals[b], across], axis=1)
     size = np.linalg.norm(axes, axis=2, keepdims=True)
@@ -217,17 +215,13 @@ def _write_numbers(axes: Axes, network: Network, seen: Floats, segments: Sequenc
     """Write the numbers of the nodes that robots may hold beside what is seen (N, 2)."""
     inner = np.flatnonzero(network.node_kind[: len(seen)] == PartKind.INNER.value)
     for i, shift in zip(inner, aside(seen[inner], segments), strict=True):
-        axes.annotate(
-            str(network.node_name[i]),
-            seen[i],
-            shift,
-            textcoords="offset points",
-            fontsize=SMALL,
-            ha="center",
-            va="center",
-            path_effects=HALO,
-            zorder=4,
-        )
+        _write(axes, str(network.node_name[i]), seen[i], shift, ha="center", zorder=4)
+
+
+def _write(axes: Axes, text: str, at: Any, shift: tuple[float, float], **how: Any) -> None:
+    """Write text beside a point, shifted by points, with a halo."""
+    beside: Any = {"textcoords": "offset points", "va": "center", "fontsize": SMALL}
+    axes.annotate(text, at, shift, path_effects=HALO, **beside, **how)
 
 
 def _lines(
@@ -244,20 +238,10 @@ def _lines(
 
 def force_key(largest_force: float) -> list[Line2D]:
     """Return entries of a legend for color and width of edges, up to the force drawn widest, N."""
-    kinds = [
-        Line2D([], [], color=color, lw=THICK / 2, label=name)
-        for color, name in ((TENSION, "tension"), (COMPRESSION, "compression"))
-    ]
-    return kinds + [
-        Line2D(
-            [],
-            [],
-            color=INK,
-            lw=THIN + (THICK - THIN) * share,
-            label=f"{share * largest_force:.0f} N",
-        )
-        for share in (0.1, 0.5, 1.0)
-    ]
+    entries = [(TENSION, THICK / 2, "tension"), (COMPRESSION, THICK / 2, "compression")]
+    for share in (0.1, 0.5, 1.0):
+        entries.append((INK, THIN + (THICK - THIN) * share, f"{share * largest_force:.0f} N"))
+    return [Line2D([], [], color=color, lw=width, label=said) for color, width, said in entries]
 
 
 def _draw_nodes(axes: Axes, kind: Ints, seen: Floats, size_by: float) -> None:
@@ -267,17 +251,9 @@ def _draw_nodes(axes: Axes, kind: Ints, seen: Floats, size_by: float) -> None:
         (PartKind.JOINT, "o", 12, "white"),
         (PartKind.BASE, "s", 36, INK),
     ):
-        at = seen[kind == which]
-        axes.scatter(
-            at[:, 0],
-            at[:, 1],
-            s=size_by * size,
-            marker=marker,
-            c=face,
-            edgecolors=INK,
-            zorder=3,
-            linewidths=0.7,
-        )
+        x, y = seen[kind == which].T
+        look: Any = {"marker": marker, "c": face, "edgecolors": INK, "linewidths": 0.7}
+        axes.scatter(x, y, size_by * size, zorder=3, **look)
 
 
 def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
@@ -306,7 +282,8 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
             polygons.append(seen[list(face), :2])
             red, green, blue = (_light(points, face) * own).tolist()
             colors.append((red, green, blue, alpha))
-    _fill(axes, polygons, colors, alpha)
+    rim = (0.25, 0.15, 0.1, alpha)
+    axes.add_collection(PolyCollection(polygons, facecolors=colors, edgecolors=rim, linewidths=0.4))
     _frame(axes)
 
 
@@ -319,20 +296,16 @@ def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: 
     }
     shifts = _apart(at, max(axes.dataLim.width, axes.dataLim.height, 0.0))
     for i, (x, y) in at.items():
-        color = ROBOT_COLORS[i % len(ROBOT_COLORS)]
-        marker = ROBOT_MARKERS[i % len(ROBOT_MARKERS)]
-        axes.scatter([x], [y], s=90, marker=marker, c=color, edgecolors="white", zorder=5)
-        axes.annotate(
-            f"{network.scene.robots[i].name} at {grips[i]}",
-            (x, y),
-            (10, shifts[i]),
-            textcoords="offset points",
-            va="center",
-            fontsize=SMALL,
-            color=color,
-            zorder=6,
-            path_effects=HALO,
-        )
+        mark = grip_mark(i)
+        axes.scatter([x], [y], 90, **mark, edgecolors="white", zorder=5)
+        name = f"{network.scene.robots[i].name} at {grips[i]}"
+        _write(axes, name, (x, y), (10, shifts[i]), color=mark["color"], zorder=6)
+
+
+def grip_mark(robot: int) -> dict[str, Any]:
+    """Return color and shape of the mark of a robot's grip."""
+    color, marker = (each[robot % len(each)] for each in (ROBOT_COLORS, ROBOT_MARKERS))
+    return {"color": color, "marker": marker}
 
 
 def _apart(at: Mapping[int, Floats], size: float) -> dict[int, float]:
@@ -360,14 +333,6 @@ def _moved(network: Network, bricks: int, twist: Floats | None, magnify: float) 
     arm = corners - corners.mean(axis=1, keepdims=True)
     turned = np.cross(twist[:bricks, None, 3:], arm)
     return np.asarray(corners + magnify * (twist[:bricks, None, :3] + turned))
-
-
-def _fill(axes: Axes, polygons: list[Floats], colors: list[Color], alpha: float) -> None:
-    """Draw polygons (m, 2) with an edge around each."""
-    edge = (0.25, 0.15, 0.1, alpha)
-    axes.add_collection(
-        PolyCollection(polygons, facecolors=colors, edgecolors=edge, linewidths=0.4)
-    )
 
 
 def _solid(brick: Brick, corners: Floats, motion: Floats | None) -> tuple[Floats, Faces]:

@@ -44,7 +44,7 @@ WIDTH = 4.5  # of a structure, inches
 STEPS = 34  # of a build whose grips are drawn
 
 
-class Card(NamedTuple):
+class _Card(NamedTuple):
     """What there is to show of a value: a title, rows of a table by name, and what draws it."""
 
     title: str
@@ -94,29 +94,28 @@ def _small(figure: Figure) -> bytes:
 
 
 @singledispatch
-def facts(value: object) -> Card:
+def facts(value: object) -> _Card:
     """Return what there is to show of a value."""
-    return Card(type(value).__name__, {"": repr(value)})
+    return _Card(type(value).__name__, {"": repr(value)})
 
 
 @facts.register
-def _scene(value: Scene) -> Card:
-    corners = boxes(value.bricks).corners().reshape(-1, 3)
+def _scene(value: Scene) -> _Card:
     by_payload: dict[float, list[str]] = {}
     for robot in value.robots:
         by_payload.setdefault(robot.payload, []).append(robot.name)
+    teams = (f"{', '.join(names)}: payload {load:.4g} N" for load, names in by_payload.items())
+    size = np.ptp(boxes(value.bricks).corners().reshape(-1, 3), axis=0)
     rows = {
         "bricks": len(value.bricks),
         "joints": len(value.joints),
         "supports": len(value.grounds),
-        "size, m": " × ".join(f"{length:.3g}" for length in np.ptp(corners, axis=0)),
+        "size, m": " × ".join(f"{length:.3g}" for length in size),
         "mass, kg": f"{sum(brick.mass for brick in value.bricks):.4g}",
-        "robots": "; ".join(
-            f"{', '.join(names)}: payload {load:.4g} N" for load, names in by_payload.items()
-        ),
+        "robots": "; ".join(teams),
         "nodes that may be held": 2 * len(value.bricks) - len(value.blocked_nodes),
     }
-    return Card(f"Scene {value.name}", rows, lambda: _of_scene(value))
+    return _Card(f"Scene {value.name}", rows, lambda: _of_scene(value))
 
 
 def _of_scene(scene: Scene) -> list[Figure]:
@@ -124,7 +123,7 @@ def _of_scene(scene: Scene) -> list[Figure]:
 
 
 @facts.register
-def _network(value: Network) -> Card:
+def _network(value: Network) -> _Card:
     supports = len(value.springs.support)
     rows = {
         "bricks": len(value.inner),
@@ -135,11 +134,11 @@ def _network(value: Network) -> Card:
         "springs of supports": supports,
     }
     name = f"Network of {value.scene.name}"
-    return Card(name, rows, lambda: [display("network_picture")(value, width=WIDTH)])
+    return _Card(name, rows, lambda: [display("network_picture")(value, width=WIDTH)])
 
 
 @facts.register
-def _schedule(value: Schedule) -> Card:
+def _schedule(value: Schedule) -> _Card:
     counts = [len(move.candidates) for move in value.moves]
     rows: dict[str, object] = {
         "scene": value.scene.name,
@@ -153,11 +152,11 @@ def _schedule(value: Schedule) -> Card:
         rows["left out"] = value.left_out
     steps = (1, min(len(value.steps), STEPS))
     draw = lambda: [display("gantt_picture")(value.scene, value.steps, None, steps)]  # noqa: E731
-    return Card(f"Schedule {value.method}", rows, draw)
+    return _Card(f"Schedule {value.method}", rows, draw)
 
 
 @facts.register
-def _problem(value: Problem) -> Card:
+def _problem(value: Problem) -> _Card:
     scene = value.scene
     if isinstance(value.moves, Schedule):
         title, rows, draw = _schedule(value.moves)
@@ -176,7 +175,7 @@ def _problem(value: Problem) -> Card:
         "orders": "" if value.orders is None else value.orders.value,
         "engine": repr(value.engine),
     }
-    return Card(name, {**rows, **{name: said for name, said in more.items() if said}}, draw)
+    return _Card(name, {**rows, **{name: said for name, said in more.items() if said}}, draw)
 
 
 def _limits(limits: tuple[Limit, ...]) -> str:
@@ -184,11 +183,11 @@ def _limits(limits: tuple[Limit, ...]) -> str:
 
 
 @facts.register
-def _build(value: ShownBuild) -> Card:
+def _build(value: ShownBuild) -> _Card:
     try:
         scene = value.engine.network.scene
     except ProblemError:  # costs alone were given
-        return Card("Plan", {"": repr(value)})
+        return _Card("Plan", {"": repr(value)})
     small = len(scene.bricks) <= SMALL
     rows: dict[str, object] = {}
     if not small:
@@ -196,22 +195,13 @@ def _build(value: ShownBuild) -> Card:
     elif left := "; ".join(map(str, value.departures)):
         rows[OUTSIDE] = f"{left}. {REMEDY}"
     rows["found by"] = typed(value.title)
-    if criterion := _criterion(value):
-        rows["criterion"] = criterion
-    rows |= {"result": value.worth, "steps": len(value.steps)}
-    if small:
-        rows |= _worst(value)
+    if isinstance(value, Plan):
+        posed = value.states if isinstance(value.graph, States) else value.layers
+        rows |= {"criterion": posed.criterion.name} if posed.criterion.name else {}
+    rows |= {"result": value.worth, "steps": len(value.steps), **(_worst(value) if small else {})}
     if value.seconds:
         rows["time to find it, s"] = f"{sum(value.seconds.values()):.3g}"
-    return Card(f"Plan for {scene.name}", rows, lambda: _of_build(value, small=small))
-
-
-def _criterion(value: ShownBuild) -> str:
-    """Return the name of the criterion that a plan was chosen by; empty where none was."""
-    if not isinstance(value, Plan):
-        return ""
-    posed = value.states if isinstance(value.graph, States) else value.layers
-    return posed.criterion.name
+    return _Card(f"Plan for {scene.name}", rows, lambda: _of_build(value, small=small))
 
 
 def _worst(value: ShownBuild) -> Rows:
@@ -231,16 +221,13 @@ def _of_build(value: ShownBuild, *, small: bool) -> list[Figure]:
     draw, count = display("steps_picture"), len(value.steps)
     from seqopt.report.pictures import spread_steps  # noqa: PLC0415  # matplotlib is an extra
 
-    if not small:
-        return [draw(value.engine, value.steps, count // 2 + 1)]
-    return [
-        draw(value.engine, value.steps, spread_steps(value.steps, 3)),
-        value.gantt(1, min(count, STEPS)),
-    ]
+    shown = spread_steps(value.steps, 3) if small else count // 2 + 1
+    pictures = [draw(value.engine, value.steps, shown)]
+    return [*pictures, value.gantt(1, min(count, STEPS))] if small else pictures
 
 
 @facts.register
-def _stability(value: Stability) -> Card:
+def _stability(value: Stability) -> _Card:
     rows: dict[str, object] = {
         "verdict": value.verdict.value,
         "bond needed, Pa": f"{value.bond:.4g}",
@@ -256,5 +243,5 @@ def _stability(value: Stability) -> Card:
         rows["fails first"] = f"block {value.first_block}{joint}"
     title = f"Stability: {value.verdict.value}"
     if value.verdict is not Verdict.STANDS:
-        return Card(title, rows)
-    return Card(title, rows, lambda: [display("tilt_picture")(value)])
+        return _Card(title, rows)
+    return _Card(title, rows, lambda: [display("tilt_picture")(value)])

@@ -160,12 +160,8 @@ def _fan(points: Floats, face: tuple[int, ...]) -> tuple[int, ...]:
 def _carried(network: Network) -> list[list[int]]:
     """Return the bricks that every node moves with, none for those that are fixed."""
     out = []
-    for kind, brick, spring in zip(
-        network.node_kind.tolist(),
-        network.node_brick.tolist(),
-        network.node_spring.tolist(),
-        strict=True,
-    ):
+    parts = (network.node_kind, network.node_brick, network.node_spring)
+    for kind, brick, spring in zip(*(part.tolist() for part in parts), strict=True):
         bodies = [brick] if brick >= 0 else network.springs.bodies[spring].tolist()
         fixed = kind == PartKind.BASE.value
         out.append([] if fixed else [body for body in bodies if body != GROUND])

@@ -23,30 +23,18 @@ WIDTH = 7.36  # inches: the column of text of the site at 100 pixels an inch
 DPI = 200  # two pixels of the file for each one that the site shows
 NOTEBOOK_DPI = 110
 SMALL, BODY = 8.0, 9.0  # points
-BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, INK = (
-    "#0072B2",
-    "#D55E00",
-    "#009E73",
-    "#CC79A7",
-    "#E69F00",
-    "#56B4E9",
-    "#000000",
-)
+BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
+ORANGE, SKY, INK = "#E69F00", "#56B4E9", "#000000"
 FEW = 3  # decades on a logarithmic axis
 GRAY = "#767676"  # of what is beside the point; 4.5 to 1 against white
 COLORS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, INK)
 MARKERS = "os^DvP<>X*"
 DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)))
 PARAMETERS: Any = {
-    "font.size": BODY,
-    "axes.titlesize": BODY,
-    "axes.labelsize": BODY,
-    "figure.titlesize": BODY,
-    "figure.labelsize": BODY,
-    "xtick.labelsize": SMALL,
-    "ytick.labelsize": SMALL,
-    "legend.fontsize": SMALL,
-    "legend.title_fontsize": SMALL,
+    **dict.fromkeys(("font.size", "axes.titlesize", "axes.labelsize"), BODY),
+    **dict.fromkeys(("figure.titlesize", "figure.labelsize"), BODY),
+    **dict.fromkeys(("xtick.labelsize", "ytick.labelsize"), SMALL),
+    **dict.fromkeys(("legend.fontsize", "legend.title_fontsize"), SMALL),
     "legend.frameon": False,
     "axes.titlelocation": "left",
     "axes.spines.top": False,
@@ -104,9 +92,7 @@ def look(number: int) -> Look:
     Two of them differ in color or in marker; of the first seven each color is one's own, of the
     first ten each marker.
     """
-    return Look(
-        COLORS[number % len(COLORS)], MARKERS[number % len(MARKERS)], DASHES[number % len(DASHES)]
-    )
+    return Look(*(each[number % len(each)] for each in (COLORS, MARKERS, DASHES)))
 
 
 def looks(names: Iterable[str]) -> dict[str, Look]:

@@ -1,4 +1,4 @@
-"""A comparison as text for a terminal."""
+"""A comparison as text for a terminal, and what methods are called in the words of the field."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from seqopt.problem.requirements import Criterion
 from seqopt.report.comparison import LARGEST, Comparison, LoopFacts
 from seqopt.scene.scene import Scene
 
+WIDTH = 80  # columns
 WORDS = {
     "sequential": "sequential",
     "cantilever": "cantilever",
@@ -37,33 +38,6 @@ WORDS = {
     "minimax_arc": "epigraph per pair",
     "minimax_big_m": "large constant (big-M)",
 }
-
-
-def in_words(name: str) -> str:
-    """Return what a method or formulation is called, or its name where nobody gave it words.
-
-    Examples
-    --------
-    >>> in_words("overlap_dp"), in_words("my_own")
-    ('dynamic programming', 'my_own')
-    """
-    return WORDS.get(name, name)
-
-
-def typed(name: str) -> str:
-    """Return words for a method or formulation, with what is typed behind where it differs.
-
-    Examples
-    --------
-    >>> typed("overlap_dp"), typed("cantilever")
-    ('dynamic programming (overlap_dp)', 'cantilever')
-    """
-    words = in_words(name)
-    same = words == name or name.replace("_", " ").replace("-", " ") in words
-    return words if same else f"{words} ({name})"
-
-
-WIDTH = 80  # columns
 
 
 def format_comparison(comparison: Comparison, scene: Scene, criterion: Criterion) -> str:
@@ -115,11 +89,9 @@ def _methods(comparison: Comparison, scene: Scene) -> str:
         lines.append(f"{'':16}" + f"{'seqopt':>13}{'paper':>8}" * maxima.shape[1])
     for row, quantity in enumerate(maxima.index):
         cells = ""
-        for column in range(maxima.shape[1]):
-            own = _number(maxima.iloc[row, column])
-            cells += (
-                f"{own:>12}" if paper is None else f"{own:>13}{_number(paper.iloc[row, column]):>8}"
-            )
+        for column, own in enumerate(map(_number, maxima.iloc[row])):
+            beside = "" if paper is None else f"{_number(paper.iloc[row, column]):>8}"
+            cells += f"{own:>12}" if paper is None else f"{own:>13}{beside}"
         lines.append(f"{quantity:16}{cells}")
     return "\n".join(lines)
 
@@ -202,23 +174,14 @@ def _objectives(table: pd.DataFrame) -> str:
 
 def _ranks(table: pd.DataFrame) -> str:
     """Return where the published plan's nodes rank, a line for each way to rank them."""
-    return "\n".join(
-        ["Where the published plan's nodes rank, optimization by optimization", *_rank_lines(table)]
-    )
-
-
-def _rank_lines(table: pd.DataFrame) -> Iterator[str]:
-    for column, label in (
-        ("rank_in_window", "cascade"),
-        ("rank_overlap", "overlap"),
-        ("rank_peak", "minimax"),
-    ):
+    ways = {"rank_in_window": "cascade", "rank_overlap": "overlap", "rank_peak": "minimax"}
+    lines = ["Where the published plan's nodes rank, optimization by optimization"]
+    for column, label in ways.items():
         ranks = table[column]
-        said = (
-            f"  {label:21}first in {(ranks == 1).sum()} of {len(ranks)}, "
-            f"among three in {(ranks <= 3).sum()}: {' '.join(map(str, ranks))}"
-        )
-        yield _wrapped(said, 23)
+        first, three = (ranks == 1).sum(), (ranks <= 3).sum()
+        said = f"first in {first} of {len(ranks)}, among three in {three}"
+        lines.append(_wrapped(f"  {label:21}{said}: {' '.join(map(str, ranks))}", 23))
+    return "\n".join(lines)
 
 
 def _wrapped(text: str, indent: int = 2) -> str:
@@ -229,3 +192,27 @@ def _wrapped(text: str, indent: int = 2) -> str:
 def _number(value: object) -> str:
     number = float(str(value))
     return "-" if np.isnan(number) else f"{number:.1f}" if abs(number) < 1e6 else f"{number:.0e}"
+
+
+def in_words(name: str) -> str:
+    """Return what a method or formulation is called, or its name where nobody gave it words.
+
+    Examples
+    --------
+    >>> in_words("overlap_dp"), in_words("my_own")
+    ('dynamic programming', 'my_own')
+    """
+    return WORDS.get(name, name)
+
+
+def typed(name: str) -> str:
+    """Return words for a method or formulation, with what is typed behind where it differs.
+
+    Examples
+    --------
+    >>> typed("overlap_dp"), typed("cantilever")
+    ('dynamic programming (overlap_dp)', 'cantilever')
+    """
+    words = in_words(name)
+    same = words == name or name.replace("_", " ").replace("-", " ") in words
+    return words if same else f"{words} ({name})"

@@ -82,11 +82,7 @@ Examples
 
 
 def find_criterion(criterion: Criterion | str) -> Criterion:
-    """Return a criterion, by name or itself.
-
-    ``criterion``: a criterion, or a name of `seqopt.CRITERIA`. Raises `ProblemError` if there is
-    none of that name.
-    """
+    """Return a criterion, by name of `seqopt.CRITERIA` or itself."""
     if not isinstance(criterion, str):
         return criterion
     if criterion not in CRITERIA:
@@ -214,10 +210,9 @@ def published_plan(scene: Scene) -> tuple[Step, ...]:
 
 
 def published_choice(problem: Layers) -> tuple[int, ...]:
-    """Return what the published plan chooses for the moves of the three-robot loop.
+    """Return the published node of every move of the loop, as index among its candidates.
 
-    ``problem``: the loop on the arch of Bruun et al. Result: index of the published node among the
-    candidates of every move. Raises `ValueError` if a published node is no candidate of its move.
+    Raises `ValueError` if one is no candidate of its move.
     """
     scene = problem.schedule.scene
     plan = published_plan(scene)
@@ -234,9 +229,6 @@ def paper_models(schedule: Schedule) -> tuple[int, int]:
 
     They count 2n candidates for every brick count n from 3 to the last, four steps each, and 2n
     times 2(n-1) pairs for the shared one.
-
-    ``schedule``: of whose scene the bricks are counted. Results: ``cascading``, ``overlap``: models
-    without and with all pairs in the shared steps.
     """
     counts = range(3, len(schedule.scene.bricks) + 1)
     cascading = sum(4 * 2 * n for n in counts)

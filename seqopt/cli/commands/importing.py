@@ -49,7 +49,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     basic.add_argument(
         "--format", choices=FORMATS, help="what the file is (default: what it looks like)"
     )
-    declare(basic, {"--name NAME": "of the scene (default: that of the file)"})
+    basic.add_argument("--name", help="of the scene (default: that of the file)")
     said = command.add_argument_group("what the file does not say")
     said.add_argument("--unit", choices=UNITS, help="unit of length, where the file has none")
     said.add_argument("--up", choices=UPS, default="z", help="axis that is up (default: z)")
