@@ -122,12 +122,11 @@ def minimize_rows(
 ) -> Point:
     """Solve a program whose arrays are given, by HiGHS.
 
-    ``cost`` (n,); ``rows`` ((m, n) sparse float); ``right`` (m,): what equations are equal to;
-    inequalities, which come after them, are no more; ``watch``: says when to stop; ``whole``: how
-    many of the first variables are 0 or 1; all are from 0 on; ``equations``: how many of the rows
-    are equations; all by default. Result: its end ``kInfeasible``, ``kOptimal`` or one of `STOPS`;
-    its values are none (0,) where nothing was found. Raises `SolverError` if it ends in any other
-    way.
+    ``cost`` (n,) of variables from 0 on; ``rows`` ((m, n) sparse float); ``right`` (m,): what
+    equations are equal to, and inequalities, which come after them, no more than; ``whole``: how
+    many of the first variables are 0 or 1; ``equations``: how many rows are; all by default.
+    Result: ended ``kInfeasible``, ``kOptimal`` or by one of `STOPS`; its values are none (0,) where
+    nothing was found. Raises `SolverError` if it ends in any other way.
     """
     dims = SimpleNamespace(zero=len(right) if equations < 0 else equations)
     data = {"A": rows, "b": right, "c": cost, "dims": dims, "bool_vars_idx": range(whole)}

@@ -97,8 +97,7 @@ class _HeldEquilibrium:
 
     def _pressed(self, cut: Floats) -> Floats:
         """Return the wrenches of all corners that press by an amount (K,)."""
-        push = np.zeros((self._corners, 3))
-        push[:, 0] = cut
+        push = np.pad(cut[:, None], ((0, 0), (0, 2)))  # along normals
         return np.asarray(self._assembly.contact_map @ push.ravel())
 
     def _right(self) -> Floats:
@@ -116,17 +115,13 @@ class _HeldEquilibrium:
     def _join(self, new: Directions) -> None:
         """Add the columns of directions: rays of cones, points of discs, and grips."""
         corner = new.owner < self._corners
-        normal = np.array([1.0, 0.0, 0.0])
-        parts = [(new.owner[corner], normal + self._case.friction * new.unit[corner])]
-        limited = [np.full(int(corner.sum()), -1)]  # the line that limits their sum
-        if self._disc.size:
-            parts.append((new.owner[corner], new.unit[corner]))
-            limited.append(new.owner[corner])
-        parts.append((new.owner[~corner], new.unit[~corner]))
-        limited.append(new.owner[~corner] - self._corners + self._disc.shape[1])
-        owner, force = (np.concatenate(part) for part in zip(*parts, strict=True))
-        matrix = self._matrix(owner, force, np.concatenate(limited))
-        self._add(np.zeros(len(owner)), self._most(owner), matrix)
+        at, unit, by = new.owner[corner], new.unit[corner], new.owner[~corner]
+        pushed = np.array([1.0, 0.0, 0.0]) + self._case.friction * unit
+        parts = [(at, pushed, np.full(len(at), -1))]  # third the line that limits their sum
+        parts += [(at, unit, at)] if self._disc.size else []
+        parts += [(by, new.unit[~corner], by - self._corners + self._disc.shape[1])]
+        owner, force, limited = (np.concatenate(part) for part in zip(*parts, strict=True))
+        self._add(np.zeros(len(owner)), self._most(owner), self._matrix(owner, force, limited))
         self._directions = self._directions.joined(new)
         self._owner = np.concatenate([self._owner, owner])
         self._force = np.concatenate([self._force, force])

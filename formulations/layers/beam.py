@@ -15,12 +15,14 @@ never does worse.
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection, Watch
-from seqopt.plan.calling.priced_paths import stopped
+from seqopt.plan.calling.priced_paths import conditional, move_by_move, stopped
 from seqopt.problem.problem import Aim
 
 
@@ -66,17 +68,7 @@ def _beam(problem: PlacementProblem, width: int, watch: Watch) -> tuple[int, ...
 
 
 def _greedy(problem: PlacementProblem, watch: Watch) -> tuple[int, ...] | None:
-    """Return the choice that takes the candidate that is cheapest now; None if time is over."""
-    costs = problem.sums
-    good = costs.continuable()
-    choice: list[int] = []
-    for k, single in enumerate(costs.single):
-        if watch.over:
-            return None
-        row = problem.conditional(k, choice[-1]) if choice else costs.shared[0][0]
-        possible = good[k] & np.isfinite(costs.shared[k][choice[-1] if choice else 0])
-        choice.append(int(np.argmin(np.where(possible, single + row, np.inf))))
-    return tuple(choice)
+    return move_by_move(problem.sums, partial(conditional, problem), watch)
 
 
 FORMULATION = Formulation(

@@ -28,7 +28,7 @@ from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, Reads, Selection, Watch
-from seqopt.plan.calling.priced_paths import stopped
+from seqopt.plan.calling.priced_paths import conditional, move_by_move, stopped
 from seqopt.problem.problem import Aim
 
 CHARGES = ("later", "earlier")
@@ -44,25 +44,16 @@ def solve(
     """
     if charge not in CHARGES:
         raise ProblemError(f"cascade: charge is {charge!r}; give one of {', '.join(CHARGES)}")
-    watch = watch or Watch()
-    layered = problem.sums
-    good = layered.continuable()
-    choice: list[int] = []
-    for k, single in enumerate(layered.single):
-        if watch.over:
-            return stopped(problem)
-        possible = good[k] & np.isfinite(layered.shared[k][choice[-1] if choice else 0])
-        costs = single + _charged(problem, k, choice, charge)
-        choice.append(int(np.argmin(np.where(possible, costs, np.inf))))
-    return Selection(tuple(choice), layered.cost(choice))
+    costs = problem.sums
 
+    def charged(k: int, before: int) -> Floats:
+        if charge == "later":
+            return conditional(problem, k, before)
+        last = k + 1 == len(costs.sizes)
+        return np.zeros(costs.sizes[k]) if last else costs.shared[k + 1].min(axis=1)
 
-def _charged(problem: PlacementProblem, k: int, choice: list[int], charge: str) -> Floats:
-    """Return what move ``k`` answers for beside the steps in which it alone is open, (C_k,)."""
-    shared = problem.sums.shared
-    if charge == "later":
-        return problem.conditional(k, choice[-1]) if choice else shared[0][0]
-    return shared[k + 1].min(axis=1) if k + 1 < len(shared) else np.zeros(shared[k].shape[1])
+    choice = move_by_move(costs, charged, watch or Watch())
+    return Selection(choice, costs.cost(choice)) if choice else stopped(problem)
 
 
 FORMULATION = Formulation(

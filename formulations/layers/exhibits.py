@@ -170,10 +170,7 @@ def largest_of_each(sizes: Sequence[int]) -> Callable[[Floats], tuple[int, ...]]
 
 
 def below(scale: float, least: float = 0.0) -> Callable[[float], float]:
-    """Return what makes a bound of a program's value, costs being divided by a scale.
-
-    ``least``: what was taken off them before.
-    """
+    """Return what makes a bound of a program's value, ``least`` off and divided by a scale."""
     return lambda value: least + scale * (value - ACCURACY * max(abs(value), 1.0))
 
 
@@ -184,10 +181,7 @@ def worst_pairs(costs: LayeredCosts) -> tuple[list[Floats], float]:
 
 
 def flow_of_peaks(problem: PlacementProblem) -> tuple[LayeredFlow, Callable[[float], float]]:
-    """Return the flow whose arcs cost the worst of every pair, none below zero, and its bound.
-
-    Raises `InfeasibleError` if no choice is allowed.
-    """
+    """Return the flow whose arcs cost the worst of every pair, none below zero, and its bound."""
     worst, least = worst_pairs(problem.peaks)
     nothing = tuple(np.zeros(size) for size in problem.peaks.sizes)
     flow = layered_flow(CostProblem(LayeredCosts(nothing, tuple(p - least for p in worst))))

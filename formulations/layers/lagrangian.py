@@ -80,9 +80,9 @@ def _mixed(paths: PricedPaths, met: Sequence[Path], prices: Floats, watch: Watch
 
 
 def _followed(paths: PricedPaths, first: Path, second: Path) -> Iterator[Path]:
-    """Yield the best ways to follow one choice up to a move and another one from there on.
+    """Yield the best way to follow one choice up to a move and another one from there on, if any.
 
-    The cheapest within the budgets; if none is, the one that exceeds them least.
+    That is the cheapest within the budgets, or else the one that exceeds them least.
     """
     begun, ended = _totals(paths, first.choice), _totals(paths, second.choice)
     moves = range(1, len(first.choice))

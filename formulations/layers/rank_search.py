@@ -27,7 +27,7 @@ from seqopt.errors import ProblemError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection, Watch
-from seqopt.plan.calling.priced_paths import stopped
+from seqopt.plan.calling.priced_paths import conditional, stopped
 from seqopt.problem.problem import Aim
 
 MOST = 20_000_000  # combinations in one enumeration: 160 MB
@@ -56,8 +56,9 @@ def solve(problem: PlacementProblem, *, watch: Watch | None = None, horizon: int
                 f"rank_search: {count:.2g} combinations of {min(horizon, len(sizes))} moves; "
                 f"lower the horizon (at most {MOST:.0e} are enumerated)"
             )
-        row = problem.conditional(k, choice[-1]) if choice else costs.shared[0][0]
-        blocked = ~np.isfinite(costs.shared[k][choice[-1] if choice else 0])
+        before = choice[-1] if choice else 0
+        row = conditional(problem, k, before)
+        blocked = ~np.isfinite(costs.shared[k][before])
         total = _enumerate(costs, np.where(blocked, np.inf, row), k, horizon, good)
         best = np.unravel_index(int(np.argmin(total)), total.shape)
         whole = k + horizon >= len(sizes)  # nothing is left to be decided after these

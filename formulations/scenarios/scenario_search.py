@@ -177,8 +177,7 @@ class _Weighed:
 def best_weights(arcs: ScenarioArcs, watch: Watch) -> _Weighed:
     """Return the weights whose bound is highest, and the best choice met on the way.
 
-    ``arcs``: some choice is allowed. Raises `SolverError` if the highest point below the planes is
-    not found.
+    ``arcs``: some choice is allowed. A `SolverError` says that no highest point was found.
     """
     count = arcs.scenarios
     ask = best = np.full(count, 1.0 / count)

@@ -67,9 +67,6 @@ EQUIVALENT = (
     ),
     Equivalent("formulations.*", "if ", "else 0", "else -1", "of one row the first is the last"),
     Equivalent(
-        "formulations.*", "if ", "shared[0][0]", "shared[0][-1]", "of one row the first is the last"
-    ),
-    Equivalent(
         "formulations.layers.rank_search",
         "while len(",
         "<",
@@ -84,7 +81,7 @@ EQUIVALENT = (
     ),
     Equivalent("formulations.layers.cascade", "charge", "==", ">=", "it is later or earlier"),
     Equivalent(
-        "formulations.layers.cascade", "len(shared)", "<", "!=", "no move is beyond the last"
+        "formulations.layers.cascade", "len(costs.sizes)", "==", ">=", "no move is beyond the last"
     ),
     Equivalent("formulations.layers.minimax", "np.full(", "1", "2", "two equal ways are one"),
     Equivalent(COSTS, "== np.inf", "==", ">=", "nothing is larger than infinity"),

@@ -9,7 +9,7 @@ amounts are scaled to order one, costs by a power of two so that nothing is roun
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -211,14 +211,33 @@ def at_least(costs: LayeredCosts, aim: Aim) -> float:
     return max(float(part.min()) for part in (*costs.single, *costs.shared))
 
 
+def move_by_move(
+    costs: LayeredCosts, charged: Callable[[int, int], Floats], watch: Watch
+) -> tuple[int, ...] | None:
+    """Return the choice that takes what is cheapest now and leads on; None if time is over.
+
+    ``charged``: returns what a move's candidates (C_k,) answer for beside the steps in which it
+    alone is open, by move and candidate before, 0 before the first.
+    """
+    good, choice = costs.continuable(), [0]
+    for k, (single, shared) in enumerate(zip(costs.single, costs.shared, strict=True)):
+        if watch.over:
+            return None
+        possible = good[k] & np.isfinite(shared[choice[-1]])
+        choice.append(int(np.argmin(np.where(possible, single + charged(k, choice[-1]), np.inf))))
+    return tuple(choice[1:])
+
+
+def conditional(problem: PlacementProblem, move: int, before: int) -> Floats:
+    """Return the costs of the steps that a move shares with the one before, if any, (C_k,)."""
+    return problem.conditional(move, before) if move else problem.sums.shared[0][0]
+
+
 def _choices(problem: PlacementProblem, costs: LayeredCosts) -> Iterator[tuple[int, ...]]:
     """Yield the cheapest way on, and the ways that take least of each budget."""
-    good = costs.continuable()
-    choice: list[int] = []
-    for k, (single, shared) in enumerate(zip(costs.single, costs.shared, strict=True)):
-        now = np.where(good[k], single + shared[choice[-1] if choice else 0], np.inf)
-        choice.append(int(np.argmin(now)))
-    yield tuple(choice)
+    choice = move_by_move(costs, lambda k, before: costs.shared[k][before], Watch())
+    assert choice is not None  # there is no time limit
+    yield choice
     for budget in problem.budgets:
         arcs = [
             np.where(np.isfinite(shared + single), takes + own, np.inf)
