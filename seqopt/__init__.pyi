@@ -5,14 +5,14 @@ from seqopt.engines.registry import make_engine as make_engine
 from seqopt.errors import SeqoptError as SeqoptError
 from seqopt.network.build import build_network as build_network
 from seqopt.network.network import Network as Network
+from seqopt.plan.build import GivenSequence as GivenSequence
 from seqopt.plan.calling.formulation import Formulation as Formulation
 from seqopt.plan.calling.formulation import formulations as formulations
-from seqopt.plan.given import GivenSequence as GivenSequence
 from seqopt.plan.judge.certificate import Certificate as Certificate
 from seqopt.plan.plan import Plan as Plan
-from seqopt.plan.posing import pose as pose
+from seqopt.plan.solving import pose as pose
 from seqopt.plan.solving import solve as solve
-from seqopt.problem.own_criterion import StepCost as StepCost
+from seqopt.problem.criteria import StepCost as StepCost
 from seqopt.problem.problem import Problem as Problem
 from seqopt.problem.requirements import Limit as Limit
 from seqopt.responses.table import analyze as analyze
@@ -25,8 +25,8 @@ from seqopt.scene.scene import Scene as Scene
 from seqopt.scene.scene_file import load_scene as load_scene
 from seqopt.scene.scene_file import save_scene as save_scene
 from seqopt.sequence.free_rules import FreeRules as FreeRules
-from seqopt.sequence.plan_file import read_plan as read_plan
 from seqopt.sequence.schedule import Schedule as Schedule
+from seqopt.sequence.schedule_file import read_plan as read_plan
 from seqopt.sequence.schedule_file import read_schedule as read_schedule
 from seqopt.sequence.steps import Step as Step
 from seqopt.sequence.three_robots import modified_sequential as modified_sequential
@@ -35,7 +35,7 @@ from seqopt.sequence.two_robots import cantilever as cantilever
 from seqopt.sequence.two_robots import sequential as sequential
 from seqopt.stability.assessment import Stability as Stability
 from seqopt.stability.assessment import assess_steps as assess_steps
-from seqopt.study.presets import CRITERIA as CRITERIA
+from seqopt.study.published import CRITERIA as CRITERIA
 from seqopt.workflow import optimize as optimize
 
 __version__: str
