@@ -17,7 +17,7 @@ from seqopt.plan.calling.formulation import On, find_formulation
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import in_layers, pose, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS
-from seqopt.problem.problem import Orders, Problem
+from seqopt.problem.problem import WORST_PEAK, Orders, Problem
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.responses.resources import Resources
 from seqopt.scene.checks import short
@@ -148,7 +148,8 @@ def posed(
     states = _of_states(moves, {**asked, "aim": aim}, formulation)
     usual = DEFAULTS[FREE if states else "any other"]
     chosen = find_criterion(criterion or usual.criterion)
-    return pose(engine, moves, chosen, aim or usual.aim or (), **asked)
+    of_totals = str(asked.get("over", WORST_PEAK)) != str(WORST_PEAK)  # they are of sums
+    return pose(engine, moves, chosen, aim or (not of_totals and usual.aim) or (), **asked)
 
 
 def _of_states(moves: Schedule | FreeRules, asked: dict[str, Any], formulation: str | None) -> bool:

@@ -40,6 +40,8 @@ SHARED = {  # what formulations may import
     "formulations.solvers",
     "formulations.states.on_graph",
     "formulations.whole_program",
+    "formulations.weights",
+    "formulations.states.totals",
 }
 MECHANICS = {"network.mechanics", "engines.rigid"}  # not for the frame
 LINES, LINES_OF_A_FUNCTION = 300, 50  # of code; imports, docstrings and comments aside

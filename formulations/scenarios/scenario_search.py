@@ -28,17 +28,15 @@ from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linprog
 
+from formulations.weights import CLOSE, Weighed, best_weights
 from seqopt.arrays import Floats, Ints
-from seqopt.errors import ProblemError, SolverError
+from seqopt.errors import ProblemError
 from seqopt.graph.scenarios import Choice, ScenarioArcs, ScenarioLayers, largest_of, scenario_arcs
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, On, Selection, Watch
 from seqopt.problem.problem import Aim
 
-STEPS = 400  # weights that are tried at most
 WIDTH = 20_000  # beginnings that are kept after every move
-CLOSE = 1e-9  # differences that are none, and of bound and roof, over the size of the values
 NUMBERS = 2e7  # that beginnings with all candidates of the next move may be
 IMPROVED = 50  # choices met that are improved move by move first
 
@@ -78,7 +76,7 @@ def solve(problem: ScenarioLayers, *, watch: Watch, width: int = WIDTH) -> Selec
     return Selection(found.choice, found.value, found.bound, weights, end=end)
 
 
-def close_gap(arcs: ScenarioArcs, weighed: _Weighed, watch: Watch, width: int = WIDTH) -> Searched:
+def close_gap(arcs: ScenarioArcs, weighed: Weighed, watch: Watch, width: int = WIDTH) -> Searched:
     """Return the best choice as far as it can be found, with a bound.
 
     ``weighed``: of `best_weights`; ``width``: how many beginnings are kept after every move.
@@ -105,7 +103,7 @@ def close_gap(arcs: ScenarioArcs, weighed: _Weighed, watch: Watch, width: int = 
     return Searched(choice, value, min(bound, value))
 
 
-def _provers(arcs: ScenarioArcs, weighed: _Weighed) -> Floats:
+def _provers(arcs: ScenarioArcs, weighed: Weighed) -> Floats:
     """Return weights that prove bounds of beginnings, (J, S): the best, and single scenarios."""
     if arcs.aim.most(arcs.scenarios) < 1:
         return weighed.weights[None]
@@ -161,61 +159,6 @@ def _traced(layers: Sequence[_Layer], last: int) -> Choice:
         choice.insert(0, int(layer.node[last]))
         last = int(layer.parent[last])
     return tuple(choice)
-
-
-@dataclass(frozen=True, eq=False)
-class _Weighed:
-    """The weights (S,) with the highest bound, and the best choice that was met, with its value."""
-
-    weights: Floats
-    bound: float
-    choice: Choice
-    value: float
-    met: tuple[Choice, ...]
-
-
-def best_weights(arcs: ScenarioArcs, watch: Watch) -> _Weighed:
-    """Return the weights whose bound is highest, and the best choice met on the way.
-
-    ``arcs``: some choice is allowed. A `SolverError` says that no highest point was found.
-    """
-    count = arcs.scenarios
-    ask = best = np.full(count, 1.0 / count)
-    bound = -np.inf
-    met: dict[Choice, Floats] = {}
-    for step in range(STEPS):
-        choice, value = arcs.cheapest(ask)
-        met[choice] = arcs.totals(choice)
-        if value > bound:
-            best, bound = ask, value
-        watch.tell(arcs.aim.value(met[choice]), bound)
-        if watch.over:
-            break
-        highest, roof = _highest(np.array([*met.values()]), arcs.aim.most(count))
-        if roof - bound <= CLOSE * max(abs(roof), abs(bound)):
-            break
-        ask = highest if step % 2 == 0 else 0.5 * (highest + best)
-    values = {choice: arcs.aim.value(totals) for choice, totals in met.items()}
-    chosen = min(values, key=values.__getitem__)
-    return _Weighed(best, bound, chosen, values[chosen], tuple(met))
-
-
-def _highest(totals: Floats, most: float) -> tuple[Floats, float]:
-    """Return the weights at which the lowest plane of totals (n, S) is highest, and its height."""
-    planes, count = totals.shape
-    size = float(np.abs(totals).max()) or 1.0
-    found = linprog(
-        [*[0.0] * count, -1.0],
-        np.hstack([-totals / size, np.ones((planes, 1))]),
-        np.zeros(planes),
-        [[*[1.0] * count, 0.0]],
-        [1.0],
-        bounds=[*[(0.0, most)] * count, (None, None)],
-    )
-    if found.x is None or found.fun is None or not found.success:
-        raise SolverError(f"weights of scenarios: {found.message}; rescale the costs")
-    weights = np.clip(found.x[:count], 0.0, most)
-    return np.asarray(weights / weights.sum()), float(-found.fun) * size
 
 
 FORMULATION = Formulation(

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from formulations.states.totals import least_total
 from seqopt.arrays import Ints, Terse
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, TimeUpError
 from seqopt.graph.budgets import Within, within_budgets
@@ -24,7 +25,7 @@ from seqopt.graph.orders import AllOrders, OrderSelection, OrderStates, TooManyS
 from seqopt.graph.orders import worth as worth_of
 from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
 from seqopt.graph.states.states import States
-from seqopt.graph.states.visits import FreeStates, explore
+from seqopt.graph.states.visits import FreeStates, ScenarioSums, explore
 from seqopt.interrupts import answered
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.plan.calling.guard import StatePath
@@ -86,6 +87,8 @@ class _OnGraph(Terse):
                 f"formulation {self.name}: it takes no budgets; take schedule_search or path_beam"
             )
         tell = watched(problem, watch, max_memory, told)
+        if problem.totals:
+            return best_total(problem, self.choose, watch, tell)
         return after_margins(problem, lambda rest: _chosen(rest, self.choose, watch, tell), tell)
 
 
@@ -143,6 +146,46 @@ def best_order(
         raise TimeUpError("no order with a plan was found yet; give more")
     bound = min(choice.bounds[0] if choice.bounds else -np.inf, value)
     return OrderSelection(order, value, bound, len(space.parts) - 1, stopped)
+
+
+def shortest(graph: Graph, _: Watch) -> Choice:
+    """Return the path that is best in one goal after the other, by shortest paths."""
+    return Choice(*lexicographic(graph))
+
+
+def best_total(
+    problem: States,
+    choose: Callable[[Graph, Watch], Choice],
+    watch: Watch,
+    tell: Watching,
+    width: int | None = None,
+) -> StatePath:
+    """Return the plan of least total over scenarios.
+
+    ``choose``: paths of least sum; ``width``: how many new states of a brick count are kept; by
+    default all, without which no plan is proven to be the least.
+    """
+    space = ScenarioSums(problem, regrips=width is None, standing=bool(problem.demands))
+
+    def cheapest(graph: Graph) -> tuple[tuple[int, ...], float]:
+        path, bounds, _ = choose(graph, watch)
+        if not path:
+            raise StopError("time")
+        return path, bounds[0] if bounds else -np.inf
+
+    try:
+        found = Explorer(space, width, tell)
+        if not found.rise():
+            if width is not None:
+                return best_total(problem, choose, watch, tell)
+            raise InfeasibleError("no plan is allowed")
+        visited = found.graph()
+        best = least_total(on_paths(visited.graph), problem.over, cheapest, watch)
+    except StopError as stop:
+        raise _too_little(stop) from None
+    plan = _selection(visited, Best(best.path, (best.value,)))
+    prices, bound = (tuple(best.weights.tolist()),), (best.bound,)
+    return replace(plan, bound=bound, prices=prices, stopped="time" * watch.over)
 
 
 def _chosen(

@@ -25,8 +25,10 @@ from formulations.states.on_graph import (
     after_margins,
     best_order,
     best_standing,
+    best_total,
     narrow,
     plan_by_then,
+    shortest,
     watched,
 )
 from seqopt.errors import InfeasibleError, ProblemError
@@ -65,6 +67,10 @@ def solve(
     tell = watched(states, watch, max_memory, resources.progress or progress)
     if isinstance(problem, AllOrders):
         return best_order(problem, lambda g, _: Choice(lexicographic(g).path), watch, tell, width)
+
+    if states.totals:
+        found = best_total(states, shortest, watch, tell, width)
+        return replace(found, bound=(-np.inf,))
 
     def search(rest: States) -> StatePath:
         try:

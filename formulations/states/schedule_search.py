@@ -46,8 +46,10 @@ from formulations.states.on_graph import (
     Watching,
     after_margins,
     best_standing,
+    best_total,
     narrow,
     plan_by_then,
+    shortest,
     watched,
 )
 from seqopt.errors import InfeasibleError, ProblemError
@@ -89,6 +91,8 @@ def solve(
             "number above 1"
         )
     tell = watched(problem, Watch(seconds), max_memory, progress)
+    if problem.totals:
+        return best_total(problem, shortest, Watch(seconds), tell)
     dear = bool(problem.demands or problem.each) and min(seconds, max_memory) == np.inf
     options = _Options(width, growth, dear)
     return after_margins(problem, lambda rest: _search(rest, options, tell), tell)

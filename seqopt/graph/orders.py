@@ -49,6 +49,11 @@ class AllOrders(Shown):
                 f"aim {goal}: an order is not chosen by a margin; name minmax, a response, sum, "
                 "steps, regrips or travel first"
             )
+        if self.states.totals:
+            raise ProblemError(
+                f"robust aim {self.states.over}: orders are compared by worst steps; give "
+                "worst-peak, or an order"
+            )
         if self.states.budgets:
             raise ProblemError(
                 f"budget {self.states.goals[-1]}: an order is chosen by its first aim alone; leave "

@@ -21,7 +21,7 @@ from seqopt.graph.states.states import over_scenarios
 from seqopt.plan.judge.schedules import plan_values
 from seqopt.plan.layers import best_choice
 from seqopt.plan.plan import Plan
-from seqopt.problem.problem import Aim
+from seqopt.problem.problem import WORST_PEAK, Aim
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene, in_order
 
@@ -103,12 +103,13 @@ def worst_values(plan: Plan, unseen: Scenarios) -> dict[str, float]:
     order = graph.network.scene.build_order
     scenes = [in_order(scene, order) for scene in unseen.scenes]
     judged = replace(graph, scenarios=(), limits=(), standing=None, settled=(), budgets=())
+    judged = replace(judged, over=WORST_PEAK)
     goals = tuple(goal for goal in graph.goals if not goal.of_margins)
     if not goals:
         return {}
-    judged = over_scenarios(replace(judged, goals=goals), scenes)
+    judged = over_scenarios(replace(judged, goals=goals), scenes, graph.over)
     values = plan_values(judged, plan.steps)
-    return {str(goal): value for goal, value in zip(goals, values, strict=True)}
+    return dict(zip(judged.names, values, strict=True))
 
 
 def _row(

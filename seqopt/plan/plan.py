@@ -143,7 +143,7 @@ class Plan(ShownBuild):
     def goals(self) -> tuple[str, ...]:
         """The names of what was made small, the most important first, then of what has budgets."""
         if isinstance(self.graph, States):
-            return tuple(map(str, self.graph.goals))
+            return self.graph.names
         if isinstance(self.graph, ScenarioLayers):
             return (str(self.graph.aim),)
         return ("minmax" if self.formulation.aim is Aim.PEAK else "sum",)
@@ -152,8 +152,8 @@ class Plan(ShownBuild):
     def objective(self) -> dict[str, float]:
         """The value of every goal by its name; of a tilt, what is survived, in degrees."""
         if isinstance(self.graph, States):
-            pairs = zip(self.graph.goals, self.selection.objective, strict=True)  # type: ignore[arg-type]
-            return {str(goal): goal.shown(value) for goal, value in pairs}
+            found = zip(self.goals, self.graph.goals, self.selection.objective, strict=True)  # type: ignore[arg-type]
+            return {name: goal.shown(value) for name, goal, value in found}
         if self.certificate is None:
             return {}
         return dict(zip(self.goals, self.certificate.values, strict=True))
@@ -203,7 +203,7 @@ class Plan(ShownBuild):
             return Status.UNPROVEN
         if isinstance(self.graph, States):
             exact = self.formulation.kind is not FormulationKind.HEURISTIC
-            if exact and not self.graph.budgets:
+            if exact and not self.graph.budgets and not self.graph.totals:
                 return Status.OPTIMAL
         if proof.gap <= TOLERANCE:
             return Status.OPTIMAL
@@ -424,7 +424,7 @@ def _states_asked(graph: States) -> dict[str, object]:
         counts = {"looked_at": sets.looked_at, "programs": sets.programs}
         stands = {**graph.standing.described(), **counts, "undecided": sets.undecided}
     return {
-        "aims": [str(goal) for goal in graph.aims],
+        "aims": list(graph.names[: len(graph.aims)]),
         **judged_by(graph.goals, graph.criterion),
         "scenarios": len(graph.scenarios),
         "limits": {limit.response: limit.bound for limit in graph.limits},
@@ -439,8 +439,8 @@ def _bounds(plan: Plan) -> dict[str, float | None]:
     if isinstance(graph, States) and isinstance(plan.selection, StatePath):
         early = proof is None or plan.selection.stopped
         bounds = plan.selection.bound if early or proof is None else proof.bounds
-        pairs = zip(graph.aims, bounds, strict=False)
-        return {str(g): g.shown(b) if isfinite(b) else None for g, b in pairs}
+        found = zip(graph.names, graph.aims, bounds, strict=False)
+        return {name: g.shown(b) if isfinite(b) else None for name, g, b in found}
     if proof is None:
         return {}
     return {

@@ -223,19 +223,15 @@ def _require_candidates(problem: Problem) -> None:
 
 def _states(problem: Problem) -> States:
     """Return the states of a problem, with all that is asked of them."""
-    if problem.scenarios and problem.over != WORST_PEAK:
-        raise ProblemError(
-            f"robust aim {problem.over}: where states are chosen, worst steps count; "
-            "give worst-peak"
-        )
-    goals = problem.goals or (AIMS[Aim.PEAK],)
+    over = problem.over if problem.scenarios else WORST_PEAK
+    goals = problem.goals or (AIMS[over.aim],)
     found = build_states(
         problem.engine, problem.moves, problem.criterion, goals, problem.limits, problem.stands
     )
     found = replace(found, resources=problem.resources)
     if caps := parse_caps(problem.budgets):
         found = within(found, caps)
-    return over_scenarios(found, problem.scenarios) if problem.scenarios else found
+    return over_scenarios(found, problem.scenarios, over) if problem.scenarios else found
 
 
 def _in_own_order(problem: Problem) -> States:

@@ -19,6 +19,7 @@ from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, StepError
 from seqopt.graph.states.states import build_states
 from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation, formulation_names
+from seqopt.problem.problem import parse_robust
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Limit
 from seqopt.sequence.free_rules import FreeRules, with_robots
 from seqopt.sequence.schedule import thin
@@ -90,6 +91,8 @@ def state(name, scenarios, mortar, grips_of):
 
 def taken(word, worst):
     """What a goal takes of a state."""
+    if word.startswith("sum in"):
+        return float(worst[int(word.split()[-1])])
     if word in ("minmax", "sum"):
         return float((worst / SCALES).max())
     return float(worst[FOUR.index(word)])
@@ -213,6 +216,35 @@ def test_everything_goes_with_everything(name, data):
     )
     formulation = find_formulation("schedule_search") if caps else pick(*PLANS)
     agree(problem, formulation, best, len(words))
+
+
+@cache
+def costs_in_each(name, grips_of):
+    """What a state costs in every scenario by itself; None where it is not allowed in one."""
+    bricks, grips = grips_of
+    rules = FreeRules() if name == "free" else IGNORED
+    found = [allowed(engine, rules, bricks, grips) for engine in engines_of(name, 4)]
+    if any(each is None for each in found):
+        return None
+    return np.array([(each / SCALES).max() for each in found])
+
+
+@pytest.mark.parametrize("over", ["worst-total", "cvar=0.5", "cvar=0"])
+@pytest.mark.parametrize("name", ["free", "own", "modified-sequential"])
+def test_totals_over_scenarios_are_the_least_of_every_path(name, over):
+    words = tuple(f"sum in {k}" for k in range(4))
+    totals = np.array([*every_path(name, "", lambda *each: costs_in_each(name, each), words)])
+    least = parse_robust(over).each(totals).min()
+    drawn = seqopt.scenarios(scene_of(name), count=4, seed=3)
+    problem = seqopt.pose(
+        *(engines_of(name, 0)[0], rules_of(name, ""), ONES), "sum", scenarios=drawn, over=over
+    )
+    for formulation in PLANS:
+        plan = seqopt.solve(problem, formulation)
+        if formulation.kind is FormulationKind.EXACT:
+            assert plan.objective[over] == pytest.approx(least, rel=1e-7)
+        assert plan.certificate.bounds[0] <= least * (1 + 1e-9) <= plan.objective[over] * (1 + 2e-9)
+        assert plan.summary()["aims"] == [over]
 
 
 def over(worst, response, bound):

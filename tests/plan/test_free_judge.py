@@ -193,3 +193,29 @@ def test_what_differs_by_rounding_alone_is_no_other_point():
         np.unique(np.array([[f"{x:.8e}" for x in p] for p in points]), axis=0)
     )
     assert len(points) == 1  # a second one was less by the last digits of T_max alone
+
+
+def test_weights_of_scenarios_that_prove_little_leave_a_gap():
+    """Wrong weights are no error, but prove less; a wrong total, or none for a scenario, is one."""
+    scene = small_arch(5)
+    problem = seqopt.pose(
+        *(seqopt.make_engine("compliance", scene), FreeRules(), ONES),
+        scenarios=seqopt.scenarios(scene, count=3, seed=1),
+        over="worst-total",
+    )
+    plan = solve(problem, "schedule_search")
+    states, found = plan.states, plan.selection
+    assert 0 < plan.certificate.gap < 0.02  # what labels alone close is claimed
+    assert plan.status == "claimed optimal"
+    worst = int(np.argmax(found.prices[0]))
+    alone = tuple(float(k == (worst + 1) % 3) for k in range(3))
+    less = judge_schedule(states, replace(found, prices=(alone,)), plan.steps)
+    assert (less.gap > plan.certificate.gap, less.claimed_gap) == (True, 0.0)
+    none = judge_schedule(states, replace(found, prices=(alone,), bound=(-np.inf,)), plan.steps)
+    assert none.claimed_gap == none.gap == less.gap
+    double = judge_schedule(states, replace(found, prices=((2.0, 2.0, 2.0),)), plan.steps)
+    assert double.bounds[0] <= plan.objective["worst-total"] * (1 + 1e-12)
+    with pytest.raises(SolverError, match="no weight for every scenario"):
+        judge_schedule(states, replace(found, prices=()), plan.steps)
+    with pytest.raises(SolverError, match=r"worst-total is .* as claimed"):
+        judge_schedule(states, replace(found, objective=(0.9 * found.objective[0],)), plan.steps)

@@ -15,7 +15,16 @@ from seqopt.errors import ProblemError
 from seqopt.graph.scenarios import engine_for, require_alike
 from seqopt.network.network import Network
 from seqopt.problem.criteria import RankSum
-from seqopt.problem.problem import LARGEST, STATE_RESPONSES, Goal, Measure, parse_goals
+from seqopt.problem.problem import (
+    LARGEST,
+    STATE_RESPONSES,
+    WORST_PEAK,
+    Aim,
+    Goal,
+    Measure,
+    RobustAim,
+    parse_goals,
+)
 from seqopt.problem.requirements import (
     LIMIT_TOLERANCE,
     Criterion,
@@ -54,6 +63,8 @@ class States(Shown):
     well; ``budgets``: caps on the sums of as many last goals, which are not to be made small but
     kept within; ``scenarios``: of the same scene in other states of the world: what is largest in
     any of them counts, and limits and standing hold in all. By default that of ``engine`` alone.
+    ``over``: what is made of their totals, if the goal is a sum; ``weights``: by scenario, of its
+    sum in that goal, in place of the largest.
     ``resources``: who solves grip sets, and where answers are kept; the proof believes none of
     these.
     """
@@ -67,12 +78,14 @@ class States(Shown):
     settled: tuple[Standing, ...] = ()
     budgets: tuple[float, ...] = ()
     scenarios: tuple[Engine, ...] = ()
+    over: RobustAim = WORST_PEAK
+    weights: tuple[float, ...] = ()
     resources: Resources = HERE
 
     def __repr__(self) -> str:
-        caps = zip(self.goals[len(self.aims) :], self.budgets, strict=True)
+        caps = zip(self.names[len(self.aims) :], self.budgets, strict=True)
         capped = [f"{goal} <= {cap:g}" for goal, cap in caps]
-        goals = ", ".join([*map(str, self.aims), *capped])
+        goals = ", ".join([*self.names[: len(self.aims)], *capped])
         where = f"{self.network.scene.name!r}"
         if isinstance(self.rules, Schedule):
             where += f", {self.rules.method!r}"
@@ -83,7 +96,18 @@ class States(Shown):
     @cached_property
     def each(self) -> tuple[States, ...]:
         """The same problem in every scenario by itself; none where there are no scenarios."""
-        return tuple(replace(self, engine=engine, scenarios=()) for engine in self.scenarios)
+        alone = replace(self, scenarios=(), over=WORST_PEAK, weights=())
+        return tuple(replace(alone, engine=engine) for engine in self.scenarios)
+
+    @property
+    def totals(self) -> bool:
+        """Whether totals of scenarios count, not the worst steps in any."""
+        return self.over.aim is Aim.SUM
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What every goal is called."""
+        return (str(self.over),) if self.totals else tuple(map(str, self.goals))
 
     @property
     def network(self) -> Network:
@@ -279,12 +303,18 @@ class States(Shown):
         """Return the largest values in all scenarios; what one rules out the next is not asked."""
         out = np.zeros((len(states), len(self.goals)))
         within = np.ones(len(states), dtype=bool)
-        for values in valued:
+        for number, values in enumerate(valued):
             rows = np.flatnonzero(within & (out[:, 0] <= most))
             found, ok = values(states[rows])
-            out[rows], within[rows] = np.maximum(out[rows], found), ok
+            out[rows], within[rows] = self.joined(out[rows], found, number), ok
         out[~within] = np.inf
         return out, within
+
+    def joined(self, before: Floats, values: Floats, number: int) -> Floats:
+        """Return values over the scenarios before one, that of a number, and with it, (n, g)."""
+        if self.weights:
+            return before + self.weights[number] * values
+        return np.maximum(before, values)
 
     @cached_property
     def stability(self) -> StandingSets:
@@ -415,23 +445,30 @@ def within(problem: States, caps: Mapping[str, float]) -> States:
     return replace(problem, goals=(*problem.goals, *goals), budgets=caps_of)
 
 
-def over_scenarios(problem: States, scenes: Sequence[Scene]) -> States:
-    """Return a problem whose worst values count in any of some scenarios.
+def over_scenarios(
+    problem: States, scenes: Sequence[Scene], over: RobustAim = WORST_PEAK
+) -> States:
+    """Return a problem whose worst values count in any of some scenarios, or totals over them.
 
     Limits and standing hold in all of them. The criterion keeps the numbers of the scene that it
-    was posed for. A `ProblemError` names a goal that adds up responses: the worst total of any
-    scenario is no total of worst states.
+    was posed for. A `ProblemError` names a goal that is no worst value, or not the one sum of which
+    totals are made.
     """
-    for goal in problem.goals:
-        if goal.measure is Measure.SUM:
-            raise ProblemError(
-                f"aim {goal}: the worst total of scenarios is no total of worst states; take worst "
-                "values, or a schedule with open grips without an aim of its own"
-            )
+    sums = [goal for goal in problem.goals if goal.measure is Measure.SUM]
+    if over.aim is Aim.SUM and problem.goals != (*sums,)[:1]:
+        raise ProblemError(
+            f"robust aim {over}: it is made of one sum alone; leave other aims and budgets out, or "
+            "give worst-peak"
+        )
+    if over.aim is Aim.PEAK and sums:
+        raise ProblemError(
+            f"aim {sums[0]}: the worst total of scenarios is no total of worst states; give "
+            "worst-total, or take worst values"
+        )
     for number, scene in enumerate(scenes, start=1):
         require_alike(problem.network.scene, scene, number)
     engines = tuple(engine_for(problem.engine, scene) for scene in scenes)
-    return replace(problem, scenarios=engines)
+    return replace(problem, scenarios=engines, over=over)
 
 
 def _goals(given: Sequence[Goal] | str) -> tuple[Goal, ...]:

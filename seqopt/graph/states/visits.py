@@ -170,6 +170,37 @@ class FreeStates:
         return self.problem.space.ended(states)
 
 
+class ScenarioSums(FreeStates):
+    """The same with a sum for every scenario in the place of the goal."""
+
+    @property
+    def peaks(self) -> tuple[bool, ...]:
+        """None."""
+        return (False,) * len(self.problem.each)
+
+    @property
+    def floors(self) -> bool:
+        """None."""
+        return False
+
+    def values(
+        self, part: int, states: Ints, *, rough: bool, most: float = np.inf
+    ) -> tuple[Floats, Bools]:
+        """Return what the goal takes of states in every scenario, and which are allowed in all."""
+        out = np.full((len(states), len(self.peaks)), np.inf)
+        rows = np.arange(len(states))
+        for k, problem in enumerate(self.problem.each):
+            asked = problem.standing_values if self.standing else problem.values
+            found, allowed = asked(part, states[rows])
+            out[rows, k] = found[:, 0]
+            rows = rows[allowed]
+        return out, np.isin(np.arange(len(states)), rows)
+
+    def amounts(self, values: Floats, taken: Floats) -> Floats:
+        """Return the values of the states that moves lead to."""
+        return values
+
+
 def move_amounts(problem: States, values: Floats, taken: Floats) -> Floats:
     """Return what goals take of moves, (m, g).
 

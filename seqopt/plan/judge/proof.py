@@ -59,10 +59,10 @@ def _worst(problem: States, bricks: int, grips: Ints, most: float) -> Answers:
     """Return the largest of all scenarios, of what is passed by those before."""
     out = np.zeros((len(grips), len(problem.goals)))
     forces, fit = np.zeros(grips.shape), np.ones(len(grips), dtype=bool)
-    for each in problem.each:
+    for number, each in enumerate(problem.each):
         rows = np.flatnonzero(fit & (out[:, 0] <= most))
         found = ask(each, bricks, grips[rows])
-        out[rows] = np.maximum(out[rows], found.worth)
+        out[rows] = problem.joined(out[rows], found.worth, number)
         forces[rows], fit[rows] = np.maximum(forces[rows], found.forces), found.fit
     return Answers(out, forces, fit)
 

@@ -10,6 +10,7 @@ judged but the states that it visited, on which only the time depends.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -49,16 +50,11 @@ def judge_schedule(
     else only bounds that were claimed are. Raises `SolverError` if a value is not what was claimed,
     a limit is exceeded, or a plan is better than promised; `StepError` if a step breaks a rule.
     """
-    if isinstance(problem.rules, Schedule):
-        check_scheduled(problem.rules, steps)
-    else:
-        check_free(problem.network, problem.rules, steps)
-    values = plan_values(problem, steps, selection.objective)
-    for goal, value, claimed in zip(problem.goals, values, selection.objective, strict=True):
-        if not abs(value - claimed) <= TOLERANCE * max(abs(value), abs(claimed)):
-            raise SolverError(f"{goal} is {value:.9g}, not {claimed:.9g} as claimed")
+    values = _as_claimed(problem, selection, steps)
     if selection.stopped:
         return _stopped(values)
+    if problem.totals:
+        return _over_totals(problem, selection, values[0], hint)
     proof = Proof(problem, hint)
     if problem.budgets:
         return _within_budgets(problem, selection, values, proof)
@@ -69,6 +65,19 @@ def judge_schedule(
             raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
     gaps = [(v - b) / (abs(v) or 1.0) for v, b in zip(values, bounds, strict=True)]
     return Certificate(values, bounds, max(gaps), max(gaps), {}, proof.states)
+
+
+def _as_claimed(problem: States, selection: StatePath, steps: Sequence[Step]) -> tuple[float, ...]:
+    """Return the values of steps that keep the rules, if they are those that are claimed."""
+    if isinstance(problem.rules, Schedule):
+        check_scheduled(problem.rules, steps)
+    else:
+        check_free(problem.network, problem.rules, steps)
+    values = plan_values(problem, steps, selection.objective)
+    for goal, value, claimed in zip(problem.names, values, selection.objective, strict=True):
+        if not abs(value - claimed) <= TOLERANCE * max(abs(value), abs(claimed)):
+            raise SolverError(f"{goal} is {value:.9g}, not {claimed:.9g} as claimed")
+    return values
 
 
 def _bounds(problem: States, proof: Proof, values: tuple[float, ...]) -> tuple[float, ...]:
@@ -109,6 +118,27 @@ def _within_budgets(
     return Certificate(values, (*bounds, *values[aims:]), left, left, {}, proof.states)
 
 
+def _over_totals(
+    problem: States, selection: StatePath, value: float, hint: Hint | None
+) -> Certificate:
+    """Return the certificate of a total over scenarios: weights bound it by one weighted sum.
+
+    Any weights from zero to the largest of the aim that add up to one or less prove a bound.
+    """
+    count, most = len(problem.each), problem.over.most(len(problem.each))
+    if [*map(len, selection.prices)] != [count]:
+        raise SolverError("there is no weight for every scenario")
+    weights = np.clip(selection.prices[0], 0.0, most)
+    weights /= max(1.0, float(weights.sum()))
+    proof = Proof(replace(problem, weights=tuple(weights.tolist())), hint)
+    bound = min(value, proof.bounds((value,))[0])
+    claimed = min(value, max(bound, selection.bound[0]))
+    if claimed > value - BELOW * abs(value):
+        claimed = value
+    gap, left = ((value - b) / (abs(value) or 1.0) for b in (bound, claimed))
+    return Certificate((value,), (bound,), gap, left, {}, proof.states)
+
+
 def _stopped(values: tuple[float, ...]) -> Certificate:
     """Return the certificate of a search that ended early: its bounds are claimed, not proven."""
     none = (-np.inf,) * len(values)
@@ -126,14 +156,7 @@ def plan_values(
     less of a margin.
     """
     if problem.each:
-        worth = [plan_values(each, steps, claimed) for each in problem.each]
-        worst = np.max(worth, axis=0).tolist()
-        if any(goal.measure is Measure.TRAVEL for goal in problem.goals):  # as it is planned
-            worst = [
-                _travel_of(problem, steps) if goal.measure is Measure.TRAVEL else value
-                for goal, value in zip(problem.goals, worst, strict=True)
-            ]
-        return tuple(worst)
+        return _in_all(problem, steps, [plan_values(each, steps, claimed) for each in problem.each])
     table = analyze(problem.engine, steps)
     columns = state_columns(problem, table)
     _require_limits(problem, columns)
@@ -153,6 +176,18 @@ def plan_values(
             costs = _costs(problem, goal, columns, len(steps))
             out.append(float(costs.max() if goal.measure is Measure.PEAK else costs.sum()))
     return tuple(out)
+
+
+def _in_all(
+    problem: States, steps: Sequence[Step], found: Sequence[tuple[float, ...]]
+) -> tuple[float, ...]:
+    """Return the largest of what goals take in scenarios, or what is made of their totals."""
+    if problem.totals:
+        return (problem.over.value(np.array(found)[:, 0]),)
+    return tuple(
+        _travel_of(problem, steps) if goal.measure is Measure.TRAVEL else max(values)
+        for goal, values in zip(problem.goals, zip(*found, strict=True), strict=True)
+    )  # ways are as they are planned
 
 
 def _require_limits(problem: States, columns: Mapping[str, np.ndarray]) -> None:
