@@ -34,15 +34,15 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.plan.front import find_front
 from seqopt.plan.solving import pose
+from seqopt.report._style import BLUE, DPI, GRAY, GREEN, VERMILION, new_figure, plain, styled
 from seqopt.report.charts import draw_responses, front_figure
 from seqopt.report.comparison import method_tables
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, force_key
-from seqopt.report.style import BLUE, DPI, GRAY, GREEN, VERMILION, new_figure, plain, styled
 from seqopt.report.text import in_words
 from seqopt.scene.boxes import boxes
 from seqopt.scene.library import DomeShape, WallShape, chain, dome, wall
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import WORST_RATIO, as_printed, printed_steps
 

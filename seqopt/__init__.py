@@ -42,7 +42,7 @@ _HOMES = {
     "problem.requirements": ("Limit",),
     "problem.problem": ("Problem",),
     "plan.calling.formulation": ("Formulation", "formulations"),
-    "sequence.free_rules": ("FreeRules",),
+    "sequence.rules": ("FreeRules",),
     "plan.solving": ("pose", "solve"),
     "workflow": ("optimize",),
     "scene.scenarios": ("scenarios",),

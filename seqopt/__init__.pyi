@@ -24,7 +24,7 @@ from seqopt.scene.scenarios import scenarios as scenarios
 from seqopt.scene.scene import Scene as Scene
 from seqopt.scene.scene_file import load_scene as load_scene
 from seqopt.scene.scene_file import save_scene as save_scene
-from seqopt.sequence.free_rules import FreeRules as FreeRules
+from seqopt.sequence.rules import FreeRules as FreeRules
 from seqopt.sequence.schedule import Schedule as Schedule
 from seqopt.sequence.schedule_file import read_plan as read_plan
 from seqopt.sequence.schedule_file import read_schedule as read_schedule

@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable
 from types import FrameType
 
-INTERRUPTED, FAILED = 130, 4  # as seqopt.cli.answer has it, which may not be there yet
+INTERRUPTED, FAILED = 130, 4  # as seqopt._cli.answer has it, which may not be there yet
 LEAST = 400e6  # bytes of addresses with which a program starts
 AGAIN = 0.05  # s after which an interrupt that was lost is raised again
 
@@ -26,7 +26,7 @@ def run() -> int:
         _open_streams()
         _answer_signals(_leave)  # libraries that are being loaded may lose what is raised in them
         _require_room()
-        from seqopt.cli.main import load, main  # noqa: PLC0415  # what an interrupt may meet
+        from seqopt._cli.main import load, main  # noqa: PLC0415  # what an interrupt may meet
 
         load(sys.argv[1:])
 

@@ -20,10 +20,10 @@ from seqopt.problem.criteria import WORST_OVER_METHODS
 from seqopt.problem.problem import WORST_PEAK, Orders, Problem
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.responses.resources import Resources
-from seqopt.scene.checks import short
+from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.free_rules import FREE, FreeRules, with_robots
+from seqopt.sequence.rules import FREE, FreeRules, with_robots
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.study.published import EQUATIONS, find_criterion

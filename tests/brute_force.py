@@ -12,8 +12,8 @@ from seqopt.errors import MechanismError
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses.quantities import CHOSEN_BY, lengths
-from seqopt.sequence.free_check import RuleBook
-from seqopt.sequence.free_rules import Payload
+from seqopt.sequence._rule_check import RuleBook
+from seqopt.sequence.rules import Payload
 from seqopt.sequence.steps import StepKind
 
 FOUR = ("F_largest", "M_sup", "T_max", "D_max")

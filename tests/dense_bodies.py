@@ -13,9 +13,9 @@ from scipy import linalg, sparse
 
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Fields
-from seqopt.engines.rigid.mixed import Solution, respond
+from seqopt.engines.rigid._mixed import Solution, respond
 from seqopt.errors import SolverError
-from seqopt.network.mechanics import build_statics, node_motion
+from seqopt.network._mechanics import build_statics, node_motion
 from seqopt.network.network import GROUND, Network
 
 SETTLED = 1e-14  # relative change of an answer that is settled

@@ -12,7 +12,7 @@ from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Anywhere, Robot, Side, Sphere
-from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.rules import FreeRules
 from seqopt.study.published import ROBOTS
 from tests.builders import about_vertical, from_both_sides, moved
 

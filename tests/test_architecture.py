@@ -11,15 +11,15 @@ import networkx as nx
 import pytest
 
 from experiments.harness.claim import claims
-from seqopt.cli.arguments import COMMANDS
-from seqopt.showing import DISPLAYS
+from seqopt._cli.arguments import COMMANDS
+from seqopt._showing import DISPLAYS
 
 ROOT = Path(__file__).resolve().parent.parent
 
 ROOMS = (
-    {"arrays", "errors", "interrupts", "plugins"},
-    {"files", "work"},
-    {"showing"},
+    {"arrays", "errors", "_interrupts"},
+    {"_files", "work"},
+    {"_showing"},
     {"scene"},
     {"network"},
     {"sequence", "contact"},
@@ -31,7 +31,7 @@ ROOMS = (
     {"study"},
     {"workflow"},
     {"report"},
-    {"cli"},
+    {"_cli"},
     {"__init__", "__main__"},
 )  # a room imports from rooms above it in this list only
 SOLVERS = {"cvxpy", "clarabel", "highspy"}
@@ -40,8 +40,9 @@ SHARED = {  # what formulations may import
     "formulations.solvers",
     "formulations.states.on_graph",
     "formulations.whole_program",
-    "formulations.weights",
-    "formulations.states.totals",
+    "formulations._weights",
+    "formulations.states._search",
+    "formulations.states._totals",
 }
 MECHANICS = {"network.mechanics", "engines.rigid"}  # not for the frame
 LINES, LINES_OF_A_FUNCTION = 300, 50  # of code; imports, docstrings and comments aside
@@ -133,9 +134,9 @@ def hidden_arrows(files: list[Path]) -> list[str]:
 
 def test_rooms_are_looked_up_in_three_places_only():
     """The door opens every room; values find what draws them, commands are in their own room."""
-    known = ["seqopt", "seqopt.cli.arguments", "seqopt.showing"]
+    known = ["seqopt", "seqopt._cli.arguments", "seqopt._showing"]
     assert hidden_arrows(sources("seqopt")) == known
-    commands = {f"seqopt.cli.{command.module}" for command in COMMANDS.values()}
+    commands = {f"seqopt._cli.{command.module}" for command in COMMANDS.values()}
     assert commands <= set(graph("seqopt"))
     assert {room(module) for module in DISPLAYS.values()} == {"report"}
 
@@ -151,10 +152,10 @@ def test_a_hidden_arrow_is_seen(tmp_path, monkeypatch, name):
 
 def test_an_arrow_against_the_order_is_seen():
     modules = graph("seqopt")
-    modules.add_edge("seqopt.scene.scene", "seqopt.engines.rigid.operator")
+    modules.add_edge("seqopt.scene.scene", "seqopt.engines.rigid._operator")
     modules.add_edge("seqopt.nowhere", "seqopt.scene.scene")
     seen = wrong_arrows(modules)
-    assert "seqopt.scene.scene imports seqopt.engines.rigid.operator" in seen
+    assert "seqopt.scene.scene imports seqopt.engines.rigid._operator" in seen
     assert "seqopt.nowhere is in no layer" in seen
 
 
@@ -165,7 +166,7 @@ def test_no_circles(folder):
 
 def test_a_circle_is_seen():
     modules = graph("seqopt")
-    a, b = "seqopt.scene.scene", "seqopt.scene.checks"
+    a, b = "seqopt.scene.scene", "seqopt.scene._checks"
     assert (a, b) in modules.edges
     modules.add_edge(b, a)
     assert circles(modules)
@@ -203,7 +204,7 @@ def test_the_frame_shares_no_mechanics():
     """It may ask rigid bricks whether there is a mechanism; its answers are its own."""
     found = imports(ROOT / "seqopt" / "engines" / "frame.py")
     shared = {name for name in found if any(f"seqopt.{part}" in name for part in MECHANICS)}
-    assert shared == {"seqopt.engines.rigid.mechanism"}
+    assert shared == {"seqopt.engines.rigid._mechanism"}
 
 
 def described(node: ast.AST) -> bool:
@@ -277,7 +278,7 @@ def rooms() -> set[str]:
 
 def untested(names: set[str]) -> set[str]:
     """Return the rooms that no folder of tests mirrors."""
-    return {name for name in names if not list((ROOT / "tests" / name).glob("test_*.py"))}
+    return {name for name in names if not list((ROOT / "tests" / name.strip("_")).glob("test_*.py"))}
 
 
 def test_every_room_has_a_folder_of_tests():

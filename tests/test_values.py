@@ -11,30 +11,30 @@ import pytest
 from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue
-from seqopt.contact.elastic_limits import face_quadrature, find_elastic_limits
+from seqopt.contact._elastic_limits import face_quadrature, find_elastic_limits
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import EPOXY
+from seqopt.engines._planar import Plane
 from seqopt.engines.diagnosis import diagnose
-from seqopt.engines.discrete.engine import held_nodes
-from seqopt.engines.discrete.equilibrium_path import settle
-from seqopt.engines.discrete.system import build_system
+from seqopt.engines.discrete._equilibrium_path import settle
+from seqopt.engines.discrete._system import build_system
+from seqopt.engines.discrete.engine import _held_nodes
 from seqopt.engines.interface import SPACE, Fields, Want
-from seqopt.engines.planar import Plane
+from seqopt.engines.rigid._growth import grow_tree
+from seqopt.engines.rigid._mechanism import rigid_structure, share, ungripped_system
+from seqopt.engines.rigid._mixed import Solution, mixed_system
+from seqopt.engines.rigid._operator import OperatorBuilder
+from seqopt.engines.rigid._response_maps import ResponseMaps, scene_maps
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.growth import grow_tree
-from seqopt.engines.rigid.mechanism import rigid_structure, share, ungripped_system
-from seqopt.engines.rigid.mixed import Solution, mixed_system
-from seqopt.engines.rigid.operator import OperatorBuilder
-from seqopt.engines.rigid.response_maps import ResponseMaps, scene_maps
+from seqopt.network._mechanics import build_statics
 from seqopt.network.build import build_network
-from seqopt.network.mechanics import build_statics
 from seqopt.scene.boxes import boxes
 from seqopt.scene.imports.contacts import flat_face, touching_faces
-from seqopt.scene.library.joints import overlaps
+from seqopt.scene.library._joints import overlaps
 from seqopt.scene.shape import Surface
+from seqopt.stability._held_states import HoldingForces, Known, first_directions
+from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import assess, bonded
-from seqopt.stability.held_states import HoldingForces, Known, first_directions
-from seqopt.stability.prover import Prover
 from tests.blocks import box
 
 COMPRESSED = (sparse.csr_array, sparse.csc_array)
@@ -48,7 +48,7 @@ def values(arch25):
     grips = np.array([2])
     assembly = step_assembly(network, 2, (2, None, None))
     system = build_system(network, 2, EPOXY, None)
-    held = held_nodes(network, system, grips, network.node_position[network.inner.ravel()[grips]])
+    held = _held_nodes(network, system, grips, network.node_position[network.inner.ravel()[grips]])
     parts = ungripped_system(network, 2)
     proven = Prover(assembly, _compiled())(bonded(assembly, EPOXY))
     plane = Plane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.eye(3)[[0, 2]])

@@ -7,15 +7,15 @@ import pandas as pd
 import pytest
 
 import seqopt
-from seqopt.cli.values import parse_options
-from seqopt.engines.auto import AutoEngine
+from seqopt._cli.values import parse_options
+from seqopt.engines._auto import AutoEngine
+from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
-from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SeqoptError
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.plan.calling.guard import require_fit
+from seqopt.plan.calling._guard import require_fit
 from seqopt.plan.judge.certificate import judge
 from seqopt.problem.criteria import RankSum, WeightedSum, WorstRatio
 from seqopt.scene.parts import Anywhere, Robot

@@ -33,7 +33,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.report.style import BLUE, GRAY, VERMILION, new_figure, plain, styled
+from seqopt.report._style import BLUE, GRAY, VERMILION, new_figure, plain, styled
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import METHODS

@@ -38,7 +38,7 @@ from experiments.harness.claim import Claim, Finding, Option, Options
 from experiments.harness.lmgc90 import python_with_lmgc90
 from experiments.harness.results import RESULTS, stored
 from seqopt.arrays import Floats
-from seqopt.contact.elastic_limits import find_elastic_limits
+from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
 from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.interface import Want

@@ -66,12 +66,12 @@ from experiments.harness.scenes import grip_sets
 from experiments.harness.timing import best
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
-from seqopt.engines.rigid.growth import SpanningTree, grow_tree
-from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid._growth import SpanningTree, grow_tree
+from seqopt.engines.rigid._operator import OperatorBuilder
+from seqopt.engines.rigid.compliance import ComplianceEngine, _solve_batch
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.report.style import GRAY, SMALL, dress, looks, new_figure, plain, styled
+from seqopt.report._style import GRAY, SMALL, dress, looks, new_figure, plain, styled
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import load_scene
 
@@ -151,8 +151,8 @@ def growth(counts: list[int], rounds: int) -> pd.DataFrame:
             OperatorBuilder(net, tree).operator(count),
             grip_columns(net, count, sets),
         )
-        once = best(partial(solve_batch, operator, columns, ASKED), 3) / len(sets)
-        _, trusted = solve_batch(operator, columns, ASKED)
+        once = best(partial(_solve_batch, operator, columns, ASKED), 3) / len(sets)
+        _, trusted = _solve_batch(operator, columns, ASKED)
         rows.append(
             {
                 "bricks": count,

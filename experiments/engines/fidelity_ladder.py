@@ -38,14 +38,14 @@ from experiments.harness.scenes import grip_sets
 from experiments.harness.timing import best
 from seqopt.arrays import Floats, Ints, Vector
 from seqopt.contact.mortar import DRY
-from seqopt.engines.auto import AutoEngine
+from seqopt.engines._auto import AutoEngine
+from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Engine, Want
-from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.report.style import (
+from seqopt.report._style import (
     BLUE,
     GRAY,
     GREEN,

@@ -22,11 +22,11 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
 from seqopt.engines.frame import CONTRAST, FrameEngine
 from seqopt.engines.interface import Engine, Fields, grip_columns
+from seqopt.engines.rigid._mixed import solve_dense
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.mixed import solve_dense
 from seqopt.errors import SolverError
 from seqopt.network.build import build_network
-from seqopt.report.style import GRAY, SMALL, dress, looks, new_figure, styled
+from seqopt.report._style import GRAY, SMALL, dress, looks, new_figure, styled
 from seqopt.responses.table import step_fields
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step

@@ -35,13 +35,13 @@ from experiments.harness.scenes import half_circle, running_bond
 from seqopt.engines.registry import make_engine
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.responses.blocks import StepChoices
-from seqopt.responses.choices import Evaluation
+from seqopt.responses._blocks import StepChoices
+from seqopt.responses._choices import Evaluation
 from seqopt.responses.resources import Resources
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.work.workers import hire, map_ordered
+from seqopt.work._workers import hire, map_ordered
 
 TWO = 1.6  # times as fast as one process that two have to be
 WANTED = frozenset({"T_max", "M_sup", "D_max", "F_largest"})

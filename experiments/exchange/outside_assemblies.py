@@ -40,21 +40,21 @@ from matplotlib.figure import Figure
 from experiments.harness.claim import Claim, Extra, Finding, Option, Options
 from experiments.harness.results import RESULTS
 from formulations.contact.limit_analysis import compile_equilibrium
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import EPOXY
 from seqopt.errors import SceneWarning
 from seqopt.network.build import build_network
+from seqopt.report._style import new_figure, styled
 from seqopt.report.draw import View, draw_bricks
-from seqopt.report.style import new_figure, styled
-from seqopt.scene.imports.content import Given
+from seqopt.scene.imports._content import Given
 from seqopt.scene.imports.formats import import_scene, read_content, sniffed
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.exports.formats import EXPORTS, read_folder
 from seqopt.sequence.steps import Step
-from seqopt.stability.assessment import Verdict, bonded, verdict_of
-from seqopt.stability.prover import Prover
+from seqopt.stability._prover import Prover
+from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 
 WHEEL = "compas_cra 0.8.0"
 COMMITS = {
@@ -256,7 +256,7 @@ def verdicts(scene: Scene, steps: Sequence[Step]) -> dict[str, int]:
     count: Counter[Verdict] = Counter()
     for place in places.tolist():
         assembly = step_assembly(network, steps[place].bricks, steps[place].grips)
-        count[verdict_of(Prover(assembly, compile_equilibrium)(bonded(assembly, EPOXY)))] += 1
+        count[_verdict_of(Prover(assembly, compile_equilibrium)(bonded(assembly, EPOXY)))] += 1
     kinds = (Verdict.STANDS, Verdict.FALLS, Verdict.UNDECIDED)
     return dict(zip(("stands", "falls", "open"), (count[kind] for kind in kinds), strict=True))
 

@@ -24,7 +24,7 @@ ONE_CORE = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MK
 
 def save_figure(figure: Figure, name: str) -> None:
     """Write a figure of the documentation."""
-    from seqopt.report.style import DPI  # noqa: PLC0415  # an extra
+    from seqopt.report._style import DPI  # noqa: PLC0415  # an extra
 
     FIGURES.mkdir(exist_ok=True)
     figure.savefig(FIGURES / name, dpi=DPI, metadata={"Software": None})

@@ -6,7 +6,7 @@ whatever engine it was made with; ``error`` is the largest difference of the eng
 the reference's, over the largest of each kind in its state. Times are medians of repeats; where
 there are several, one run before them does not count. Stages before the choice are shared by all
 formulations. One more row is the search that solves only the models it meets and proves nothing
-(`seqopt.plan.search.window_search`).
+(`seqopt.plan.search._window_search`).
 
 Command: ``python -m experiments.harness.runs SCENE ENGINE CRITERION REPEATS`` prints rows as JSON.
 """
@@ -24,7 +24,7 @@ from typing import TypeVar
 import numpy as np
 
 from experiments.harness.scenes import longer
-from seqopt.engines.auto import AutoEngine
+from seqopt.engines._auto import AutoEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Engine

@@ -41,7 +41,16 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import Layers
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.report.style import BLUE, GRAY, SMALL, VERMILION, name_panels, new_figure, plain, styled
+from seqopt.report._style import (
+    BLUE,
+    GRAY,
+    SMALL,
+    VERMILION,
+    name_panels,
+    new_figure,
+    plain,
+    styled,
+)
 from seqopt.scene.scene_file import load_scene
 from seqopt.study.published import paper_models
 

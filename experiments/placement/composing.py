@@ -25,7 +25,7 @@ from typing import Any
 import pandas as pd
 
 from experiments.harness.claim import Claim, Finding, Options, Times
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 
 SCENE = "chain:bricks=7"
 OPEN = """step,type,bricks,rob1_node,rob2_node,rob3_node

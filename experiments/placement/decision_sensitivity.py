@@ -44,9 +44,9 @@ from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import find_formulation
 from seqopt.plan.solving import solve
 from seqopt.problem.requirements import Criterion, SceneFacts
-from seqopt.report.style import dress, looks, new_figure, styled
+from seqopt.report._style import dress, looks, new_figure, styled
 from seqopt.report.text import in_words
-from seqopt.scene.scenarios import shifted, stiffened, weighed
+from seqopt.scene.scenarios import _stiffened, shifted, weighed
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import Schedule
@@ -81,7 +81,7 @@ def perturbed(scene: Scene, kind: str, size: float, seed: int) -> Scene:
     springs, bricks = len(scene.joints) + len(scene.grounds), len(scene.bricks)
     if kind.startswith("stiffness"):
         powers = rng.uniform(-1, 1, (2, springs)) if kind == STIFFNESS else ALIKE[kind]
-        return stiffened(scene, *np.broadcast_to(size**powers, (2, springs)))
+        return _stiffened(scene, *np.broadcast_to(size**powers, (2, springs)))
     if kind.startswith("weight"):
         shares = rng.uniform(-size, size, bricks) if kind == WEIGHT else np.full(bricks, size)
         return weighed(scene, 1 + shares)

@@ -30,7 +30,7 @@ from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation, formulation_names
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve
-from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.rules import FreeRules
 from seqopt.study.published import CRITERIA
 
 SIZES = ("chain7", "chain11", "chain15", "arch25", "chain49", "chain97")

@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
 from experiments.harness.results import apart, drawn
-from seqopt.report.style import GRAY, SMALL, dress, look, new_figure, plain, styled
+from seqopt.report._style import GRAY, SMALL, dress, look, new_figure, plain, styled
 
 SOME = (7, 13, 25, 37, 49, 73)
 SIZES = {3: (7, 13, 25, 49, 73, 97, 145), 4: SOME, 5: (7, 13, 19, *SOME[2:])}

@@ -37,7 +37,7 @@ from matplotlib.figure import Figure
 from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
 from experiments.harness.results import drawn, stored
 from experiments.harness.scenes import half_circle
-from formulations.scenarios.scenario_program import solve_program
+from formulations.scenarios.scenario_program import _solve_program
 from seqopt.engines.registry import make_engine
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.scenarios import Choice, ScenarioLayers, in_scenarios
@@ -49,7 +49,7 @@ from seqopt.plan.search.in_order import least_quantile, solve_in_order
 from seqopt.plan.solving import solve
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
 from seqopt.problem.requirements import Criterion
-from seqopt.report.style import BLUE, GRAY, VERMILION, dress, new_figure, styled
+from seqopt.report._style import BLUE, GRAY, VERMILION, dress, new_figure, styled
 from seqopt.scene.scenarios import scenarios
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
@@ -125,7 +125,9 @@ def references(scene: Scene, count: int, limit: float) -> pd.DataFrame:
     for aim in (WORST_TOTAL, TAIL):
         plan = solve(most.under(aim))
         start = time.perf_counter()
-        told = solve_program(most.layered(Aim.SUM), aim.most(count), whole=True, watch=Watch(limit))
+        told = _solve_program(
+            most.layered(Aim.SUM), aim.most(count), whole=True, watch=Watch(limit)
+        )
         row = {"aim": str(aim), "scenarios": count, "objective": plan.objective[str(aim)]}
         row |= {"bound": plan.selection.bound, "solve_s": plan.seconds["solve"]}
         row |= {"program": told.value, "program_bound": told.bound}

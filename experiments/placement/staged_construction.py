@@ -35,14 +35,14 @@ from matplotlib.figure import Figure
 from experiments.harness.claim import Claim, Finding, Options, told
 from experiments.harness.results import drawn
 from seqopt.engines.interface import Engine, Fields
+from seqopt.engines.rigid._mechanism import Ungripped, ungripped_system
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.mechanism import Ungripped, ungripped_system
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.solving import pose, solve
-from seqopt.report.style import BLUE, INK, VERMILION, dress, new_figure, styled
+from seqopt.report._style import BLUE, INK, VERMILION, dress, new_figure, styled
+from seqopt.responses._staged import Placing, StagedState, next_state, staged_fields, state_fields
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, TO_1E_3MM, lengths
-from seqopt.responses.staged import Placing, StagedState, next_state, staged_fields, state_fields
 from seqopt.responses.table import step_fields
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule

@@ -83,9 +83,9 @@ from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.sequence.two_robots import METHODS
-from seqopt.stability.assessment import Verdict, assess_steps, bonded, stability_table, verdict_of
-from seqopt.stability.prover import Prover
-from seqopt.stability.screens import FALLS, OPEN, STANDS, Screen
+from seqopt.stability._prover import Prover
+from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen
+from seqopt.stability.assessment import Verdict, _verdict_of, assess_steps, bonded, stability_table
 from seqopt.study.published import EQUATIONS, published_plan
 
 BRICKS, THICKNESSES = (7, 10, 13, 16), (0.03, 0.053, 0.116)  # m
@@ -156,7 +156,7 @@ def contradictions(network: Network, bricks: int, sets: Ints, found: Ints, morta
     for i in rng.choice(len(sets), min(SAMPLE, len(sets)), replace=False).tolist():
         grips = [nodes[place - 1] if place else None for place in sets[i].tolist()]
         assembly = step_assembly(network, bricks, grips)
-        proven = verdict_of(Prover(assembly, compile_equilibrium)(bonded(assembly, mortar)))
+        proven = _verdict_of(Prover(assembly, compile_equilibrium)(bonded(assembly, mortar)))
         own = VERDICTS.get(int(found[i]), Verdict.UNDECIDED)
         wrong += Verdict.UNDECIDED not in (own, proven) and own is not proven
     return wrong

@@ -61,9 +61,9 @@ from experiments.stability.parts.witness_cra import (
 from experiments.stability.parts.witness_lmgc90 import moved_by
 from experiments.stability.parts.witness_scenes import Scene, arch, incline, scene_of
 from seqopt.contact.mortar import Mortar
-from seqopt.stability.assessment import Verdict, bonded, verdict_of
+from seqopt.stability._prover import Prover
+from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.limit_analysis import compile_equilibrium
-from seqopt.stability.prover import Prover
 
 SOONER = 5.0
 OPEN = Verdict.UNDECIDED.value
@@ -147,7 +147,7 @@ def ours(trial: Trial) -> tuple[Verdict, float]:
     assembly = trial.scene.assembly(trial.density or 1.0)
     prove = Prover(assembly, compile_equilibrium)
     stand = prove(bonded(assembly, Mortar(friction=trial.friction)))
-    return verdict_of(stand), stand.value
+    return _verdict_of(stand), stand.value
 
 
 def row_of(trial: Trial, python: str | None, *, aside: bool) -> dict[str, object]:

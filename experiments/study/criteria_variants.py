@@ -35,9 +35,9 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import TIED, rank_choice, rank_of
 from seqopt.network.build import build_network
-from seqopt.problem.criteria import RankSum, equal, mean_ranks
-from seqopt.report.style import BLUE, GRAY, GREEN, PURPLE, VERMILION, dress, new_figure, styled
-from seqopt.responses.choices import StepChoices
+from seqopt.problem.criteria import RankSum, _mean_ranks, equal
+from seqopt.report._style import BLUE, GRAY, GREEN, PURPLE, VERMILION, dress, new_figure, styled
+from seqopt.responses._choices import StepChoices
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION, published_choice
@@ -110,10 +110,10 @@ def _ranks(values: list[Floats], name: str, rule: Rule) -> Floats:
     size = dict(RESOLUTION)[name[0]] * rule.rounded
     steps = np.array(values) / size
     joined: dict[str, Callable[[], Floats]] = {
-        "sum of rounded": lambda: mean_ranks(np.round(steps).sum(axis=0)),
-        "rounded sum": lambda: mean_ranks(np.round(steps.sum(axis=0))),
-        "rounded largest": lambda: mean_ranks(np.round(steps.max(axis=0))),
-        "sum of ranks": lambda: np.sum([mean_ranks(row) for row in np.round(steps)], axis=0),
+        "sum of rounded": lambda: _mean_ranks(np.round(steps).sum(axis=0)),
+        "rounded sum": lambda: _mean_ranks(np.round(steps.sum(axis=0))),
+        "rounded largest": lambda: _mean_ranks(np.round(steps.max(axis=0))),
+        "sum of ranks": lambda: np.sum([_mean_ranks(row) for row in np.round(steps)], axis=0),
     }
     return joined[rule.join]()
 

@@ -29,7 +29,7 @@ from scipy import sparse
 
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.assembly import Assembly
-from seqopt.stability.held_states import (
+from seqopt.stability._held_states import (
     Directions,
     Enough,
     HeldProgram,

@@ -72,7 +72,7 @@ class _Equilibrium:
         matrix, right = self._program(case)
         cost = self._cost.copy()
         cost[0] = case.sense.value
-        claim, x, multipliers = solve_cones(cost, matrix, right, self._cones, attempt)
+        claim, x, multipliers = _solve_cones(cost, matrix, right, self._cones, attempt)
         if claim in (Claim.STALLED, Claim.INFEASIBLE):
             x, multipliers = np.zeros_like(x), np.zeros_like(multipliers)
             x[0] = np.nan
@@ -107,7 +107,7 @@ def _first_of(values: Floats, rows: int) -> Floats:
     return np.pad(values[:, None], ((0, 0), (0, rows - 1))).ravel()
 
 
-def solve_cones(
+def _solve_cones(
     cost: Floats, matrix: sparse.csc_array, right: Floats, cones: Sequence[Any], attempt: int
 ) -> tuple[Claim, Floats, Floats]:
     """Minimize a cost (n,) where right (m,) - matrix (m, n) x is in cones, by Clarabel.

@@ -64,7 +64,7 @@ def _tight(problem: PlacementProblem) -> WholeProgram:
     if continued := sum(sizes[:-1]):
         rules.append(cp.Zero(out[:continued] @ pairs - picks[:continued]))
     program = cp.Problem(cp.Minimize(flow.cost @ pairs), rules)
-    return WholeProgram(program, picks, largest_of_each(sizes), flow.bound)
+    return WholeProgram(program, picks, _largest_of_each(sizes), flow.bound)
 
 
 def _loose(problem: PlacementProblem) -> WholeProgram:
@@ -87,12 +87,12 @@ def _loose(problem: PlacementProblem) -> WholeProgram:
         rules.append(cp.NonNeg(both - taken @ picks + np.ones(len(extra))))
         total = total + extra @ both / scale
     program = cp.Problem(cp.Minimize(total), rules)
-    return WholeProgram(program, picks, largest_of_each(costs.sizes), below(scale))
+    return WholeProgram(program, picks, _largest_of_each(costs.sizes), below(scale))
 
 
 def _epigraph(problem: PlacementProblem, *, of_layers: bool) -> WholeProgram:
     """Return the flow whose peak is above what it costs in every layer, or on every arc."""
-    flow, bound = flow_of_peaks(problem)
+    flow, bound = _flow_of_peaks(problem)
     arcs, peak = cp.Variable(len(flow.cost), boolean=True), cp.Variable(nonneg=True)
     rows = np.arange(len(flow.cost))
     if of_layers:
@@ -106,7 +106,7 @@ def _big_m(problem: PlacementProblem) -> WholeProgram:
     """Return the assignment whose peak is above every pair that is not switched off."""
     costs = problem.peaks
     costs.continuable()
-    worst, least = worst_pairs(costs)
+    worst, least = _worst_pairs(costs)
     allowed = [np.isfinite(part) for part in worst]
     size = np.concatenate([p[mask] for p, mask in zip(worst, allowed, strict=True)]) - least
     scale = float(size.max()) or 1.0
@@ -118,7 +118,7 @@ def _big_m(problem: PlacementProblem) -> WholeProgram:
     switched_off = taken.sum(axis=1) - taken @ picks  # zero where all of a pair are taken
     rules.append(cp.NonNeg(peak - size / scale + switched_off))
     program = cp.Problem(cp.Minimize(peak), rules)
-    return WholeProgram(program, picks, largest_of_each(costs.sizes), below(scale, least))
+    return WholeProgram(program, picks, _largest_of_each(costs.sizes), below(scale, least))
 
 
 def _assignment(
@@ -163,7 +163,7 @@ def _adding(ends: Ints, count: int) -> sparse.csr_array:
     return sparse.csr_array((np.ones(len(pair)), (pair, ends[end, pair])), shape=shape)
 
 
-def largest_of_each(sizes: Sequence[int]) -> Callable[[Floats], tuple[int, ...]]:
+def _largest_of_each(sizes: Sequence[int]) -> Callable[[Floats], tuple[int, ...]]:
     """Return what reads a choice from assignments of so many candidates of every move."""
     ends = np.cumsum(sizes)[:-1]
     return lambda picks: tuple(int(np.argmax(part)) for part in np.split(picks, ends))
@@ -174,15 +174,15 @@ def below(scale: float, least: float = 0.0) -> Callable[[float], float]:
     return lambda value: least + scale * (value - ACCURACY * max(abs(value), 1.0))
 
 
-def worst_pairs(costs: LayeredCosts) -> tuple[list[Floats], float]:
+def _worst_pairs(costs: LayeredCosts) -> tuple[list[Floats], float]:
     """Return the worst cost of every pair of every move (C_k-1, C_k), and their least below 0."""
     worst = [np.maximum(d, c) for d, c in zip(costs.shared, costs.single, strict=True)]
     return worst, min(0.0, *(float(part.min()) for part in worst))
 
 
-def flow_of_peaks(problem: PlacementProblem) -> tuple[LayeredFlow, Callable[[float], float]]:
+def _flow_of_peaks(problem: PlacementProblem) -> tuple[LayeredFlow, Callable[[float], float]]:
     """Return the flow whose arcs cost the worst of every pair, none below zero, and its bound."""
-    worst, least = worst_pairs(problem.peaks)
+    worst, least = _worst_pairs(problem.peaks)
     nothing = tuple(np.zeros(size) for size in problem.peaks.sizes)
     flow = layered_flow(CostProblem(LayeredCosts(nothing, tuple(p - least for p in worst))))
     return flow, lambda value: least + flow.bound(value)

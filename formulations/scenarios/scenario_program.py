@@ -37,7 +37,7 @@ class _Reference:
     choice: tuple[int, ...]
 
 
-def solve_program(
+def _solve_program(
     layers: Sequence[LayeredCosts], most: float, *, whole: bool, watch: Watch | None = None
 ) -> _Reference:
     """Return the least worst or tail total over scenarios, or a bound on it.

@@ -29,7 +29,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from formulations.weights import CLOSE, Weighed, best_weights
+from formulations._weights import CLOSE, Weighed, best_weights
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.scenarios import Choice, ScenarioArcs, ScenarioLayers, largest_of, scenario_arcs
@@ -42,7 +42,7 @@ IMPROVED = 50  # choices met that are improved move by move first
 
 
 @dataclass(frozen=True)
-class Searched:
+class _Searched:
     """The best choice, what the aim makes of its totals, and a bound on that of any choice."""
 
     choice: Choice
@@ -70,13 +70,13 @@ def solve(problem: ScenarioLayers, *, watch: Watch, width: int = WIDTH) -> Selec
     largest_of(layers)  # says if no choice is allowed in all scenarios
     arcs = scenario_arcs(layers, problem.aim)
     weighed = best_weights(arcs, watch)
-    found = close_gap(arcs, weighed, watch, width)
+    found = _close_gap(arcs, weighed, watch, width)
     weights = {str(i): float(w) for i, w in enumerate(weighed.weights, start=1)}
     end = End.STOPPED if watch.over else End.DONE
     return Selection(found.choice, found.value, found.bound, weights, end=end)
 
 
-def close_gap(arcs: ScenarioArcs, weighed: Weighed, watch: Watch, width: int = WIDTH) -> Searched:
+def _close_gap(arcs: ScenarioArcs, weighed: Weighed, watch: Watch, width: int = WIDTH) -> _Searched:
     """Return the best choice as far as it can be found, with a bound.
 
     ``weighed``: of `best_weights`; ``width``: how many beginnings are kept after every move.
@@ -89,7 +89,7 @@ def close_gap(arcs: ScenarioArcs, weighed: Weighed, watch: Watch, width: int = W
     watch.tell(value, weighed.bound)
     level = value - CLOSE * max(abs(value), abs(weighed.bound))
     if weighed.bound >= level or watch.over:
-        return Searched(choice, value, min(weighed.bound, value))
+        return _Searched(choice, value, min(weighed.bound, value))
     layers, bound = _grown(arcs, _provers(arcs, weighed), level, (watch, width))
     bound = max(bound, weighed.bound)
     last = layers[-1]
@@ -100,7 +100,7 @@ def close_gap(arcs: ScenarioArcs, weighed: Weighed, watch: Watch, width: int = W
             choice = _traced(layers, best)
             value = arcs.aim.value(arcs.totals(choice))
     watch.tell(value, min(bound, value))
-    return Searched(choice, value, min(bound, value))
+    return _Searched(choice, value, min(bound, value))
 
 
 def _provers(arcs: ScenarioArcs, weighed: Weighed) -> Floats:

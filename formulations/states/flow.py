@@ -43,7 +43,8 @@ import numpy as np
 from scipy import sparse
 
 from formulations.solvers import STOPS, Point, minimize_rows
-from formulations.states.on_graph import Choice, on_graph, worth
+from formulations.states._search import worth
+from formulations.states.on_graph import Choice, on_graph
 from seqopt.arrays import Floats
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import TIED, fewest_moves, tied

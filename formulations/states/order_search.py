@@ -29,9 +29,9 @@ from itertools import islice
 
 import numpy as np
 
-from formulations.states.on_graph import StopError, exact_best
+from formulations.states._search import StopError, exact_best
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
-from seqopt.graph.explore import Explorer, Visited
+from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.orders import (
     AllOrders,
     OrderSelection,
@@ -46,8 +46,8 @@ from seqopt.graph.paths import keep_best, lexicographic, reached
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.scene import ORDERS, Order
+from seqopt.work._workers import hire, map_ordered
 from seqopt.work.progress import Stage
-from seqopt.work.workers import hire, map_ordered
 
 FAR_BELOW = 4.0  # the best order known, over the first threshold
 GROWTH = 1.1  # of the threshold

@@ -19,8 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from formulations.states.on_graph import (
-    Choice,
+from formulations.states._search import (
     StopError,
     after_margins,
     best_order,
@@ -28,17 +27,17 @@ from formulations.states.on_graph import (
     best_total,
     narrow,
     plan_by_then,
-    shortest,
     watched,
 )
+from formulations.states.on_graph import Choice, shortest
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.explore import Explorer
+from seqopt.graph._explore import Explorer
 from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.graph.paths import lexicographic
+from seqopt.graph.states._visits import FreeStates
 from seqopt.graph.states.states import States
-from seqopt.graph.states.visits import FreeStates
+from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
-from seqopt.plan.calling.guard import StatePath
 from seqopt.responses.resources import HERE, Resources
 from seqopt.work.progress import Tell
 

@@ -40,7 +40,7 @@ from operator import le
 
 import numpy as np
 
-from formulations.states.on_graph import (
+from formulations.states._search import (
     WIDTH,
     StopError,
     Watching,
@@ -49,17 +49,17 @@ from formulations.states.on_graph import (
     best_total,
     narrow,
     plan_by_then,
-    shortest,
     watched,
 )
+from formulations.states.on_graph import shortest
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.budgets import is_beyond
-from seqopt.graph.explore import Explorer
+from seqopt.graph._budgets import is_beyond
+from seqopt.graph._explore import Explorer
 from seqopt.graph.paths import distances, tied
+from seqopt.graph.states._visits import FreeStates, floors_of_goals
 from seqopt.graph.states.states import States
-from seqopt.graph.states.visits import FreeStates, floors_of_goals
+from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
-from seqopt.plan.calling.guard import StatePath
 from seqopt.problem.problem import Measure
 from seqopt.work.progress import Tell
 

@@ -19,8 +19,8 @@ Joints stay elastic as long as the stress on their faces stays below the strengt
 [True, False]
 """
 
+from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.faces import bare_assembly, step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 

@@ -10,7 +10,7 @@ from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frozen, skew
 from seqopt.errors import SceneError
-from seqopt.network.mechanics import spread
+from seqopt.network._mechanics import spread
 from seqopt.network.network import GROUND
 
 

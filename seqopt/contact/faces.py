@@ -58,7 +58,7 @@ def _require_touching(
         raise SceneError(f"joint {name}: {wrong}")
 
 
-def face_distance(brick: Brick, normal: Floats, point: Floats) -> float:
+def _face_distance(brick: Brick, normal: Floats, point: Floats) -> float:
     """Return how far from a point the face of a brick lies along a normal into it, m."""
     frame = brick.frame
     i = int(np.abs(frame @ normal).argmax())
@@ -67,7 +67,7 @@ def face_distance(brick: Brick, normal: Floats, point: Floats) -> float:
     return float((face - point) @ outward / (normal @ outward))
 
 
-def distance_beside(polygon: Floats) -> float:
+def _distance_beside(polygon: Floats) -> float:
     """Return how far the origin lies outside the edges of a convex polygon (m, 2), m."""
     edge = np.roll(polygon, -1, axis=0) - polygon
     size = np.linalg.norm(edge, axis=1)
@@ -181,10 +181,10 @@ def _contact(network: Network, spring: int) -> tuple[str, Floats, Floats]:
     axes = _oriented(springs.axes[spring], point, between)
     common = _overlap(axes, point, between, name)
     middle = point + _centroid(common) @ axes[1:]
-    before = -face_distance(between[0], -axes[0], middle) if len(between) > 1 else 0.0
-    ends = (before, face_distance(between[-1], axes[0], middle))
+    before = -_face_distance(between[0], -axes[0], middle) if len(between) > 1 else 0.0
+    ends = (before, _face_distance(between[-1], axes[0], middle))
     _require_touching(
-        name, between, ends, distance_beside(common), float(springs.thickness[spring])
+        name, between, ends, _distance_beside(common), float(springs.thickness[spring])
     )
     return name, axes[0], np.asarray(point + common @ axes[1:])
 

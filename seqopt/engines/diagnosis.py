@@ -7,7 +7,7 @@ all is asked of the ties that springs and grips are, however soft; the smallest 
 stiffness, scaled by its diagonal, says how well it does.
 
 Deformations, wrenches and balances are written out here once more, on purpose: a check that used
-the maps of `seqopt.network.mechanics` would share their errors.
+the maps of `seqopt.network._mechanics` would share their errors.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.interface import Engine, Fields, Want, grip_columns
-from seqopt.engines.rigid.mechanism import free_motion, ungripped_system
-from seqopt.engines.rigid.mixed import MixedSystem, factorize, mixed_system, solve_mixed
+from seqopt.engines.rigid._mechanism import free_motion, ungripped_system
+from seqopt.engines.rigid._mixed import MixedSystem, factorize, mixed_system, solve_mixed
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.network import GROUND, Network
 
@@ -33,7 +33,7 @@ _SHIFT = 1e-15  # added to the scaled stiffness of a mechanism to find its mode
 _EIGENVALUE_TOLERANCE = 1e-6  # relative
 
 
-def spectrum(network: Network, bricks: int, columns: Ints) -> tuple[float, float, Floats]:
+def _spectrum(network: Network, bricks: int, columns: Ints) -> tuple[float, float, Floats]:
     """Return how the constrained stiffness, scaled by its diagonal, resists motions.
 
     The inverse is applied by the mixed system, which keeps small eigenvalues that the stiffness
@@ -272,7 +272,7 @@ def diagnose(source: Engine | Network, bricks: int, grips: ArrayLike) -> Diagnos
     network = source if isinstance(source, Network) else source.network
     numbers = np.array(grips, dtype=np.int64).reshape(1, -1)
     columns = grip_columns(network, bricks, numbers)
-    lowest, condition, mode = spectrum(network, bricks, columns[0])
+    lowest, condition, mode = _spectrum(network, bricks, columns[0])
     free = free_motion(network, bricks, columns[0]) if lowest < _LOOKED_INTO else None
     if free is not None:
         lowest, condition, mode = 0.0, np.inf, free

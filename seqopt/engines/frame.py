@@ -29,7 +29,7 @@ from seqopt.engines.interface import (
     no_sets,
     require_finite,
 )
-from seqopt.engines.rigid.mechanism import require_resistance
+from seqopt.engines.rigid._mechanism import require_resistance
 from seqopt.errors import SolverError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network, PartKind

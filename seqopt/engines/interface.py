@@ -19,7 +19,7 @@ from threadpoolctl import ThreadpoolController
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import GripError, MemoryShortError, SolverError
 from seqopt.network.network import Network
-from seqopt.work.workers import free_memory
+from seqopt.work._workers import free_memory
 
 _BUFFERS = 100e6  # bytes; taken at once: OpenBLAS waits without end for buffers it does not get
 _SOME = 200  # rows of a matrix whose product and factors need them

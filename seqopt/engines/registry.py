@@ -19,11 +19,11 @@ import numpy as np
 import scipy
 
 from seqopt.contact.mortar import Mortar, find_mortar
-from seqopt.engines.auto import AutoEngine
+from seqopt.engines._auto import AutoEngine
+from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Engine
-from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network, network_of

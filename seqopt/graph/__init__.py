@@ -15,7 +15,7 @@ arrays that no path is better.
 Best(path=(2, 3), values=(2.5, 2.0))
 """
 
-from seqopt.graph.explore import Explorer, Space, Visited
+from seqopt.graph._explore import Explorer, Space, Visited
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import Best, lexicographic
 

@@ -48,13 +48,13 @@ def potentials(graph: Graph, goal: int, value: float) -> tuple[float, Bools]:
     """Return the bound of a sum, and the moves that can be on a path of no more than a value."""
     costs = graph.amounts[:, goal]
     before, after = distances(graph, costs), distances(graph, costs, back=True)
-    bound, every = sum_bound(graph, goal, before), np.ones(len(costs), dtype=bool)
+    bound, every = _sum_bound(graph, goal, before), np.ones(len(costs), dtype=bool)
     if bound == -np.inf or after[graph.ends].any() or not _hold(after, costs, graph, back=True):
         return bound, every
     return bound, before[graph.source] + costs + after[graph.target] <= tied(value)
 
 
-def sum_bound(graph: Graph, goal: int, before: Floats) -> float:
+def _sum_bound(graph: Graph, goal: int, before: Floats) -> float:
     """Return what the sum of a path is at least, by potentials of states (n,).
 
     Minus infinity where a move takes less than the difference of its states' potentials.

@@ -10,21 +10,21 @@ from itertools import combinations
 
 import numpy as np
 
+from seqopt._showing import Shown
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine, recipe_of
 from seqopt.errors import ProblemError
-from seqopt.graph.explore import Moves
+from seqopt.graph._explore import Moves
 from seqopt.graph.paths import keep_best
+from seqopt.graph.states._visits import FreeStates, explore, move_amounts
 from seqopt.graph.states.states import States
-from seqopt.graph.states.visits import FreeStates, explore, move_amounts
 from seqopt.network.build import build_network
 from seqopt.problem.problem import LARGEST, Measure, Orders
-from seqopt.responses.blocks import Shipment, engine_of, pack
+from seqopt.responses._blocks import Shipment, engine_of, pack
 from seqopt.scene.scene import Order, Scene
-from seqopt.sequence.free_rules import Ending
-from seqopt.sequence.free_space import node_numbers, sort_entries
-from seqopt.showing import Shown
+from seqopt.sequence._rule_space import node_numbers, sort_entries
+from seqopt.sequence.rules import Ending
 
 
 @dataclass(frozen=True, repr=False)

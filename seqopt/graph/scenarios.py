@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from seqopt._showing import Shown
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
@@ -19,18 +20,17 @@ from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import Layers
 from seqopt.problem.problem import Aim, RobustAim
 from seqopt.problem.requirements import Criterion, Limit, ResponsesAsked
-from seqopt.responses.choices import Evaluation
+from seqopt.responses._choices import Evaluation
 from seqopt.responses.resources import Resources
-from seqopt.scene.checks import short
+from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
-from seqopt.showing import Shown
+from seqopt.work._workers import Crew, hire, map_ordered
 from seqopt.work.progress import Progress
-from seqopt.work.workers import Crew, hire, map_ordered
 
 
-def recipe_for(engine: Engine, scene: Scene) -> Recipe:
+def _recipe_for(engine: Engine, scene: Scene) -> Recipe:
     """Return how to make an engine for another scene; a `ProblemError` where nobody knows."""
     recipe = recipe_of(engine)
     if recipe is None:
@@ -43,7 +43,7 @@ def recipe_for(engine: Engine, scene: Scene) -> Recipe:
 
 def engine_for(engine: Engine, scene: Scene) -> Engine:
     """Return an engine of the same kind and settings for another scene."""
-    recipe = recipe_for(engine, scene)
+    recipe = _recipe_for(engine, scene)
     return make_engine(recipe.engine, recipe.scene, **recipe.options)  # type: ignore[arg-type]
 
 
@@ -82,7 +82,7 @@ class ScenarioCosts(FrozenValue):
 
 
 @dataclass(frozen=True)
-class ScenarioTask:
+class _ScenarioTask:
     """One scenario, as it is sent to a worker.
 
     ``name``: for messages; ``recipe``: of its engine; ``schedule``: the nominal one, whose steps
@@ -107,7 +107,7 @@ class ScenarioTask:
         return Layers(self.criterion, self.limits, evaluation)
 
 
-def tasks_of(problem: Layers, scenes: Sequence[Scene]) -> tuple[ScenarioTask, ...]:
+def _tasks_of(problem: Layers, scenes: Sequence[Scene]) -> tuple[_ScenarioTask, ...]:
     """Return the tasks of scenarios.
 
     ``problem``: the nominal one. Raises `ProblemError` if the engine was not made by name, so that
@@ -117,9 +117,9 @@ def tasks_of(problem: Layers, scenes: Sequence[Scene]) -> tuple[ScenarioTask, ..
     also = asked.also if isinstance(asked, ResponsesAsked) else ()
     alone = problem.evaluation.resources.alone()
     return tuple(
-        ScenarioTask(
+        _ScenarioTask(
             f"scenario {i}",
-            recipe_for(problem.engine, scene),
+            _recipe_for(problem.engine, scene),
             problem.schedule,
             problem.criterion,
             problem.limits,
@@ -130,8 +130,8 @@ def tasks_of(problem: Layers, scenes: Sequence[Scene]) -> tuple[ScenarioTask, ..
     )
 
 
-def scenario_costs(
-    tasks: Sequence[ScenarioTask], resources: Resources
+def _scenario_costs(
+    tasks: Sequence[_ScenarioTask], resources: Resources
 ) -> tuple[tuple[ScenarioCosts, ...], float]:
     """Return the costs in every scenario, and what they took.
 
@@ -149,7 +149,7 @@ def scenario_costs(
     return costs, time.perf_counter() - start
 
 
-def _costs(task: ScenarioTask) -> ScenarioCosts:
+def _costs(task: _ScenarioTask) -> ScenarioCosts:
     problem = task.problem()
     try:
         problem.require_possible()
@@ -162,7 +162,7 @@ def _costs(task: ScenarioTask) -> ScenarioCosts:
     return ScenarioCosts(sums, peaks, evaluation.models, evaluation.seconds)
 
 
-def _require_sendable(tasks: Sequence[ScenarioTask], crew: Crew | None) -> None:
+def _require_sendable(tasks: Sequence[_ScenarioTask], crew: Crew | None) -> None:
     """Raise an error if tasks are to go to other processes and cannot be sent."""
     if crew is None:
         return
@@ -304,14 +304,14 @@ class ScenarioLayers(Shown):
     @cached_property
     def _found(self) -> tuple[tuple[ScenarioCosts, ...], float]:
         resources = self.nominal.evaluation.resources
-        return scenario_costs(tasks_of(self.nominal, self.scenes), resources)
+        return _scenario_costs(_tasks_of(self.nominal, self.scenes), resources)
 
     @property
     def from_cache(self) -> Iterator[Layers]:
         """The problems of the scenarios, if their responses may come from files."""
         if self.nominal.evaluation.resources.cache is None:
             return iter(())
-        return (task.problem() for task in tasks_of(self.nominal, self.scenes))
+        return (task.problem() for task in _tasks_of(self.nominal, self.scenes))
 
     def seconds(self, aim: Aim) -> Mapping[str, float]:
         """Return what the costs of all scenarios took, of whatever aim: ``respond``, s."""
@@ -403,7 +403,7 @@ def in_scenarios(nominal: Layers, scenes: Sequence[Scene], aim: RobustAim) -> Sc
         raise ProblemError("there is no scenario; give at least one")
     for i, scene in enumerate(scenes, start=1):
         require_alike(nominal.schedule.scene, scene, i)
-    tasks_of(nominal, scenes[:1])  # says if engines for other scenes cannot be made
+    _tasks_of(nominal, scenes[:1])  # says if engines for other scenes cannot be made
     return ScenarioLayers(nominal, tuple(scenes), aim)
 
 

@@ -18,8 +18,8 @@ Linear maps give the motion of nodes from that of bricks, and edge forces from s
 ((33, 18), (77, 78))
 """
 
+from seqopt.network._mechanics import Statics, build_statics, node_motion
 from seqopt.network.build import build_network
-from seqopt.network.mechanics import Statics, build_statics, node_motion
 from seqopt.network.network import GROUND, Network, PartKind, Springs
 
 __all__ = [

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from seqopt._showing import Shown, display
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
-from seqopt.showing import Shown, display
 
 if TYPE_CHECKING:
     import networkx as nx

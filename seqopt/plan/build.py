@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from seqopt._showing import Page, Shown, display
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.responses.table import Departure, LinearRange, grips_table
 from seqopt.sequence.steps import Step
-from seqopt.showing import Page, Shown, display
 from seqopt.stability.assessment import assess_steps, stability_table
 
 if TYPE_CHECKING:

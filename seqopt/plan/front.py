@@ -13,18 +13,18 @@ import pandas as pd
 
 from seqopt.arrays import Floats, FrozenValue, Ints, Terse
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, did_you_mean
-from seqopt.graph.explore import Visited
+from seqopt.graph._explore import Visited
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
+from seqopt.graph.states._visits import explore, steps_of, steps_with, with_held
 from seqopt.graph.states.states import States
-from seqopt.graph.states.visits import explore, steps_of, steps_with, with_held
+from seqopt.plan.calling._guard import called, readable, text
 from seqopt.plan.calling.formulation import Formulation, On, as_formulation
-from seqopt.plan.calling.guard import called, readable, text
-from seqopt.plan.judge.infeasible import confirmed
+from seqopt.plan.judge._infeasible import confirmed
 from seqopt.plan.judge.schedules import plan_values
 from seqopt.plan.solving import states_of
 from seqopt.problem.problem import Measure, Problem
-from seqopt.sequence.free_rules import Ending
+from seqopt.sequence.rules import Ending
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.work.progress import Tell, told
 

@@ -18,7 +18,16 @@ from seqopt.graph.layers.layers import Layers
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.graph.states.states import States
+from seqopt.plan._status import ENDS, FoundOrder, Status
+from seqopt.plan._tables import (
+    Objectives,
+    alternatives,
+    chosen_table,
+    moves_table,
+    split_objectives,
+)
 from seqopt.plan.build import ShownBuild
+from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import (
     End,
     Finding,
@@ -27,17 +36,14 @@ from seqopt.plan.calling.formulation import (
     Reads,
     Selection,
 )
-from seqopt.plan.calling.guard import StatePath
+from seqopt.plan.judge._standing_proof import certified
 from seqopt.plan.judge.certificate import TOLERANCE, Certificate
-from seqopt.plan.judge.standing_proof import certified
-from seqopt.plan.search.window_search import WindowSearch
-from seqopt.plan.status import ENDS, FoundOrder, Status
-from seqopt.plan.tables import Objectives, alternatives, chosen_table, moves_table, split_objectives
+from seqopt.plan.search._window_search import WindowSearch
 from seqopt.problem.problem import Aim, Problem, judged_by
 from seqopt.problem.requirements import Excess, overloads
-from seqopt.responses.choices import window_models
+from seqopt.responses._choices import window_models
 from seqopt.responses.table import analyze
-from seqopt.sequence.free_rules import Ending
+from seqopt.sequence.rules import Ending
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step, StepKind, idle_robots
 from seqopt.stability.assessment import stability_table

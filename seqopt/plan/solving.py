@@ -15,10 +15,10 @@ from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.scenarios import ScenarioLayers, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
+from seqopt.plan._layers import solve_layers, with_budgets
+from seqopt.plan._states import solve_orders, solve_states
 from seqopt.plan.calling.formulation import Formulation, On, Run, as_formulation
-from seqopt.plan.layers import solve_layers, with_budgets
 from seqopt.plan.plan import Plan
-from seqopt.plan.states import solve_orders, solve_states
 from seqopt.problem.problem import (
     WORST_PEAK,
     Aim,
@@ -35,7 +35,7 @@ from seqopt.problem.standing import Standing
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
-from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 
 Graph = Layers | ScenarioLayers | States | AllOrders

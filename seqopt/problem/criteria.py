@@ -21,7 +21,7 @@ from seqopt.arrays import Floats, Terse
 from seqopt.errors import ProblemError, said
 from seqopt.problem.requirements import NEVER, ROUNDED, ChoiceResponses, SceneFacts
 from seqopt.responses.quantities import robot_response
-from seqopt.scene.checks import short
+from seqopt.scene._checks import short
 
 
 class Ranked(Enum):
@@ -38,23 +38,23 @@ class Among(Enum):
     POSSIBLE = "possible"  # without those that the choice before it makes impossible
 
 
-def ranks_of(values: Floats, choices: int, ranked: Ranked) -> Floats:
+def _ranks_of(values: Floats, choices: int, ranked: Ranked) -> Floats:
     """Return mean ranks of the choices in a step.
 
-    ``values`` ((C,) or (C, D) float): as in `scaled_ranks`; ``choices``: how many candidates the
+    ``values`` ((C,) or (C, D) float): as in `_scaled_ranks`; ``choices``: how many candidates the
     move has that decides the step; ``ranked``: what pairs are ranked among. Result ((C,) or (C, D)
     float).
     """
     if values.ndim == 2 and ranked is Ranked.CONDITIONAL:
-        return row_ranks(values, choices)
-    return scaled_ranks(values, choices)
+        return _row_ranks(values, choices)
+    return _scaled_ranks(values, choices)
 
 
-def row_ranks(values: Floats, choices: int) -> Floats:
+def _row_ranks(values: Floats, choices: int) -> Floats:
     """Return mean ranks, from 1, of values rounded to whole numbers, every row for itself.
 
     ``values`` (C, D): in units of their resolution; NaN where a choice is impossible; ``choices``:
-    all ranks are the mean of 1 and this where all values are NaN. Result (C, D): as `scaled_ranks`
+    all ranks are the mean of 1 and this where all values are NaN. Result (C, D): as `_scaled_ranks`
     of each row; NaN stays NaN where any value is known.
     """
     known = np.isfinite(values)
@@ -75,7 +75,7 @@ def row_ranks(values: Floats, choices: int) -> Floats:
     return np.where(known, ranks, np.nan)
 
 
-def scaled_ranks(values: Floats, choices: int) -> Floats:
+def _scaled_ranks(values: Floats, choices: int) -> Floats:
     """Return mean ranks of values rounded to whole numbers.
 
     ``values`` ((C,) or (C, D) float): in units of their resolution; NaN where a choice is
@@ -87,12 +87,12 @@ def scaled_ranks(values: Floats, choices: int) -> Floats:
     out = np.full(flat.shape, np.nan)
     if not known.any():
         return np.full(values.shape, 0.5 * (choices + 1))
-    ranks = mean_ranks(np.round(flat[known]))
+    ranks = _mean_ranks(np.round(flat[known]))
     out[known] = ranks if values.ndim == 1 else (ranks - 0.5) * choices / known.sum() + 0.5
     return out.reshape(values.shape)
 
 
-def mean_ranks(values: Floats) -> Floats:
+def _mean_ranks(values: Floats) -> Floats:
     """Return ranks from 1; ties share the mean of theirs.
 
     As `scipy.stats.rankdata`, in a fifth of its time for the few values of a step.
@@ -112,7 +112,7 @@ Term = tuple[Any, ...]  # a name and its numbers
 Number = TypeVar("Number")
 
 
-def scale_of(facts: SceneFacts, response: str, given: float | None) -> float:
+def _scale_of(facts: SceneFacts, response: str, given: float | None) -> float:
     """Return the scale of a response: that which is given, or the scene's.
 
     Result: SI units. Raises `ProblemError` if none is given and the scene's methods give none.
@@ -152,7 +152,7 @@ def present(values: Floats) -> Floats:
     return np.zeros_like(values) if np.isnan(values).all() else values
 
 
-def spell_out(terms: tuple[Term, ...], robots: Sequence[str]) -> tuple[Term, ...]:
+def _spell_out(terms: tuple[Term, ...], robots: Sequence[str]) -> tuple[Term, ...]:
     """Return terms in which ``F_each`` stands once for every robot; all numbers are positive.
 
     ``robots``: their names. Raises `ProblemError` if there is no term, or a number of one is not
@@ -242,11 +242,11 @@ class RankSum(Terse):
             resolution = tuple((name, share * facts.units.of(name)) for name, share in ROUNDED)
         return replace(
             self,
-            before=spell_out(self.before, facts.robots),
-            after=spell_out(self.after, facts.robots),
+            before=_spell_out(self.before, facts.robots),
+            after=_spell_out(self.after, facts.robots),
             crown=crown,
             delay=0,
-            resolution=spell_out(resolution, ()),
+            resolution=_spell_out(resolution, ()),
         )
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
@@ -262,7 +262,7 @@ class RankSum(Terse):
         rounding = dict(known(self.resolution, self.name))
         for name, weight in terms:
             units = responses[name] / rounding[name[0]]
-            total = total + weight * ranks_of(units, choices, self.ranked)
+            total = total + weight * _ranks_of(units, choices, self.ranked)
         return total / sum(weight for _, weight in terms)
 
     def _terms(self, bricks: int) -> tuple[tuple[str, float], ...]:
@@ -299,9 +299,9 @@ class WeightedSum(Terse):
 
         ``facts``: of the scene.
         """
-        terms = spell_out(self.terms, facts.robots)
+        terms = _spell_out(self.terms, facts.robots)
         scaled = tuple(
-            (name, weight, scale_of(facts, name, scale)) for name, weight, scale in terms
+            (name, weight, _scale_of(facts, name, scale)) for name, weight, scale in terms
         )
         name = named(self.name, facts, [scale for _, _, scale in terms])
         return replace(self, name=name, terms=scaled)
@@ -349,9 +349,9 @@ class WorstRatio(Terse):
 
         ``facts``: of the scene.
         """
-        limits = spell_out(self.limits, facts.robots)
+        limits = _spell_out(self.limits, facts.robots)
         name = named(self.name, facts, [scale for _, scale in limits])
-        scaled = tuple((response, scale_of(facts, response, s)) for response, s in limits)
+        scaled = tuple((response, _scale_of(facts, response, s)) for response, s in limits)
         return replace(self, name=name, limits=scaled)
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
@@ -448,7 +448,7 @@ class StepCost:
 
         ``facts``: of the scene.
         """
-        terms = spell_out(tuple((name,) for name in self.responses), facts.robots)
+        terms = _spell_out(tuple((name,) for name in self.responses), facts.robots)
         return replace(self, responses=tuple(name for (name,) in terms))
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:

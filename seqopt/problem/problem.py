@@ -14,6 +14,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
+from seqopt._showing import Shown
 from seqopt.arrays import Floats
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
@@ -22,12 +23,11 @@ from seqopt.problem.requirements import Criterion, Limit, as_limits
 from seqopt.problem.standing import MARGINS, Standing
 from seqopt.responses.quantities import robot_response
 from seqopt.responses.resources import HERE, Resources
-from seqopt.scene.checks import short
+from seqopt.scene._checks import short
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
-from seqopt.sequence.free_rules import FREE, FreeRules
+from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
-from seqopt.showing import Shown
 
 
 class Costs(Protocol):

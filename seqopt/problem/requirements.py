@@ -19,7 +19,7 @@ from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.network import Network
 from seqopt.responses.quantities import RESPONSES, robot_response, steps_in_words
 from seqopt.responses.table import analyze, force_column
-from seqopt.scene.checks import short
+from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step
@@ -82,7 +82,7 @@ def _scene_units(network: Network) -> Units:
     return Units(weight, weight * length, weight / middle)
 
 
-def own_scales(network: Network) -> Mapping[str, float]:
+def _own_scales(network: Network) -> Mapping[str, float]:
     """Return scales that every scene has, for one that no fixed method builds.
 
     Result: SI units: of grip forces the smallest payload; of ``T_max`` the weight of the structure,
@@ -146,10 +146,10 @@ class SceneFacts:
     def reference(self) -> Mapping[str, float]:
         """The least that any fixed method reaches of each response's largest value, SI units.
 
-        Where no fixed method can build the scene, or none stands on the way: see `own_scales`.
+        Where no fixed method can build the scene, or none stands on the way: see `_own_scales`.
         """
         if not self._reached:
-            return own_scales(self.engine.network)
+            return _own_scales(self.engine.network)
         return {name: min(values[name] for values in self._reached) for name in self._reached[0]}
 
     @property

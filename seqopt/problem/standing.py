@@ -12,10 +12,10 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar, find_mortar
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
-from seqopt.responses.grip_sets import KnownRows
-from seqopt.scene.checks import short
-from seqopt.stability.margins import Margins
-from seqopt.stability.screens import FALLS, OPEN, STANDS, Screen
+from seqopt.responses._grip_sets import KnownRows
+from seqopt.scene._checks import short
+from seqopt.stability._margins import Margins
+from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen
 
 MARGINS = ("bond", "friction", "tilt")
 """What goals may ask of the stability of states, each of them to be small: the least bond (Pa, in
@@ -77,7 +77,7 @@ class Standing:
         }
 
 
-def without_implied(demands: Sequence[Standing]) -> tuple[Standing, ...]:
+def _without_implied(demands: Sequence[Standing]) -> tuple[Standing, ...]:
     """Return demands without those that another one implies."""
     out = set(demands)
     implied = {one for one in out if any(other._implies(one) for other in out - {one})}
@@ -106,7 +106,7 @@ class StandingSets:
                 "a robot without a largest force holds up anything, and says nothing of what "
                 "stands; give it a payload, or a limit on its force, and keep payloads"
             )
-        demands = without_implied(demands or (standing,))
+        demands = _without_implied(demands or (standing,))
         self._screens = [Screen(network, demand.mortar, demand.tilt) for demand in demands]
         self._margins = Margins(network, standing.mortar)
         self._network, self._mortar = network, standing.mortar

@@ -15,10 +15,8 @@ from matplotlib.ticker import LogFormatter, MaxNLocator, ScalarFormatter
 from seqopt.engines.interface import Engine
 from seqopt.plan.front import Front
 from seqopt.plan.plan import Plan
-from seqopt.report.comparison import LARGEST, Comparison, in_shown_unit, worst_of
-from seqopt.report.page import Build
-from seqopt.report.pictures import gantt_picture, steps_picture
-from seqopt.report.style import (
+from seqopt.report._pictures import gantt_picture, steps_picture
+from seqopt.report._style import (
     BLUE,
     GRAY,
     SMALL,
@@ -30,6 +28,8 @@ from seqopt.report.style import (
     plain,
     styled,
 )
+from seqopt.report.comparison import LARGEST, Comparison, in_shown_unit, worst_of
+from seqopt.report.page import Build
 from seqopt.report.text import in_words, typed
 from seqopt.study.published import PUBLISHED
 
@@ -106,7 +106,7 @@ def _maxima(result: Comparison) -> Figure:
 def _responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
     """Return the largest responses at every number of bricks; equal builds share a line."""
     plans = merged(builds)
-    tables = {_together(names): worst_steps(builds[one]) for one, names in plans.items()}
+    tables = {_together(names): _worst_steps(builds[one]) for one, names in plans.items()}
     figure = new_figure(6.6 + 0.2 * len(tables))
     figure.suptitle("Worst step at every number of bricks", x=0.01, ha="left")
     axes = figure.subplots(len(COLUMNS), 1, sharex=True)
@@ -207,7 +207,7 @@ def _ended(table: pd.DataFrame) -> pd.Series[float]:
     return table["bricks"] - 1 + (steps.cumcount() + 1) / steps["step"].transform("count")
 
 
-def worst_steps(table: pd.DataFrame) -> pd.DataFrame:
+def _worst_steps(table: pd.DataFrame) -> pd.DataFrame:
     """Return the largest responses while each number of bricks stands, a row for each."""
     return table.select_dtypes("number").groupby("bricks").max().reset_index()
 

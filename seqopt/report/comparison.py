@@ -15,10 +15,10 @@ from seqopt.graph.layers.costs import TINY
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import rank_choice, under_both
 from seqopt.graph.states.states import build_states
+from seqopt.plan._layers import on_the_way
+from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import On, formulations
-from seqopt.plan.calling.guard import StatePath
 from seqopt.plan.judge.certificate import least_sum
-from seqopt.plan.layers import on_the_way
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import RankSum, WorstRatio
@@ -28,7 +28,7 @@ from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
 from seqopt.responses.resources import Resources
 from seqopt.responses.table import Departure, LinearRange, analyze, force_column
 from seqopt.scene.scene import Scene
-from seqopt.sequence.free_rules import FREE, FreeRules
+from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule_file import MOST, find_schedule
 from seqopt.sequence.steps import AnyStep, idle_robots
 from seqopt.sequence.three_robots import modified_sequential

@@ -23,7 +23,7 @@ from matplotlib.patheffects import withStroke
 
 from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind
-from seqopt.report.style import BLUE, SMALL, VERMILION
+from seqopt.report._style import BLUE, SMALL, VERMILION
 from seqopt.scene.boxes import boxes, vertices_of
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import normal_of
@@ -104,7 +104,7 @@ def _from_lines(spots: Floats, ends: Floats) -> Floats:
     return np.asarray(np.linalg.norm(away - share[..., None] * along, axis=2).min(axis=1))
 
 
-def drawing_order(corners: Floats, toward: Floats) -> list[int]:
+def _drawing_order(corners: Floats, toward: Floats) -> list[int]:
     """Return the indices of boxes with corners (n, 8, 3) from the farthest to the nearest.
 
     ``toward`` has unit vectors to the right, up and toward the viewer (3, 3). Boxes that hide each
@@ -115,7 +115,7 @@ def drawing_order(corners: Floats, toward: Floats) -> list[int]:
     >>> low, high = np.zeros((8, 3)), np.zeros((8, 3))
     >>> low[4:, 0] = low[[2, 3, 6, 7], 1] = low[1::2, 2] = 1.0
     >>> high = low + [0.0, 0.0, 1.0]
-    >>> drawing_order(np.array([high, low]), np.eye(3))
+    >>> _drawing_order(np.array([high, low]), np.eye(3))
     [1, 0]
     """
     seen = corners @ toward.T
@@ -274,7 +274,7 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
     """
     boxed = _moved(network, bricks, twist, magnify)
     polygons, colors = [], []
-    for b in drawing_order(boxed, view.axes()):
+    for b in _drawing_order(boxed, view.axes()):
         own = MARKED if (brick := network.scene.placed[b]).name in marked else CLAY
         points, faces = _solid(brick, boxed[b], None if twist is None else magnify * twist[b])
         seen = points @ view.axes().T

@@ -20,10 +20,10 @@ from itertools import cycle
 import numpy as np
 import pandas as pd
 
+from seqopt._files import csv_text
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Want
 from seqopt.errors import ProblemError
-from seqopt.files import csv_text
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, overloads
 from seqopt.responses.quantities import number_text
@@ -94,7 +94,7 @@ class Scatter:
         }
 
 
-def structure_data(network: Network) -> dict[str, object]:
+def _structure_data(network: Network) -> dict[str, object]:
     """Return a structure as lists, ready for JSON.
 
     Edges have the points at their ends and the brick count from which they are there; ``carried``
@@ -168,7 +168,7 @@ def _carried(network: Network) -> list[list[int]]:
     return out
 
 
-def build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[str, object]:
+def _build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[str, object]:
     """Return the steps of a build as lists, ready for JSON.
 
     Rows of the table of responses are text; ``marks`` says what is wrong with each step; the packed
@@ -304,9 +304,9 @@ def _data(engine: Engine, builds: Sequence[Build], scatter: Scatter | None) -> d
     numbers = 6 * len(network.inner) + len(network.edge_nodes)  # of the fields of a step
     ends = np.cumsum([numbers * len(build.steps) for build in builds])
     return {
-        "structure": structure_data(network),
+        "structure": _structure_data(network),
         "builds": [
-            build_data(engine, build, fields=bool(end <= MOST))
+            _build_data(engine, build, fields=bool(end <= MOST))
             for build, end in zip(builds, ends, strict=True)
         ],
         "responses": RESPONSES,

@@ -30,10 +30,10 @@ bit:
 True
 """
 
-from seqopt.responses.choices import Evaluation, StepChoices
+from seqopt.responses._choices import Evaluation, StepChoices
+from seqopt.responses._staged import analyze_staged
 from seqopt.responses.quantities import RESPONSES, Response, responses_of
 from seqopt.responses.resources import Resources
-from seqopt.responses.staged import analyze_staged
 from seqopt.responses.table import analyze
 
 __all__ = [

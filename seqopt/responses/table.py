@@ -13,11 +13,11 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
-from seqopt.contact.elastic_limits import ElasticLimits, find_elastic_limits
+from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY
-from seqopt.engines.auto import AutoEngine
+from seqopt.engines._auto import AutoEngine
+from seqopt.engines.discrete._equilibrium_path import FAR
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.discrete.equilibrium_path import FAR
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.network import Network

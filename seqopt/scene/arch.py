@@ -12,8 +12,8 @@ import numpy as np
 
 from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError, SceneWarning
+from seqopt.scene._checks import short
 from seqopt.scene.boxes import as_vector, spring_fields
-from seqopt.scene.checks import short
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot, Side
 from seqopt.scene.scene import Scene
 

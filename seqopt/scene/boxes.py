@@ -15,7 +15,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import rows, short, vector, whole
+from seqopt.scene._checks import rows, short, vector, whole
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron
 
@@ -121,7 +121,7 @@ def boxes(bricks: Sequence[Brick]) -> Boxes:
     )
 
 
-def separations(bricks: Sequence[Brick]) -> tuple[Ints, Floats]:
+def _separations(bricks: Sequence[Brick]) -> tuple[Ints, Floats]:
     """Return how far bricks are apart that are near each other, as pairs (P, 2) and m (P,).
 
     Along the direction in which they are farthest apart: at most their distance, negative where
@@ -149,7 +149,7 @@ def require_apart(
     where: str, bricks: Sequence[Brick], remedy: str, deepest: float = _DEEPEST
 ) -> None:
     """Require bricks that interpenetrate by at most ``deepest`` of the smallest dimension."""
-    pairs, distance = separations(bricks)
+    pairs, distance = _separations(bricks)
     thin = min(min(brick.dimensions) for brick in bricks)
     if distance.min(initial=0.0) < -deepest * thin:
         i, j = pairs[distance.argmin()]

@@ -14,7 +14,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import (
+from seqopt.scene._checks import (
     positive,
     printable,
     rows,

@@ -16,8 +16,8 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
+from seqopt.scene._checks import short, whole_between
 from seqopt.scene.boxes import as_vector
-from seqopt.scene.checks import short, whole_between
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
 
@@ -25,7 +25,7 @@ _End = TypeVar("_End", Joint, Ground)
 _Part = TypeVar("_Part", Brick, Joint, Ground)
 
 
-def stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene:
+def _stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene:
     """Return a scene stiffer by factors (J + G,), one for every joint, then every ground end."""
 
     def stiffer(spring: _End, shift: float, turn: float) -> _End:
@@ -170,7 +170,7 @@ def _sample(
     logs = stiff.uniform(low, high, (2, len(scene.joints) + len(scene.grounds)))
     shares = heavy.uniform(-1.0, 1.0, len(scene.bricks))
     try:
-        out = weighed(stiffened(scene, *np.exp(logs)), 1.0 + density * shares)
+        out = weighed(_stiffened(scene, *np.exp(logs)), 1.0 + density * shares)
         return shifted(out, position, moved) if position else out
     except SceneError as error:
         raise SceneError(

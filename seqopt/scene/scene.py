@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
+from seqopt._showing import Shown, display
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import printable, settle, short, vector, wholes
+from seqopt.scene._checks import printable, settle, short, vector, wholes
 from seqopt.scene.parts import Brick, Ground, Joint, Reach, Robot
-from seqopt.showing import Shown, display
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -274,7 +274,7 @@ Order = tuple[int, ...]
 _PART = re.compile(r"(-?\d+)(?:\.\.(-?\d+))?")
 
 
-def from_all_ends(scene: Scene) -> Order:
+def _from_all_ends(scene: Scene) -> Order:
     """Return the order that builds from all ground ends at once, one brick each in turn."""
     graph: nx.Graph[int] = nx.Graph([joint.bricks for joint in scene.joints])
     graph.add_nodes_from(scene.build_order)
@@ -288,12 +288,12 @@ def from_all_ends(scene: Scene) -> Order:
 
 ORDERS: dict[str, Callable[[Scene], Order]] = {
     "reversed": lambda scene: scene.build_order[::-1],
-    "ends": from_all_ends,
+    "ends": _from_all_ends,
 }
 """Orders by name: the scene's own from its last brick on, and from all ground ends at once."""
 
 
-def parse_order(scene: Scene, text: str) -> Order:
+def _parse_order(scene: Scene, text: str) -> Order:
     """Return an order from a key of `ORDERS`, or names with commas between, runs as ``25..13``."""
     if text in ORDERS:
         return ORDERS[text](scene)
@@ -315,11 +315,11 @@ def parse_order(scene: Scene, text: str) -> Order:
 
 
 def in_order(scene: Scene, order: Sequence[int] | str | None) -> Scene:
-    """Return a scene built in an order: names of all bricks, or words for `parse_order`."""
+    """Return a scene built in an order: names of all bricks, or words for `_parse_order`."""
     if order is None:
         return scene
     where = f"scene {scene.name}: order"
-    given = parse_order(scene, order) if isinstance(order, str) else wholes(where, order)
+    given = _parse_order(scene, order) if isinstance(order, str) else wholes(where, order)
     _require_all(scene, given)
     return replace(scene, build_order=given)
 

@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
+from seqopt._files import read_text, write_text
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
-from seqopt.files import read_text, write_text
-from seqopt.scene.checks import reading_json, short
+from seqopt.scene._checks import reading_json, short
 from seqopt.scene.library.arch_form import ArchForm, arch, barrel_vault, chain
 from seqopt.scene.library.dome import DomeShape, dome
 from seqopt.scene.library.vault import VaultShape, herringbone_vault
@@ -39,14 +39,14 @@ _DENSITIES = (10.0, 30_000.0)  # kg/m³; from aerogel to the heaviest metals
 _PULL = 100.0  # m/s²; ten times that of the earth
 
 
-def find_warnings(scene: Scene) -> tuple[str, ...]:
+def _find_warnings(scene: Scene) -> tuple[str, ...]:
     """Return what looks wrong in a scene, one line each; most scenes have none."""
     return (*_of_units(scene), *_of_places(scene), *_of_joints(scene))
 
 
 def warn_of(scene: Scene, name: str) -> None:
     """Give a `SceneWarning` for each thing that looks wrong in a scene."""
-    for doubt in find_warnings(scene):
+    for doubt in _find_warnings(scene):
         warnings.warn(f"scene {name}: {doubt}", SceneWarning, stacklevel=3)
 
 
@@ -183,7 +183,7 @@ _READ: dict[Any, tuple[Callable[[str], Any], str]] = {
 }  # by what a number is: how it is read, and an example
 
 
-def scene_by_words(words: str) -> Scene:
+def _scene_by_words(words: str) -> Scene:
     """Return the scene of a key of `KINDS`, a colon, and ``name=value`` parted by commas.
 
     Three lengths are ``0.2x0.1x0.06``; lengths in m, angles in rad, densities in kg/m³.
@@ -227,7 +227,7 @@ def _stored() -> tuple[str, ...]:
 
 def _load_stored(name: str) -> Scene:
     """Return a scene that ships as a file."""
-    return parse_scene(_DATA.joinpath("scenes", f"{name}.json").read_text("utf-8"), name)
+    return _parse_scene(_DATA.joinpath("scenes", f"{name}.json").read_text("utf-8"), name)
 
 
 def load_scene(name: str | Path) -> Scene:
@@ -237,7 +237,7 @@ def load_scene(name: str | Path) -> Scene:
     ----------
     name : str or pathlib.Path
         A name in `builtin_scenes`, the path of a file, or a few words that
-        `scene_by_words` reads, such as ``arch:span=2,rise=0.7``.
+        `_scene_by_words` reads, such as ``arch:span=2,rise=0.7``.
 
     Returns
     -------
@@ -268,11 +268,11 @@ def load_scene(name: str | Path) -> Scene:
     if name in _stored():
         return _load_stored(name)
     if ":" in name and name.partition(":")[0] in KINDS:
-        return scene_by_words(name)
+        return _scene_by_words(name)
     path = Path(name)
     if not path.suffix and not os.path.lexists(path):
         raise SceneError(_no_such(name))
-    scene = parse_scene(read_text(path), name)
+    scene = _parse_scene(read_text(path), name)
     warn_of(scene, name)
     return scene
 
@@ -287,7 +287,7 @@ def _no_such(name: str) -> str:
     )
 
 
-def parse_scene(text: str, source: str = "text") -> Scene:
+def _parse_scene(text: str, source: str = "text") -> Scene:
     """Return the scene that a JSON document describes, if it obeys the schema."""
     with reading_json(f"scene {source}", "a scene"):
         document = json.loads(text, object_pairs_hook=partial(_entries, source))

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
+from seqopt._showing import Shown, display
 from seqopt.arrays import Terse
 from seqopt.errors import StepError
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
-from seqopt.showing import Shown, display
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,14 +8,14 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from seqopt._files import harmless, plain, read_text
 from seqopt.errors import StepError, did_you_mean
-from seqopt.files import harmless, plain, read_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.scene.checks import short, whole
+from seqopt.scene._checks import short, whole
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
-from seqopt.sequence.free_rules import FREE
+from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule, ScheduledGrips
 from seqopt.sequence.steps import Step, StepKind, check_sequence, check_step
 from seqopt.sequence.three_robots import SCHEDULES, make_schedule, open_schedule, robot_loop
@@ -69,7 +69,7 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     empty cell means that the robot does not grip. Other columns are ignored. Result: numbered from
     1. Raises `StepError` if the text is not such a table or a step is impossible.
     """
-    rows = read_rows(scene, text, f"plan {source}")
+    rows = _read_rows(scene, text, f"plan {source}")
     steps = [_given_step(scene, row, f"plan {source}, line {line}") for line, row in rows]
     for expected, step in enumerate(steps, start=1):
         if step.number != expected:
@@ -79,7 +79,7 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     return check_sequence(scene, steps)
 
 
-def read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, Row]]:
+def _read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, Row]]:
     """Return the rows of a table of steps.
 
     ``scene``: whose robots have a column each; ``text``: CSV, as in `parse_plan`. Result (int, dict
@@ -105,12 +105,12 @@ def _rows(scene: Scene, reader: csv.DictReader[str], what: str) -> list[tuple[in
 
 
 def _given_step(scene: Scene, row: Row, where: str) -> Step:
-    number, kind, bricks = read_cells(row, where)
-    grips = tuple(read_grip(scene, robot, row, where) for robot in scene.robots)
+    number, kind, bricks = _read_cells(row, where)
+    grips = tuple(_read_grip(scene, robot, row, where) for robot in scene.robots)
     return Step(number, kind, bricks, grips)
 
 
-def read_cells(row: Row, where: str) -> tuple[int, StepKind, int]:
+def _read_cells(row: Row, where: str) -> tuple[int, StepKind, int]:
     """Return what a row says beside its grips.
 
     ``row``: cells by column. Raises `StepError` if a cell is not a whole number, or there is no
@@ -123,7 +123,7 @@ def read_cells(row: Row, where: str) -> tuple[int, StepKind, int]:
     return number, kinds[row["type"]], bricks
 
 
-def read_grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
+def _read_grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
     """Return the node a robot holds; its brick, if named, must be the node's.
 
     ``row``: cells by column. Raises `StepError` if a cell is not a whole number, or the node is on
@@ -206,7 +206,7 @@ def parse_schedule(where: Network | Scene, text: str, source: str) -> Schedule:
     """
     network = where if isinstance(where, Network) else build_network(where)
     scene, what = network.scene, f"schedule {source}"
-    rows = read_rows(scene, text, what)
+    rows = _read_rows(scene, text, what)
     if not rows:
         raise StepError(f"{what}: it has no steps; give at least one")
     _check_columns(scene, text, what)
@@ -301,7 +301,7 @@ def _check_columns(scene: Scene, text: str, what: str) -> None:
 
 def _step(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> OpenStep:
     """Return the step of a row, which must be possible after those before."""
-    number, kind, bricks = read_cells(row, where)
+    number, kind, bricks = _read_cells(row, where)
     if number != len(before) + 1:
         raise StepError(f"{where}: step {number} should be {len(before) + 1}; number steps from 1")
     if None in row:
@@ -346,4 +346,4 @@ def _given(scene: Scene, row: Row, column: str, where: str) -> int | None:
             f"{where}: {column} is {cell!r}; give a node, ? for an open grip, or nothing"
         )
     robot = next(robot for robot in scene.robots if f"{robot.name}_node" == column)
-    return read_grip(scene, robot, row, where)
+    return _read_grip(scene, robot, row, where)

@@ -64,7 +64,7 @@ def _move(network: Network, steps: Sequence[OpenStep], number: int) -> Move:
     return Move(robot.name, first.number, first.bricks, free)
 
 
-def two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
+def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the loop of two robots: the sequential method with every grip open.
 
     While one robot holds the newest brick the other places the next one, at a node that is to be
@@ -79,7 +79,7 @@ def two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sche
     Examples
     --------
     >>> import seqopt
-    >>> schedule = two_robot_loop(seqopt.build_network(seqopt.load_scene("arch25")))
+    >>> schedule = _two_robot_loop(seqopt.build_network(seqopt.load_scene("arch25")))
     >>> [(step.kind.value, step.moves) for step in schedule.steps[1:4]]
     [('place', (0, 1)), ('release', (1,)), ('place', (1, 2))]
     >>> [move.candidates for move in schedule.moves[:3]]
@@ -103,7 +103,7 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
     brick, the robot that has held its brick longest releases, and takes a new grip, which is to be
     chosen. With n robots, at least n - 1 grip at every step once all do: n - 2 hold the bricks that
     they placed, the newest among them, and one holds where it was chosen. With three robots this is
-    the loop of Bruun et al.; with two it is `two_robot_loop`.
+    the loop of Bruun et al.; with two it is `_two_robot_loop`.
 
     ``network``: of a scene with at least one brick more than robots take part. ``robots``: how many
     robots take part, or their names in the order in which they place the first bricks; by default
@@ -124,7 +124,7 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
     names = () if isinstance(robots, int) else tuple(robots)
     count = robots if isinstance(robots, int) else len(names) or len(scene.robots)
     if count <= 2:
-        return two_robot_loop(network, names)
+        return _two_robot_loop(network, names)
     if len(scene.robots) < count or len(scene.placed) < count + 1:
         raise StepError(
             f"scene {scene.name}: {len(scene.robots)} robots and {len(scene.placed)} bricks; "
@@ -331,7 +331,7 @@ def _free(scene: Scene, window: Sequence[Step], helpers: Sequence[int]) -> int:
 SCHEDULES: dict[str, _ScheduleMethod] = {
     "three-robot": three_robot_loop,
     "modified-sequential": modified_sequential,
-    "two-robot": two_robot_loop,
+    "two-robot": _two_robot_loop,
     "loop": robot_loop,
 }
 

@@ -181,7 +181,7 @@ def lies_along(network: Network) -> frozenset[int]:
     return frozenset(placed[i].name for i in along.tolist())
 
 
-def begins_elsewhere(network: Network) -> frozenset[int]:
+def _begins_elsewhere(network: Network) -> frozenset[int]:
     """Return the bricks with which the cantilever method turns to another part of the structure.
 
     A stretch is a brick that is held while others are placed, and these others. A brick begins
@@ -221,7 +221,7 @@ def degeneration(network: Network, method: str) -> str:
         return ""
     if not between:
         return "no bricks lie between the first and the last: it is the sequential method here"
-    along, elsewhere = lies_along(network), begins_elsewhere(network)
+    along, elsewhere = lies_along(network), _begins_elsewhere(network)
     if along.issuperset(between):
         return "every brick lies along the structure: it is the sequential method here"
     if along | elsewhere >= {*between}:
@@ -353,7 +353,7 @@ def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     [('place', (1, 7)), ('release', (7,)), ('place', (8, 7))]
     """
     network = network_of(network)
-    swaps = lies_along(network) | begins_elsewhere(network)
+    swaps = lies_along(network) | _begins_elsewhere(network)
     return _two_robots(network, "cantilever", swaps, robots)
 
 

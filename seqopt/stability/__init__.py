@@ -15,8 +15,8 @@ An assembly of blocks is assessed with the mortar in its joints. Every verdict i
 `Screen` says which of many grip sets stand, and `Margins` by how much: most of them unsolved.
 """
 
+from seqopt.stability._margins import Margins
+from seqopt.stability._screens import Screen
 from seqopt.stability.assessment import Stability, Verdict, assess, assess_steps, stability_table
-from seqopt.stability.margins import Margins
-from seqopt.stability.screens import Screen
 
 __all__ = ["Margins", "Screen", "Stability", "Verdict", "assess", "assess_steps", "stability_table"]

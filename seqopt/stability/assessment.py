@@ -9,6 +9,7 @@ from enum import Enum
 import numpy as np
 import pandas as pd
 
+from seqopt._showing import Shown
 from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import Contacts, step_assembly
@@ -17,7 +18,7 @@ from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step, require_steps
-from seqopt.showing import Shown
+from seqopt.stability._prover import DIRECTIONS, Proven, Prover, safe_pull
 from seqopt.stability.limit_analysis import (
     CAP,
     EXACT,
@@ -28,7 +29,6 @@ from seqopt.stability.limit_analysis import (
     Sense,
     compile_equilibrium,
 )
-from seqopt.stability.prover import DIRECTIONS, Proven, Prover, safe_pull
 from seqopt.work.progress import Tell, told
 
 _STILL = 1e-6  # motion slower than this, beside the fastest, is none
@@ -83,7 +83,7 @@ class Stability(Shown, FrozenValue):
     tilt : float
         Tilt survived in every direction, rad: a safe bound by forces; NaN if it does not stand.
         Gravity turned by atan(a) mixes no load with gravity and a sideways a, all survived. It is
-        less than the largest such tilt by what `seqopt.stability.prover.safe_pull` leaves, and
+        less than the largest such tilt by what `seqopt.stability._prover.safe_pull` leaves, and
         for bonds and for grips at their payload by what weighs less once it is turned.
     grip : float
         The largest grip force, made as small as equilibrium with the mortar allows, N; inf if no
@@ -159,7 +159,7 @@ def assess(
     prove = Prover(assembly, compiled)
     growing = bonded(assembly, mortar)
     stand = prove(growing)
-    verdict = verdict_of(stand)
+    verdict = _verdict_of(stand)
     bare = bonded(assembly, Mortar(friction=mortar.friction))
     bond = stand if bare == growing else prove(bare)
     fixed = replace(growing, tension=(growing.tension[0], 0.0), cohesion=(growing.cohesion[0], 0.0))
@@ -189,7 +189,7 @@ def assess(
 
 def verdict(assembly: Assembly, mortar: Mortar, compiled: Compile = compile_equilibrium) -> Verdict:
     """Return the verdict of `assess` alone: one case, where margins need about twenty."""
-    return verdict_of(Prover(assembly, compiled)(bonded(assembly, mortar)))
+    return _verdict_of(Prover(assembly, compiled)(bonded(assembly, mortar)))
 
 
 def bonded(assembly: Assembly, mortar: Mortar) -> Case:
@@ -207,7 +207,7 @@ def bonded(assembly: Assembly, mortar: Mortar) -> Case:
     )
 
 
-def verdict_of(stand: Proven) -> Verdict:
+def _verdict_of(stand: Proven) -> Verdict:
     """Return the verdict where a number is proven that must be zero.
 
     It falls if the motion says so by itself: forces only show that no more is needed.
@@ -230,7 +230,7 @@ def _least_friction(prove: Prover, mortar: Mortar) -> float:
 
     def lacking(friction: float) -> float:
         proven = prove(bonded(prove.assembly, replace(mortar, friction=friction)))
-        return np.nan if verdict_of(proven) is Verdict.UNDECIDED else proven.value
+        return np.nan if _verdict_of(proven) is Verdict.UNDECIDED else proven.value
 
     low = (0.0, lacking(0.0))
     if not low[1] > EXACT:

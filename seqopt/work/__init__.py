@@ -9,7 +9,7 @@ dies, its unfinished tasks are given out again.
 [3, 2]
 """
 
+from seqopt.work._workers import Crew, hire, map_ordered
 from seqopt.work.progress import Progress, Stage
-from seqopt.work.workers import Crew, hire, map_ordered
 
 __all__ = ["Crew", "Progress", "Stage", "hire", "map_ordered"]

@@ -13,8 +13,8 @@ from experiments.stability.parts.witness_cra import SAMPLES, force_only, sample_
 from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import Mortar
 from seqopt.network.build import build_network
+from seqopt.scene.imports._content import Given
 from seqopt.scene.imports.contacts import flat_face
-from seqopt.scene.imports.content import Given
 from seqopt.scene.imports.formats import import_scene
 from seqopt.sequence.exports.formats import export_plan
 from seqopt.sequence.two_robots import METHODS

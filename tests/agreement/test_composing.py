@@ -21,7 +21,7 @@ from seqopt.graph.states.states import build_states
 from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation, formulation_names
 from seqopt.problem.problem import parse_robust
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Limit
-from seqopt.sequence.free_rules import FreeRules, with_robots
+from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.sequence.schedule import thin
 from seqopt.sequence.schedule_file import parse_schedule
 from seqopt.sequence.steps import StepKind

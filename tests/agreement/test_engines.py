@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.rigid._mixed import solve_dense
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.mixed import solve_dense
 from seqopt.errors import MechanismError, SolverError
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network

@@ -8,9 +8,9 @@ from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from seqopt.contact.mortar import DRY, Mortar
+from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Want
-from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.build import build_network

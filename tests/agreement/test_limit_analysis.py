@@ -8,8 +8,8 @@ import pytest
 from experiments.stability.parts.blocks import ring, stack
 from formulations.contact.limit_analysis import compile_equilibrium
 from seqopt.contact.mortar import Mortar
+from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import bonded
-from seqopt.stability.prover import Prover
 
 
 def plane_bond(assembly, friction):

@@ -11,17 +11,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.graph.layers._partial_costs import PartialCosts, least_possible
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.layers.partial_costs import PartialCosts, least_possible
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import End, Selection
 from seqopt.plan.judge.certificate import certify_partial
-from seqopt.plan.search.window_search import search_windows
+from seqopt.plan.search._window_search import search_windows
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import Among, Ranked, StepCost
 from seqopt.problem.problem import Aim

@@ -23,7 +23,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneWarning
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.scene.imports.content import Given
+from seqopt.scene.imports._content import Given
 from seqopt.scene.imports.formats import import_scene
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import ABOUT, load_scene

@@ -16,10 +16,10 @@ from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.parts import Robot
-from seqopt.stability.assessment import Verdict, assess, bonded, verdict_of
-from seqopt.stability.margins import Margins
-from seqopt.stability.prover import Prover
-from seqopt.stability.screens import Screen
+from seqopt.stability._margins import Margins
+from seqopt.stability._prover import Prover
+from seqopt.stability._screens import Screen
+from seqopt.stability.assessment import Verdict, _verdict_of, assess, bonded
 from tests.strategies import arches, walls
 
 VERDICTS = {1: Verdict.STANDS, -1: Verdict.FALLS, 0: Verdict.UNDECIDED}
@@ -48,7 +48,7 @@ def certified(network, bricks, row, mortar):
     nodes = [n for brick in network.scene.placed for n in brick.nodes]
     grips = [nodes[place - 1] if place else None for place in row.tolist()]
     assembly = step_assembly(network, bricks, grips)
-    return verdict_of(Prover(assembly, compile_equilibrium)(bonded(assembly, mortar)))
+    return _verdict_of(Prover(assembly, compile_equilibrium)(bonded(assembly, mortar)))
 
 
 def compare(scene, bricks, mortar):

@@ -12,7 +12,7 @@ from seqopt.engines.registry import make_engine
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.responses.table import analyze
-from seqopt.scene.scene_file import dump_scene, parse_scene
+from seqopt.scene.scene_file import _parse_scene, dump_scene
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import assess_steps
 from tests.blocks import with_shapes
@@ -45,7 +45,7 @@ def test_stability():
 
 def test_a_round_trip_changes_nothing():
     scene = with_shapes(six_bricks())
-    assert parse_scene(dump_scene(scene)) == scene
+    assert _parse_scene(dump_scene(scene)) == scene
 
 
 def moved_nodes(scene, *offsets):

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from seqopt.contact.mortar import Mortar
-from seqopt.engines.auto import AutoEngine
+from seqopt.engines._auto import AutoEngine
+from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.planar import PlanarEngine
+from seqopt.engines.rigid._mixed import solve_dense, solve_mixed
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.mixed import solve_dense, solve_mixed
 from seqopt.network.build import build_network
 from tests.builders import from_both_sides
 

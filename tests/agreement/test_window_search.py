@@ -11,10 +11,10 @@ from seqopt.errors import SolverError, TimeUpError
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import Watch
-from seqopt.plan.search.window_search import search_windows
+from seqopt.plan.search._window_search import search_windows
 from seqopt.plan.solving import solve
 from seqopt.problem.requirements import Limit
-from seqopt.responses.choices import window_models
+from seqopt.responses._choices import window_models
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop
 from seqopt.study.published import CRITERIA, EQUATIONS, WEIGHTED
 from tests.builders import far_reaching

@@ -8,8 +8,8 @@ from contextlib import redirect_stdout
 
 import pytest
 
-from seqopt.cli.commands.completion import words
-from seqopt.cli.main import main
+from seqopt._cli.commands.completion import words
+from seqopt._cli.main import main
 from seqopt.plan.calling.formulation import formulation_names
 
 ASK = {

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 import seqopt
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 from seqopt.scene.scene_file import save_scene
 from seqopt.work.progress import Stage
 from tests.builders import anywhere, small_arch

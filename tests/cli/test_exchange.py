@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 from seqopt.scene.scene_file import load_scene
 from tests.documents import BOXES, DOCUMENTS
 

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from seqopt.cli.answer import plain
-from seqopt.cli.main import main
+from seqopt._cli.answer import plain
+from seqopt._cli.main import main
 from seqopt.responses.table import analyze
 from seqopt.sequence.two_robots import cantilever
 

@@ -8,7 +8,7 @@ import re
 import pandas as pd
 import pytest
 
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 from seqopt.scene.scene_file import load_scene, save_scene
 from seqopt.sequence.schedule_file import read_plan
 from tests.builders import small_arch
@@ -202,7 +202,7 @@ def test_figures_that_cannot_be_drawn_are_left_out_and_it_says_so(
     """Without the extra that draws: tables and the page are written all the same."""
     asked = ("pareto", arch, "--aim", "F_largest,steps")
     assert run(capsys, *asked, "--out", str(tmp_path / "drawn"))[0] == 0
-    monkeypatch.setattr("seqopt.cli.outputs.find_spec", lambda name: None)
+    monkeypatch.setattr("seqopt._cli.outputs.find_spec", lambda name: None)
     status, _, error = run(capsys, *asked, "--out", str(tmp_path / "plain"))
     assert (status, error.count("\n")) == (0, 1)
     assert "figures are left out, they need matplotlib" in error

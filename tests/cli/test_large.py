@@ -13,10 +13,10 @@ from functools import partial
 
 import pytest
 
-from seqopt.cli.main import main
-from seqopt.cli.values import parse_size
+from seqopt._cli.main import main
+from seqopt._cli.values import parse_size
 from seqopt.errors import ProblemError
-from seqopt.plan import layers
+from seqopt.plan import _layers as layers
 from seqopt.scene.scene_file import save_scene
 from tests.builders import ROOT, small_arch
 
@@ -227,7 +227,7 @@ def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tm
         if len(came) == 1:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr("seqopt.cli.commands.optimize.within", lambda tell, seconds: interrupt)
+    monkeypatch.setattr("seqopt._cli.commands.optimize.within", lambda tell, seconds: interrupt)
     words = ["optimize", "--formulation", name, "--budget", "travel=0.8"]
     assert main([*words, "--out", str(tmp_path / "out")]) == 130
     out, err = capsys.readouterr()

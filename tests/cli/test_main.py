@@ -13,9 +13,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from seqopt.cli.arguments import parser
-from seqopt.cli.commands import analyze as analyze_command
-from seqopt.cli.main import main
+from seqopt._cli.arguments import parser
+from seqopt._cli.commands import analyze as analyze_command
+from seqopt._cli.main import main
 from seqopt.responses.table import analyze, step_fields
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.schedule_file import schedule_text

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 
 PLAN = "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n"
 

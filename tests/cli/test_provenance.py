@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 from seqopt.engines.registry import provenance
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.scene.scene_file import save_scene

@@ -8,8 +8,8 @@ import math
 import pandas as pd
 import pytest
 
-from seqopt.cli.main import main
-from seqopt.cli.outputs import _plain
+from seqopt._cli.main import main
+from seqopt._cli.outputs import _plain
 from seqopt.scene.scene_file import save_scene
 from tests.builders import six_bricks
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, load_scene
 
 

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from seqopt.cli.answer import Status
-from seqopt.cli.main import main
+from seqopt._cli.answer import Status
+from seqopt._cli.main import main
 from seqopt.scene.scene_file import load_scene, save_scene
 from tests.builders import ROOT
 
@@ -98,7 +98,7 @@ def test_an_interrupt_is_one_line(tmp_path, which, after):
 def test_an_interrupt_is_not_lost_at_the_end_of_an_object():
     program = """
 import os, signal, sys, time
-import seqopt.cli.commands.scene
+import seqopt._cli.commands.scene
 from seqopt.__main__ import run
 
 class Ends:
@@ -110,7 +110,7 @@ def wait(options):
     Ends()
     time.sleep(20)
 
-seqopt.cli.commands.scene.run = wait
+seqopt._cli.commands.scene.run = wait
 sys.argv = ["seqopt", "scene"]
 sys.exit(run())
 """
@@ -137,7 +137,7 @@ def test_what_ends_a_command_is_one_line(capsys, monkeypatch, error, status, sai
     def fails(options):
         raise error
 
-    monkeypatch.setattr("seqopt.cli.commands.scene.run", fails)
+    monkeypatch.setattr("seqopt._cli.commands.scene.run", fails)
     assert main(["scene"]) == status
     err = capsys.readouterr().err
     assert said in err

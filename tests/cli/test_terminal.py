@@ -9,10 +9,10 @@ import sys
 
 import pytest
 
-from seqopt.cli import watcher
-from seqopt.cli.main import main
-from seqopt.cli.terminal import colored, columns, complain, note, painted, show_text, wrapped
-from seqopt.cli.watcher import Watcher
+from seqopt._cli import watcher
+from seqopt._cli.main import main
+from seqopt._cli.terminal import colored, columns, complain, note, painted, show_text, wrapped
+from seqopt._cli.watcher import Watcher
 from seqopt.work.progress import Stage, told, within
 
 posix = pytest.mark.skipif(os.name != "posix", reason="terminals are POSIX's")

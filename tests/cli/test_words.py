@@ -9,9 +9,9 @@ import sys
 import pytest
 
 import seqopt
-from seqopt.cli.arguments import COMMANDS, EXAMPLES, parser
-from seqopt.cli.commands.completion import _commands
-from seqopt.cli.main import main
+from seqopt._cli.arguments import COMMANDS, EXAMPLES, parser
+from seqopt._cli.commands.completion import _commands
+from seqopt._cli.main import main
 from tests.builders import ROOT
 
 
@@ -121,7 +121,7 @@ LOADED = f"print(*[name for name in {HEAVY} if name in sys.modules], file=sys.st
     [([], True), (["--help"], True), (["--version"], True), (["scene", "--help"], False)],
 )
 def test_what_needs_no_library_loads_none(words, light):
-    program = f"import sys\nfrom seqopt.cli.main import main\nmain({words})\n{LOADED}"
+    program = f"import sys\nfrom seqopt._cli.main import main\nmain({words})\n{LOADED}"
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT
     )

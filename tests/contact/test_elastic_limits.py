@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from seqopt.contact.elastic_limits import find_elastic_limits
+from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import DRY
 from seqopt.network.build import build_network
 from tests.builders import block

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from experiments.harness.scenes import running_bond
-from seqopt.contact.faces import bare_assembly, distance_beside
+from seqopt.contact.faces import _distance_beside, bare_assembly
 from seqopt.contact.mortar import DRY
-from seqopt.engines.auto import AutoEngine
+from seqopt.engines._auto import AutoEngine
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import THICKEST
-from seqopt.scene.scene_file import dump_scene, parse_scene
+from seqopt.scene.scene_file import _parse_scene, dump_scene
 from seqopt.sequence.two_robots import sequential
 from seqopt.stability.assessment import assess_steps
 
@@ -83,7 +83,7 @@ def test_a_thick_joint_says_so():
     assert touches(thick).area.shape == (2,)
     with pytest.raises(SceneError, match="more than 43 mm"):
         touches(shifted((0, 0, 0.05), (0, 0, 0.02), thickness=0.04))
-    assert parse_scene(dump_scene(thick)) == thick
+    assert _parse_scene(dump_scene(thick)) == thick
     assert '"thickness": 0.05' in dump_scene(thick)
     assert "thickness" not in dump_scene(WALL)
     with pytest.raises(SceneError, match="thickness is -1; give a positive number of m"):
@@ -110,6 +110,6 @@ def test_the_joints_of_the_reference_arch_are_well_within(arch25):
 
 def test_the_distance_beside_a_polygon():
     square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    assert distance_beside(square) == -1.0
-    assert distance_beside(square + np.array([3.0, 0.0])) == pytest.approx(2.0)
-    assert distance_beside(square - np.array([0.0, 2.5])) == pytest.approx(1.5)
+    assert _distance_beside(square) == -1.0
+    assert _distance_beside(square + np.array([3.0, 0.0])) == pytest.approx(2.0)
+    assert _distance_beside(square - np.array([0.0, 2.5])) == pytest.approx(1.5)

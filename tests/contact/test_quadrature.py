@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from experiments.stability.parts.blocks import stack
-from seqopt.contact.elastic_limits import face_quadrature
+from seqopt.contact._elastic_limits import face_quadrature
 
 
 @pytest.mark.parametrize("size", [(1.0, 0.5, 0.2), (0.3, 0.9, 2.0)])

@@ -12,7 +12,7 @@ import pytest
 
 from experiments.harness.results import RESULTS, markdown, two
 from experiments.harness.stated import stated
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 from seqopt.plan.calling.formulation import On, exhibits, formulations
 from tests.browser import browsed
 from tests.builders import ROOT

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from experiments.harness.scenes import running_bond
-from seqopt.contact.elastic_limits import find_elastic_limits
+from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
-from seqopt.engines.auto import _BEYOND, _IN_PLANE, AutoEngine, Level
+from seqopt.engines._auto import _BEYOND, _IN_PLANE, AutoEngine, Level
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network

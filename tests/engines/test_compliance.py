@@ -8,16 +8,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.interface import _NAMES, Want, grip_columns
-from seqopt.engines.planar import PlanarEngine
 from seqopt.engines.rigid import compliance
 from seqopt.engines.rigid import compliance as trial
-from seqopt.engines.rigid.compliance import _CANCEL, _EVEN, ComplianceEngine, cancels, solve_batch
-from seqopt.engines.rigid.growth import grow_tree
-from seqopt.engines.rigid.mixed import solve_mixed
-from seqopt.engines.rigid.operator import OperatorBuilder
-from seqopt.engines.rigid.refinement import Corrector
-from seqopt.engines.rigid.response_maps import loads_of
+from seqopt.engines.rigid._growth import grow_tree
+from seqopt.engines.rigid._mixed import solve_mixed
+from seqopt.engines.rigid._operator import OperatorBuilder
+from seqopt.engines.rigid._refinement import Corrector
+from seqopt.engines.rigid._response_maps import loads_of
+from seqopt.engines.rigid.compliance import _CANCEL, _EVEN, ComplianceEngine, _solve_batch, cancels
 from seqopt.network.build import build_network
 from tests.builders import from_both_sides, six_bricks, small_arch
 from tests.limit_scenes import LOOSE_AT, chain, loosened
@@ -47,9 +47,9 @@ def test_grips_on_both_sides_of_a_joint_that_hardly_turns(monkeypatch):
     net = build_network(loosened(chain(16), 1e-7, only_turning=True))
     columns = grip_columns(net, 16, BOTH_SIDES)
     operator = OperatorBuilder(net, grow_tree(net)).operator(16)
-    plain, trusted = solve_batch(operator, columns, Want.ALL, accuracy=1e-7)
+    plain, trusted = _solve_batch(operator, columns, Want.ALL, accuracy=1e-7)
     assert trusted.all()
-    assert solve_batch(operator, columns)[1].any()
+    assert _solve_batch(operator, columns)[1].any()
     better, worse = ComplianceEngine(net).solve(16, BOTH_SIDES, Want.ALL), 0.0
     for row, grips in enumerate(columns):
         exact = solve_exactly(net, 16, grips)
@@ -59,7 +59,7 @@ def test_grips_on_both_sides_of_a_joint_that_hardly_turns(monkeypatch):
         gap = np.abs(plain.displacement[row, nodes] - exact.displacement).max()
         worse = max(worse, gap / size)
     assert worse > 5e-9
-    assert not solve_batch(operator, columns, even=False)[1].all()
+    assert not _solve_batch(operator, columns, even=False)[1].all()
 
 
 def evenly(scene, joint, kind, share):
@@ -172,7 +172,7 @@ def test_what_is_only_compared_is_corrected_once_and_right_to_six_digits(monkeyp
             made.append(len(arguments[0]))
             return super()._correction(*arguments)
 
-    monkeypatch.setattr("seqopt.engines.rigid.refinement.Corrector", Counted)
+    monkeypatch.setattr("seqopt.engines.rigid._refinement.Corrector", Counted)
     net = build_network(chain(bricks))
     nodes = np.array([brick.nodes for brick in net.scene.placed])
     pairs = [(i, j) for i in (1, 2, 3) for j in (4, 6, 9)]
@@ -216,8 +216,8 @@ def test_what_is_only_to_be_compared_is_corrected_less(monkeypatch):
     sets, engine = [[199, 198, 197]], ComplianceEngine(net)
     operator = OperatorBuilder(net, grow_tree(net)).operator(100)
     columns = grip_columns(net, 100, sets)
-    assert not solve_batch(operator, columns)[1].any()
-    assert solve_batch(operator, columns, accuracy=compliance._SCREEN)[1].all()
+    assert not _solve_batch(operator, columns)[1].any()
+    assert _solve_batch(operator, columns, accuracy=compliance._SCREEN)[1].all()
     monkeypatch.setattr(compliance, "Refinement", None)
     engine.solve(100, sets, Want.RESPONSES | Want.SCREEN)
     with pytest.raises(TypeError):

@@ -13,14 +13,14 @@ from seqopt.engines.diagnosis import (
     UNRESISTED,
     WELL,
     Finding,
+    _spectrum,
     diagnose,
     residual,
-    spectrum,
 )
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.rigid._mixed import mixed_system, solve_dense, ungripped_system
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.mixed import mixed_system, solve_dense, ungripped_system
 from seqopt.network.build import build_network
 from tests.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
 from tests.reference_chain import solve_exactly
@@ -82,7 +82,7 @@ def test_the_smallest_eigenvalue_is_that_of_the_dense_matrix():
     scale = np.sqrt(np.maximum(matrix.diagonal(), _LEAST_DIAGONAL * matrix.diagonal().max()))
     null = np.linalg.svd(system.forbidden.toarray() / scale)[2][6:].T
     values, vectors = np.linalg.eigh(null.T @ (matrix / scale / scale[:, None]) @ null)
-    lowest, condition, mode = spectrum(net, 9, grips)
+    lowest, condition, mode = _spectrum(net, 9, grips)
     assert lowest == pytest.approx(values[0], rel=1e-6)
     assert condition >= 0.99 * values[-1] / values[0]
     want = null @ vectors[:, 0] / scale
@@ -127,7 +127,7 @@ def test_the_smallest_eigenvalue_follows_a_loose_joint(power):
     """Down to what double precision loses in the stiffness matrix itself."""
     nothing = np.zeros(0, dtype=int)
     base, less = (
-        spectrum(build_network(loosened(chain(25), 10.0**-p, only_turning=True)), 25, nothing)[0]
+        _spectrum(build_network(loosened(chain(25), 10.0**-p, only_turning=True)), 25, nothing)[0]
         for p in (power, power + 3)
     )
     assert less == pytest.approx(1e-3 * base, rel=0.3)

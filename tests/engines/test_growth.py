@@ -9,13 +9,14 @@ from hypothesis import strategies as st
 
 from experiments.harness.scenes import grip_sets, half_circle, running_bond
 from seqopt.engines.interface import _NAMES, Want, grip_columns
-from seqopt.engines.rigid import compliance, growth
+from seqopt.engines.rigid import _growth as growth
+from seqopt.engines.rigid import compliance
 from seqopt.engines.rigid import compliance as trial
-from seqopt.engines.rigid.compliance import ComplianceEngine, Kept, solve_batch
-from seqopt.engines.rigid.growth import grow_tree
-from seqopt.engines.rigid.mixed import solve_mixed
-from seqopt.engines.rigid.operator import OperatorBuilder
-from seqopt.engines.rigid.refinement import Refinement
+from seqopt.engines.rigid._growth import grow_tree
+from seqopt.engines.rigid._mixed import solve_mixed
+from seqopt.engines.rigid._operator import OperatorBuilder
+from seqopt.engines.rigid._refinement import Refinement
+from seqopt.engines.rigid.compliance import ComplianceEngine, Kept, _solve_batch
 from seqopt.network.build import build_network
 from tests.strategies import arches, both_sided, walls
 
@@ -83,7 +84,7 @@ def test_an_arch_that_closes_keeps_its_digits(count, monkeypatch):
     def worst(net):
         operator = OperatorBuilder(net, grow_tree(net)).operator(count)
         columns = np.array([[2 * count - 1, 2 * count - 3, i] for i in range(0, count, 5)])
-        fields, _ = solve_batch(operator, columns, Want.ALL)
+        fields, _ = _solve_batch(operator, columns, Want.ALL)
         return error(fields, solve_mixed(net, count, columns)).max()
 
     net = half_circle(count)
@@ -101,7 +102,7 @@ def test_walls_agree_with_the_mixed_system(columns, courses):
         sets = grip_sets(net, bricks, 12)
         operator = OperatorBuilder(net, grow_tree(net)).operator(bricks)
         places = grip_columns(net, bricks, sets)
-        fields, trusted = solve_batch(operator, places, Want.ALL)
+        fields, trusted = _solve_batch(operator, places, Want.ALL)
         assert trusted.all()
         assert error(fields, solve_mixed(net, bricks, places)).max() <= 1e-11
 
@@ -133,9 +134,9 @@ def test_no_set_errs_unnoticed(net, bricks):
     operator = OperatorBuilder(net, grow_tree(net)).operator(bricks)
     exact = Refinement(net, bricks).solve(columns, operator)
     for accuracy in (1e-6, 1e-9, 1e-10):
-        fields, trusted = solve_batch(operator, columns, Want.ALL, accuracy=accuracy)
+        fields, trusted = _solve_batch(operator, columns, Want.ALL, accuracy=accuracy)
         assert error(fields, exact)[trusted].max(initial=0) <= accuracy
-    _, easily = solve_batch(operator, columns, accuracy=1e-6)
+    _, easily = _solve_batch(operator, columns, accuracy=1e-6)
     assert easily.mean() >= 0.95  # few are doubted in vain where six digits are enough
 
 
@@ -145,7 +146,7 @@ def test_sets_that_err_are_there_to_be_noticed(monkeypatch):
     columns = hard_sets(bricks, np.random.default_rng(bricks))
     operator = OperatorBuilder(net, grow_tree(net)).operator(bricks)
     monkeypatch.setattr(trial, "_UNSEEN", 1e-300)
-    fields, trusted = solve_batch(operator, columns, Want.ALL, accuracy=1e-10)
+    fields, trusted = _solve_batch(operator, columns, Want.ALL, accuracy=1e-10)
     assert trusted.all()
     assert error(fields, Refinement(net, bricks).solve(columns, operator)).max() > 1e-10
 
@@ -202,8 +203,8 @@ def test_mapped_before_or_after_they_are_summed():
     """A few sets of many loads and many sets of few take other ways to the same fields."""
     net = half_circle(50)
     columns = np.array([[14, 61, 99], [0, 1, 50], [15, 60, 98]])
-    few, _ = solve_batch(OperatorBuilder(net, grow_tree(net)).operator(50), columns, Want.ALL)
-    many, _ = solve_batch(
+    few, _ = _solve_batch(OperatorBuilder(net, grow_tree(net)).operator(50), columns, Want.ALL)
+    many, _ = _solve_batch(
         OperatorBuilder(net, grow_tree(net)).operator(50), np.tile(columns, (120, 1)), Want.ALL
     )
     for name in _NAMES:

@@ -9,18 +9,19 @@ import numpy as np
 import pytest
 
 from experiments.harness.scenes import grip_sets, running_bond
+from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import _NAMES, Want, grip_columns
-from seqopt.engines.planar import PlanarEngine
-from seqopt.engines.rigid import compliance, refinement
-from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
-from seqopt.engines.rigid.grip_equations import solve_positive
-from seqopt.engines.rigid.growth import grow_tree
-from seqopt.engines.rigid.mechanism import require_resistance, ungripped_system
-from seqopt.engines.rigid.mixed import solve_dense, solve_mixed
-from seqopt.engines.rigid.operator import OperatorBuilder
-from seqopt.engines.rigid.refinement import Corrector, Refinement, held_operator, hold_loose
+from seqopt.engines.rigid import _refinement as refinement
+from seqopt.engines.rigid import compliance
+from seqopt.engines.rigid._grip_equations import solve_positive
+from seqopt.engines.rigid._growth import grow_tree
+from seqopt.engines.rigid._mechanism import require_resistance, ungripped_system
+from seqopt.engines.rigid._mixed import solve_dense, solve_mixed
+from seqopt.engines.rigid._operator import OperatorBuilder
+from seqopt.engines.rigid._refinement import Corrector, Refinement, held_operator, hold_loose
+from seqopt.engines.rigid.compliance import ComplianceEngine, _solve_batch
 from seqopt.errors import MechanismError, SolverError
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
@@ -202,7 +203,7 @@ def test_close_grips_on_a_long_chain_are_corrected_together(count, together):
     sets = [(tip, tip - 1, tip - 2), (tip, tip - 2, tip - 4), (tip - 1, tip - 2, tip - 3)]
     engine = ComplianceEngine(net)
     columns = grip_columns(net, count, sets)
-    _, trusted = solve_batch(engine._operator(count, columns), columns)
+    _, trusted = _solve_batch(engine._operator(count, columns), columns)
     assert not trusted.any()
     fields = engine.solve(count, sets, Want.ALL)
     for row, places in enumerate(columns):

@@ -8,22 +8,22 @@ import numpy as np
 import pytest
 
 from experiments.harness.scenes import running_bond
+from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.interface import _NAMES, FLAGS, SPACE, Want, grip_columns
-from seqopt.engines.planar import PlanarEngine
-from seqopt.engines.rigid.compliance import ComplianceEngine, solve_batch
-from seqopt.engines.rigid.grip_equations import (
+from seqopt.engines.rigid._grip_equations import (
     doubts,
     grip_forces,
     share_pairs,
     still_forces,
     trusted,
 )
-from seqopt.engines.rigid.growth import grow_tree
-from seqopt.engines.rigid.mechanism import ungripped_system
-from seqopt.engines.rigid.mixed import solve_dense
-from seqopt.engines.rigid.operator import OperatorBuilder
-from seqopt.engines.rigid.refinement import held_operator, hold_loose
-from seqopt.engines.rigid.response_maps import _GATHERED, loads_of
+from seqopt.engines.rigid._growth import grow_tree
+from seqopt.engines.rigid._mechanism import ungripped_system
+from seqopt.engines.rigid._mixed import solve_dense
+from seqopt.engines.rigid._operator import OperatorBuilder
+from seqopt.engines.rigid._refinement import held_operator, hold_loose
+from seqopt.engines.rigid._response_maps import _GATHERED, loads_of
+from seqopt.engines.rigid.compliance import ComplianceEngine, _solve_batch
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from tests.builders import branch, from_both_sides, hinged, six_bricks, small_arch, torsion_free
@@ -73,7 +73,7 @@ def test_every_field_is_that_of_a_direct_solve(name, grips):
         if len(free_nodes(scene, bricks)) < grips:
             continue
         columns = grip_columns(net, bricks, sets_of(scene, bricks, grips))
-        fields, trusted = solve_batch(builder.operator(bricks), columns, Want.ALL)
+        fields, trusted = _solve_batch(builder.operator(bricks), columns, Want.ALL)
         direct = solve_dense(net, bricks, columns)
         assert trusted.all()
         for field in _NAMES:
@@ -269,8 +269,8 @@ def test_answers_do_not_depend_on_how_they_are_summed(monkeypatch, name, grips):
     builder = OperatorBuilder(net, grow_tree(net))
     found = []
     for few, held in ((10**9, None), (0, None), (0, np.unique(columns // 2))):
-        monkeypatch.setattr("seqopt.engines.rigid.operator._FEW", few)
-        found.append(solve_batch(builder.operator(bricks, held), columns, Want.ALL)[0])
+        monkeypatch.setattr("seqopt.engines.rigid._operator._FEW", few)
+        found.append(_solve_batch(builder.operator(bricks, held), columns, Want.ALL)[0])
     for field in _NAMES:
         once, *others = (getattr(fields, field) for fields in found)
         for other in others:
@@ -285,7 +285,7 @@ def test_answers_beside_loose_motions_do_not_depend_on_it_either(monkeypatch):
     force = np.random.default_rng(0).normal(size=index.shape)
     answers = {}
     for few in (10**9, 0):
-        monkeypatch.setattr("seqopt.engines.rigid.operator._FEW", few)
+        monkeypatch.setattr("seqopt.engines.rigid._operator._FEW", few)
         answers[few] = {name: operator.answer(name, index, force) for name in FLAGS}
     for name, once in answers[10**9].items():
         assert np.abs(answers[0][name] - once).max() <= 1e-9 * np.abs(once).max(), name

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from seqopt.engines._planar import PlanarEngine, find_plane
 from seqopt.engines.interface import Want
-from seqopt.engines.planar import PlanarEngine, find_plane
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, SceneError
 from seqopt.network.build import build_network

@@ -6,9 +6,9 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from seqopt.engines.interface import one_thread
+from seqopt.engines.rigid._operator import OperatorBuilder
+from seqopt.engines.rigid._refinement import Refinement
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.operator import OperatorBuilder
-from seqopt.engines.rigid.refinement import Refinement
 from seqopt.network.build import build_network
 from tests.builders import hinged, six_bricks
 

@@ -9,9 +9,9 @@ import pytest
 
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid import compliance as trial
-from seqopt.engines.rigid.compliance import ACCURACY, solve_batch, try_forces
-from seqopt.engines.rigid.growth import grow_tree
-from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid._growth import grow_tree
+from seqopt.engines.rigid._operator import OperatorBuilder
+from seqopt.engines.rigid.compliance import ACCURACY, _solve_batch, _try_forces
 from seqopt.network.build import build_network
 from tests.builders import small_arch
 
@@ -29,7 +29,7 @@ def asked():
 
 def test_asked_twice_it_says_the_same(asked):
     """Two grips on one brick share their force for good."""
-    tried = try_forces(*asked, even=True, accuracy=ACCURACY)
+    tried = _try_forces(*asked, even=True, accuracy=ACCURACY)
     assert len(tried.pairs.sets) == 4
     before = tried.force.copy()
     first, second = tried.fields(Want.ALL), tried.fields(Want.ALL)
@@ -41,10 +41,10 @@ def test_asked_twice_it_says_the_same(asked):
 
 @pytest.mark.parametrize("chunk", [1, 2, 3, 5])
 def test_sets_are_trusted_whatever_stands_beside_them(monkeypatch, asked, chunk):
-    whole, trusted = solve_batch(*asked, Want.ALL)
+    whole, trusted = _solve_batch(*asked, Want.ALL)
     assert trusted.all()
     monkeypatch.setattr(trial, "_CHUNK", chunk)
-    parts, also = solve_batch(*asked, Want.ALL)
+    parts, also = _solve_batch(*asked, Want.ALL)
     assert also.all()
     size = np.abs(whole.edge_force).max()
     assert np.abs(parts.edge_force - whole.edge_force).max() <= 1e-9 * size

@@ -33,8 +33,8 @@ from experiments.discrete.parts.arches_lmgc90 import (
     witness,
 )
 from experiments.harness.lmgc90 import python_with_lmgc90
+from seqopt.engines.discrete._system import BedStiffness
 from seqopt.engines.discrete.engine import Across, Pinch
-from seqopt.engines.discrete.system import BedStiffness
 from seqopt.network.network import GROUND
 from seqopt.sequence.two_robots import sequential
 from seqopt.study.published import STUDY_BED, STUDY_PADS

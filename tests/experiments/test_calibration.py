@@ -37,8 +37,8 @@ from experiments.calibration.parts.calibration_spread import (
     rotational,
 )
 from experiments.harness.results import RESULTS
+from seqopt.network._mechanics import spring_maps
 from seqopt.network.build import build_network
-from seqopt.network.mechanics import spring_maps
 from seqopt.study.published import printed
 
 VAULTS = vaults()
@@ -121,12 +121,12 @@ def test_stiffness_scales_with_the_springs_and_shares_sum_to_one():
     assert ((share > 0) & (share < 1)).all()
 
 
-@pytest.mark.parametrize(("scale_of", "power"), [(median_scale, 1), (square_scale, 2)])
-def test_the_best_scale_beats_every_other(scale_of, power):
+@pytest.mark.parametrize(("_scale_of", "power"), [(median_scale, 1), (square_scale, 2)])
+def test_the_best_scale_beats_every_other(_scale_of, power):
     share = np.random.default_rng(1).uniform(0.2, 3.0, (8, 5))
     trial = np.linspace(0.01, 5, 4001)[:, None, None]
     least = (np.abs(trial * share - 1) ** power).sum(axis=1).min(axis=0)
-    best = (np.abs(scale_of(share) * share - 1) ** power).sum(axis=0)
+    best = (np.abs(_scale_of(share) * share - 1) ** power).sum(axis=0)
     assert (best <= least + 1e-12).all()
 
 

@@ -26,7 +26,7 @@ from experiments.discrete.parts.arch_pads import (
 )
 from experiments.discrete.parts.arches_lmgc90 import error, moved
 from experiments.harness.results import RESULTS
-from seqopt.engines.discrete.engine import Across, Pinch, pad_stiffness
+from seqopt.engines.discrete.engine import Across, Pinch, _pad_stiffness
 from seqopt.sequence.two_robots import sequential
 from seqopt.study.published import STUDY_PADS, printed
 
@@ -44,7 +44,7 @@ def test_even_pads_can_stand_for_pads_at_corners(engine25, across):
     if across == Across.THICKNESS:
         axis = np.cross(brick.length_axis, axis)
     even, corners = (
-        pad_stiffness(engine25.network, 16, center, p) for p in (pinch, pads_at_corners(pinch))
+        _pad_stiffness(engine25.network, 16, center, p) for p in (pinch, pads_at_corners(pinch))
     )
     np.testing.assert_allclose(corners[:3, :3], even[:3, :3], atol=1e-6)
     turning = 2 * pinch.stiffness.tangential * pinch.side**4 / 6

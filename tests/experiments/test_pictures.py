@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from experiments.figures import PICTURES
 from experiments.harness.claim import claims
 from experiments.harness.results import FIGURES
-from seqopt.report.style import DPI, WIDTH, dress, looks, new_figure, styled
+from seqopt.report._style import DPI, WIDTH, dress, looks, new_figure, styled
 from tests.pictures import flaws, texts
 from tests.quality.engine_limits import picture as limits_picture
 

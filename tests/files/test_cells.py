@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from seqopt._files import _FORMULA, csv_text, harmless, plain
 from seqopt.engines.registry import make_engine
-from seqopt.files import _FORMULA, csv_text, harmless, plain
 from seqopt.network.build import build_network
 from seqopt.responses.table import analyze
-from seqopt.sequence.exports.tables import plan_csv
+from seqopt.sequence.exports._tables import plan_csv
 from seqopt.sequence.schedule_file import parse_plan, parse_schedule, schedule_text
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from seqopt import files
+from seqopt import _files as files
+from seqopt._files import read_text, require_apart, require_folder, write_folder, write_text
 from seqopt.errors import FileError
-from seqopt.files import read_text, require_apart, require_folder, write_folder, write_text
 
 posix = pytest.mark.skipif(os.name != "posix", reason="links, modes and pipes are POSIX's")
 

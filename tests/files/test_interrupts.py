@@ -9,8 +9,8 @@ import time
 
 import pytest
 
-from seqopt.files import write_folder
-from seqopt.interrupts import answered, ending, undisturbed
+from seqopt._files import write_folder
+from seqopt._interrupts import answered, ending, undisturbed
 
 
 def meanwhile(number):

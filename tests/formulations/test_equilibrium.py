@@ -20,8 +20,8 @@ from formulations.contact.limit_analysis import (
     CONE_OPTIONS,
     ENDS,
     SECONDS,
+    _solve_cones,
     compile_equilibrium,
-    solve_cones,
 )
 from formulations.solvers import GAPS, minimize, minimize_whole
 from seqopt.stability.limit_analysis import CAP, Case, Claim, Sense, limits
@@ -187,7 +187,7 @@ def test_how_a_solver_says_that_it_ended(monkeypatch, status):
     monkeypatch.setattr(clarabel, "DefaultSolver", Ended)
     program = np.zeros(1), np.zeros((1, 1)), np.zeros(1), []
     for attempt, own in enumerate(CONE_OPTIONS):
-        assert solve_cones(*program, attempt)[0] is ENDS.get(status, Claim.STALLED)
+        assert _solve_cones(*program, attempt)[0] is ENDS.get(status, Claim.STALLED)
         given, usual = Ended.given[-1], clarabel.DefaultSettings()
         assert (given.time_limit, given.max_threads, given.verbose) == (SECONDS, 1, False)
         assert given.equilibrate_enable is own.get("equilibrate_enable", usual.equilibrate_enable)
@@ -197,13 +197,13 @@ def test_how_a_solver_says_that_it_ended(monkeypatch, status):
 
 def test_the_first_attempt_is_the_first_and_has_its_authors_scaling(monkeypatch):
     given = []
-    solved = formulations.contact.limit_analysis.solve_cones
+    solved = formulations.contact.limit_analysis._solve_cones
 
     def attempted(*words):
         given.append(words[-1])
         return solved(*words)
 
-    monkeypatch.setattr("formulations.contact.limit_analysis.solve_cones", attempted)
+    monkeypatch.setattr("formulations.contact.limit_analysis._solve_cones", attempted)
     program = compile_equilibrium(CUBE)
     for attempts in ((), (0,), (1,)):
         program(case(Sense.LARGEST), *attempts)

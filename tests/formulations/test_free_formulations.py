@@ -10,14 +10,15 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from formulations.states.on_graph import Choice, on_graph, on_paths, worth
-from formulations.states.totals import least_total
+from formulations.states._search import _on_paths, worth
+from formulations.states._totals import least_total
+from formulations.states.on_graph import Choice, on_graph
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import fewest_moves, lexicographic
+from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import build_states
-from seqopt.graph.states.visits import explore
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import (
     FormulationKind,
@@ -29,7 +30,7 @@ from seqopt.plan.calling.formulation import (
 from seqopt.plan.solving import solve
 from seqopt.problem.problem import WORST_TOTAL, cvar
 from seqopt.problem.requirements import Limit
-from seqopt.sequence.free_rules import FreeRules, with_robots
+from seqopt.sequence.rules import FreeRules, with_robots
 from tests.brute_force import ONES, best_values
 from tests.builders import from_both_sides, small_arch
 from tests.random_graphs import graphs, simple_paths, values_of
@@ -105,7 +106,7 @@ def test_all_agree_with_brute_force_under_any_rules(build):
 @given(graph=graphs())
 @settings(max_examples=30)
 def test_it_finds_the_best_path_of_any_graph(name, graph):
-    graph = on_paths(graph)
+    graph = _on_paths(graph)
     found = sorted(values_of(graph, moves) for moves in simple_paths(graph))
     if found:
         choice = ALL[name].solve.choose(graph, Watch(np.inf))
@@ -236,7 +237,7 @@ def test_the_least_total_over_scenarios_is_that_of_every_path(graph, level):
         return
     aim = WORST_TOTAL if level is None else cvar(level)
     found = least_total(
-        on_paths(once), aim, lambda g: (lexicographic(g).path, lexicographic(g).values[0]), Watch()
+        _on_paths(once), aim, lambda g: (lexicographic(g).path, lexicographic(g).values[0]), Watch()
     )
     least = aim.each(np.array(paths)).min()
     assert found.value == pytest.approx(least) == pytest.approx(found.bound)

@@ -9,7 +9,7 @@ import pytest
 
 import seqopt
 from seqopt.errors import ProblemError, SolverError
-from seqopt.responses.blocks import Store
+from seqopt.responses._blocks import Store
 from tests.brute_force import ONES
 from tests.builders import small_arch
 

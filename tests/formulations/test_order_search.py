@@ -17,13 +17,13 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpErro
 from seqopt.graph.orders import AllOrders, OrderSelection, trying, whole_bound
 from seqopt.graph.states.states import build_states, over_scenarios, within
 from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation
-from seqopt.plan.judge.orders import finds_better_order
+from seqopt.plan.judge._orders import finds_better_order
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import StepCost, WorstRatio
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import Resources
 from seqopt.scene.library.wall import WallShape, wall
-from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.rules import FreeRules
 from seqopt.work.progress import Stage
 from tests.builders import from_both_sides, small_arch
 from tests.strategies import free_builds
@@ -106,7 +106,7 @@ def test_formulations_of_states_find_the_best_order_too(name, aim):
 
 
 def test_orders_of_too_many_sets_are_left_to_the_search(monkeypatch):
-    monkeypatch.setattr("formulations.states.on_graph.MOST_PARTS", 2)
+    monkeypatch.setattr("formulations.states._search.MOST_PARTS", 2)
     with pytest.raises(ProblemError, match="more than 2 sets of bricks; take order_search"):
         seqopt.solve(posed(small_arch(4)), "path_dp")
 

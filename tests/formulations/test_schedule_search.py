@@ -13,21 +13,21 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt.contact.elastic_limits import find_elastic_limits
+from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
-from seqopt.engines.auto import AutoEngine, Level
+from seqopt.engines._auto import AutoEngine, Level
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError, TimeUpError
 from seqopt.graph.paths import fewest_moves, keep_best, reached
+from seqopt.graph.states._visits import explore, steps_with, with_held
 from seqopt.graph.states.states import build_states
-from seqopt.graph.states.visits import explore, steps_with, with_held
 from seqopt.network.build import build_network
 from seqopt.plan.front import StateFront, find_front, pick, upper_bounds
 from seqopt.plan.judge.schedules import judge_schedule, plan_values
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
-from seqopt.sequence.free_rules import FreeRules, with_robots
+from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from tests.brute_force import FOUR, ONES, least_peak, peaks, whole_graph
 from tests.builders import small_arch
@@ -347,7 +347,7 @@ def test_a_time_limit_holds_while_it_is_asked_what_helps(monkeypatch, limit, sai
     """What is known by then is said."""
     engine = ComplianceEngine(build_network(small_arch(5)))
     problem = build_states(engine, FreeRules(), ONES, "steps", [Limit("F_largest", 1.0)])
-    monkeypatch.setattr("seqopt.plan.judge.infeasible.time", Clock())
+    monkeypatch.setattr("seqopt.plan.judge._infeasible.time", Clock())
     with pytest.raises(InfeasibleError, match=said):
         seqopt.solve(problem, "schedule_search", time_limit=limit)
 

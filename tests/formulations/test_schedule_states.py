@@ -20,7 +20,7 @@ from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY
-from seqopt.sequence.free_rules import with_robots
+from seqopt.sequence.rules import with_robots
 from seqopt.sequence.schedule_file import parse_schedule
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.stability.assessment import Verdict, verdict

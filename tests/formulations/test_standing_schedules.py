@@ -21,19 +21,19 @@ from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SceneEr
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
 from seqopt.plan.front import StateFront, find_front
-from seqopt.plan.judge.infeasible import worst_least
+from seqopt.plan.judge._infeasible import worst_least
 from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import LIMIT_TOLERANCE
-from seqopt.problem.standing import Standing, StandingSets, without_implied
+from seqopt.problem.standing import Standing, StandingSets, _without_implied
 from seqopt.responses.quantities import CHOSEN_BY, lengths
-from seqopt.sequence.free_check import RuleBook
-from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence._rule_check import RuleBook
+from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.stability.assessment import Verdict, bonded, verdict_of
+from seqopt.stability._margins import Margins
+from seqopt.stability._prover import Prover
+from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.limit_analysis import GAP
-from seqopt.stability.margins import Margins
-from seqopt.stability.prover import Prover
 from tests.builders import small_arch
 from tests.strategies import free_builds
 
@@ -59,7 +59,7 @@ def worth(engine, bricks, grips):
 def stands(network, bricks, grips, mortar):
     """By the cone program."""
     assembly = step_assembly(network, bricks, grips)
-    return verdict_of(Prover(assembly, compile_equilibrium)(bonded(assembly, mortar)))
+    return _verdict_of(Prover(assembly, compile_equilibrium)(bonded(assembly, mortar)))
 
 
 def brute_force(engine, rules, mortar):
@@ -213,7 +213,7 @@ def test_a_bond_is_found_to_its_share_at_every_size(scale):
 def test_demands_that_others_imply_are_not_asked():
     weak, strong = Standing("bond=3e3"), Standing("dry")
     tilted = Standing("bond=1e3", 0.1)
-    assert without_implied((weak, strong, tilted, weak)) == (strong, tilted)
+    assert _without_implied((weak, strong, tilted, weak)) == (strong, tilted)
 
 
 def test_margins_come_before_other_aims(dry):

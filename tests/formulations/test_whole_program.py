@@ -10,10 +10,10 @@ import pytest
 
 from formulations.layers.exhibits import (
     MINIMAX_LAYER,
+    _flow_of_peaks,
+    _largest_of_each,
+    _worst_pairs,
     below,
-    flow_of_peaks,
-    largest_of_each,
-    worst_pairs,
 )
 from formulations.layers.overlap_flow import OVERLAP_MIP
 from seqopt.errors import InfeasibleError
@@ -77,8 +77,8 @@ def test_a_program_is_itself_and_one_without_a_choice_is_infeasible():
 
 def test_what_is_read_from_assignments():
     picks = np.array([0.1, 0.9, 0.0, 0.2, 0.8, 1.0])
-    assert largest_of_each((2, 3, 1))(picks) == (1, 2, 0)
-    assert largest_of_each((6,))(picks) == (5,)
+    assert _largest_of_each((2, 3, 1))(picks) == (1, 2, 0)
+    assert _largest_of_each((6,))(picks) == (5,)
 
 
 @pytest.mark.parametrize(("scale", "least"), [(4.0, 0.0), (0.5, -3.0)])
@@ -92,11 +92,11 @@ def test_a_bound_is_lower_by_what_a_solver_may_be_off(scale, least, value):
 @pytest.mark.parametrize("lowest", [-9.0, 1.0])
 def test_pairs_cost_the_worst_of_both(lowest):
     costs = costs_of(lowest)
-    worst, least = worst_pairs(costs)
+    worst, least = _worst_pairs(costs)
     for part, shared, single in zip(worst, costs.shared, costs.single, strict=True):
         assert (part == np.maximum(shared, single[None, :])).all()
     assert least == min(0.0, *(part.min() for part in worst))
-    flow, bound = flow_of_peaks(CostProblem(costs))
+    flow, bound = _flow_of_peaks(CostProblem(costs))
     assert flow.cost.min() >= 0.0
     sizes = [np.concatenate([part.ravel() for part in worst])]
     assert flow.cost == pytest.approx((sizes[0] - least) / (sizes[0] - least).max(), rel=1e-12)

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph import Explorer, Graph, lexicographic
-from seqopt.graph.budgets import budget_bounds, within_budgets
-from seqopt.graph.duality import lexicographic_bounds, sum_bound
-from seqopt.graph.explore import Moves
+from seqopt.graph._budgets import budget_bounds, within_budgets
+from seqopt.graph._explore import Moves
+from seqopt.graph.duality import _sum_bound, lexicographic_bounds
 from seqopt.graph.paths import distances, reached
 from tests.random_graphs import graphs, simple_paths, values_of
 
@@ -71,11 +71,11 @@ def line():
 def test_potentials_that_a_move_violates_prove_nothing():
     graph = line()
     right = distances(graph, graph.amounts[:, 0])
-    assert sum_bound(graph, 0, right) == 3.0
+    assert _sum_bound(graph, 0, right) == 3.0
     wrong = right.copy()
     wrong[2] = 3.5  # more than the move from the start takes
-    assert sum_bound(graph, 0, wrong) == -np.inf
-    assert sum_bound(graph, 0, right + 1) == -np.inf  # the start has a potential of its own
+    assert _sum_bound(graph, 0, wrong) == -np.inf
+    assert _sum_bound(graph, 0, right + 1) == -np.inf  # the start has a potential of its own
 
 
 def test_amounts_that_pay_without_end_are_refused():

@@ -16,7 +16,7 @@ from seqopt.errors import ProblemError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.layers.ranking import (
-    least_among_least,
+    _least_among_least,
     move_costs,
     rank_choice,
     split_gap,
@@ -25,7 +25,7 @@ from seqopt.graph.layers.ranking import (
 )
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
-from seqopt.problem.criteria import Among, Ranked, row_ranks, scaled_ranks
+from seqopt.problem.criteria import Among, Ranked, _row_ranks, _scaled_ranks
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS, WEIGHTED, published_choice
@@ -72,9 +72,9 @@ def test_rows_are_ranked_as_if_alone(rows):
     table = np.array(rows, float)
     if not np.isfinite(table).any() or table.ndim != 2:
         return
-    together = row_ranks(table, 9)
+    together = _row_ranks(table, 9)
     for row, ranks in zip(table, together, strict=True):
-        alone = scaled_ranks(row, 9) if np.isfinite(row).any() else np.full(row.shape, np.nan)
+        alone = _scaled_ranks(row, 9) if np.isfinite(row).any() else np.full(row.shape, np.nan)
         np.testing.assert_array_equal(ranks, alone)
 
 
@@ -187,8 +187,8 @@ def test_of_the_best_choices_the_cheapest_by_the_other_costs(first, data):
     second = LayeredCosts(*parts)
     choices = [c for c in product(*map(range, costs.sizes)) if np.isfinite(costs.cost(c))]
     if not choices:
-        assert least_among_least(costs, second) == np.inf
+        assert _least_among_least(costs, second) == np.inf
         return
     least = min(map(costs.cost, choices))
     wanted = min(second.cost(c) for c in choices if costs.cost(c) == least)
-    assert least_among_least(costs, second) == pytest.approx(wanted)
+    assert _least_among_least(costs, second) == pytest.approx(wanted)

@@ -16,7 +16,7 @@ from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.scene.parts import Anywhere, Robot, Sphere
-from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.rules import FreeRules
 from tests.builders import rescaled
 from tests.strategies import free_builds
 

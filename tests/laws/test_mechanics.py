@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want
+from seqopt.engines.rigid._growth import grow_tree
+from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.growth import grow_tree
-from seqopt.engines.rigid.operator import OperatorBuilder
 from seqopt.network.build import build_network
 from seqopt.responses.quantities import responses_of
 from tests.builders import about_vertical, moved, scaled, solve

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
-from seqopt.stability.screens import FALLS, OPEN, STANDS, Screen
+from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen
 from tests.builders import about_vertical, moved, scaled
 from tests.strategies import arches
 

@@ -17,8 +17,8 @@ from seqopt.contact.mortar import DRY, Mortar
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.sequence.steps import Step, StepKind
+from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import Verdict, assess, bonded
-from seqopt.stability.prover import Prover
 from tests.builders import about_vertical, held, moved
 from tests.strategies import arches
 

@@ -18,7 +18,7 @@ from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
-from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.rules import FreeRules
 from tests.builders import small_arch
 
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))

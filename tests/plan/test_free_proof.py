@@ -11,11 +11,11 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
-from seqopt.plan.judge.proof import Proof
-from seqopt.plan.judge.rule_moves import RuleTables
+from seqopt.plan.judge._proof import Proof
+from seqopt.plan.judge._rule_moves import RuleTables
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
-from seqopt.sequence.free_check import RuleBook
+from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.steps import StepKind
 from tests.strategies import free_builds
 

@@ -14,13 +14,13 @@ from formulations.states.schedule_search import FORMULATION as PLAN
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.graph.states.states import build_states
-from seqopt.plan.calling.guard import StatePath
+from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.front import FrontSelection, StateFront, find_front
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import parse_goals
 from seqopt.problem.requirements import Limit
-from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.rules import FreeRules
 from tests.builders import small_arch
 
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, MemoryShortError, ProblemError, SolverError
 from seqopt.graph.layers.costs import Budget, LayeredCosts
@@ -18,7 +18,7 @@ from seqopt.network.build import build_network
 from seqopt.plan.calling import formulation as registry
 from seqopt.plan.calling.formulation import Selection, find_formulation
 from seqopt.plan.solving import solve
-from seqopt.responses import blocks as batches
+from seqopt.responses import _blocks as batches
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop

@@ -13,26 +13,26 @@ import seqopt
 from seqopt.engines.interface import Want
 from seqopt.errors import SolverError
 from seqopt.graph import Explorer
+from seqopt.graph.layers._partial_costs import PartialCosts
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.layers.partial_costs import PartialCosts
 from seqopt.graph.orders import AllOrders, OrderStates
 from seqopt.graph.paths import keep_best, least_peak
+from seqopt.graph.states._visits import explore, floors_of_goals
 from seqopt.graph.states.states import build_states
-from seqopt.graph.states.visits import explore, floors_of_goals
 from seqopt.plan.calling.formulation import Selection
-from seqopt.plan.judge import budget_proof
-from seqopt.plan.judge.budget_proof import least_within
+from seqopt.plan.judge import _budget_proof as budget_proof
+from seqopt.plan.judge._budget_proof import least_within
+from seqopt.plan.judge._orders import finds_better_order
+from seqopt.plan.judge._proof import Passable, Proof
 from seqopt.plan.judge.certificate import TOLERANCE, certify_partial
-from seqopt.plan.judge.orders import finds_better_order
-from seqopt.plan.judge.proof import Passable, Proof
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY
-from seqopt.sequence.free_check import RuleBook
-from seqopt.sequence.free_rules import Ending, FreeRules, with_robots
+from seqopt.sequence._rule_check import RuleBook
+from seqopt.sequence.rules import Ending, FreeRules, with_robots
 from tests.builders import small_arch
 
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import seqopt
 from formulations.scenarios import scenario_search
-from formulations.scenarios.scenario_program import solve_program
-from formulations.scenarios.scenario_search import Searched, best_weights, close_gap
+from formulations.scenarios.scenario_program import _solve_program
+from formulations.scenarios.scenario_search import _close_gap, _Searched, best_weights
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.costs import LayeredCosts
@@ -130,10 +130,10 @@ def test_plans_agree_with_the_program(aim, layers):
         return
     plan = seqopt.solve(Posed(layers, aim))
     most = aim.most(len(layers))
-    assert solve_program(layers, most, whole=True).value == pytest.approx(
+    assert _solve_program(layers, most, whole=True).value == pytest.approx(
         plan.certificate.objective, abs=1e-5
     )
-    relaxed = solve_program(layers, most, whole=False).value
+    relaxed = _solve_program(layers, most, whole=False).value
     assert relaxed == pytest.approx(plan.certificate.bound, abs=1e-4 * max(1.0, abs(relaxed)))
 
 
@@ -193,7 +193,7 @@ def test_one_scenario_is_the_nominal_problem():
 
 
 def claimed(monkeypatch, found):
-    monkeypatch.setattr(scenario_search, "close_gap", lambda *_: found)
+    monkeypatch.setattr(scenario_search, "_close_gap", lambda *_: found)
 
 
 LAYERS = tuple(
@@ -204,8 +204,8 @@ LAYERS = tuple(
 @pytest.mark.parametrize(
     ("found", "match"),
     [
-        (Searched((0,), 2.5, 2.0), "objective is 3, not 2.5 as claimed"),
-        (Searched((1,), 4.0, 4.5), "bound is 4.5, above the objective 4"),
+        (_Searched((0,), 2.5, 2.0), "objective is 3, not 2.5 as claimed"),
+        (_Searched((1,), 4.0, 4.5), "bound is 4.5, above the objective 4"),
     ],
 )
 def test_a_false_claim_is_refused(monkeypatch, found, match):
@@ -229,7 +229,7 @@ def test_the_gap_that_weights_leave_is_real_here():
     arcs = scenario_arcs(LAYERS, WORST_TOTAL)
     weighed = best_weights(arcs, Watch())
     assert weighed.bound == pytest.approx(2.0)
-    searched = close_gap(arcs, weighed, Watch())
+    searched = _close_gap(arcs, weighed, Watch())
     assert searched.bound == pytest.approx(3.0)
 
 

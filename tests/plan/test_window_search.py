@@ -7,7 +7,7 @@ import pytest
 
 from seqopt.errors import ProblemError, SolverError
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.plan.search.window_search import search_windows, window
+from seqopt.plan.search._window_search import search_windows, window
 from seqopt.plan.solving import solve
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import three_robot_loop

@@ -14,11 +14,11 @@ from seqopt.problem.criteria import (
     Ranked,
     RankSum,
     WeightedSum,
+    _mean_ranks,
+    _ranks_of,
+    _scaled_ranks,
     equal,
-    mean_ranks,
     present,
-    ranks_of,
-    scaled_ranks,
 )
 from seqopt.problem.criteria import WorstRatio as Worst
 from seqopt.problem.requirements import NEVER, ROUNDED, Units
@@ -77,14 +77,14 @@ def test_what_is_below_the_resolution_decides_nothing():
 
 def test_ranks_of_pairs_run_as_far_as_those_of_candidates():
     pairs = np.array([[4.0, 1.0, 2.0], [3.0, NAN, NAN]])
-    assert scaled_ranks(pairs, 2) == pytest.approx(
+    assert _scaled_ranks(pairs, 2) == pytest.approx(
         np.array([[2.25, 0.75, 1.25], [1.75, NAN, NAN]]), nan_ok=True
     )
-    assert scaled_ranks(np.full((2, 3), NAN), 4).tolist() == [[2.5] * 3] * 2
-    assert scaled_ranks(np.array([NAN, 5.0, np.inf, 2.0]), 4) == pytest.approx(
+    assert _scaled_ranks(np.full((2, 3), NAN), 4).tolist() == [[2.5] * 3] * 2
+    assert _scaled_ranks(np.array([NAN, 5.0, np.inf, 2.0]), 4) == pytest.approx(
         [NAN, 2, NAN, 1], nan_ok=True
     )
-    assert mean_ranks(np.array([7.0, 1.0, 7.0, 7.0, 3.0])).tolist() == [4, 1, 4, 4, 2]
+    assert _mean_ranks(np.array([7.0, 1.0, 7.0, 7.0, 3.0])).tolist() == [4, 1, 4, 4, 2]
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -94,21 +94,21 @@ def test_given_the_choice_before_every_row_is_ranked_for_itself(seed):
     values[rng.random(values.shape) < 0.2] = NAN
     if np.isnan(values).all():
         values[0, 0] = 1.0
-    rows = ranks_of(values, 9, Ranked.CONDITIONAL)
+    rows = _ranks_of(values, 9, Ranked.CONDITIONAL)
     for row, own in zip(rows, values, strict=True):
-        one = np.full(own.shape, NAN) if np.isnan(own).all() else scaled_ranks(own, len(own))
+        one = np.full(own.shape, NAN) if np.isnan(own).all() else _scaled_ranks(own, len(own))
         assert row == pytest.approx(one, nan_ok=True)
-    assert ranks_of(np.full((2, 3), NAN), 4, Ranked.CONDITIONAL).tolist() == [[2.5] * 3] * 2
+    assert _ranks_of(np.full((2, 3), NAN), 4, Ranked.CONDITIONAL).tolist() == [[2.5] * 3] * 2
 
 
 @pytest.mark.parametrize("ranked_among", Ranked)
 def test_what_one_move_decides_is_ranked_in_either_way(ranked_among):
     single, pairs = np.array([3.0, 1.0, 2.0]), np.array([[4.0, 1.0], [2.0, 3.0]])
-    assert ranks_of(single, 3, ranked_among).tolist() == [3, 1, 2]
+    assert _ranks_of(single, 3, ranked_among).tolist() == [3, 1, 2]
     by_row = [[2.0, 1.0], [1.0, 2.0]]
     by_pair = [[2.25, 0.75], [1.25, 1.75]]
     expected = by_pair if ranked_among is Ranked.PAIRS else by_row
-    assert ranks_of(pairs, 2, ranked_among).tolist() == expected
+    assert _ranks_of(pairs, 2, ranked_among).tolist() == expected
     own = replace(ranked((("T_max", 1.0),)), ranked=ranked_among)
     assert own.costs({"T_max": 10 * pairs}, 3, 2).tolist() == expected
 

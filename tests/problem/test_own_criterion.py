@@ -15,11 +15,11 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers, travel
 from seqopt.graph.states.states import build_states
-from seqopt.plan.judge.proof import Proof
+from seqopt.plan.judge._proof import Proof
 from seqopt.plan.search.in_order import least_quantile, solve_in_order
 from seqopt.problem.criteria import StepCost, WeightedSum
 from seqopt.problem.problem import Aim
-from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.rules import FreeRules
 from tests.builders import six_bricks, small_arch
 from tests.strategies import problems
 

@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 
 import seqopt
 from experiments.harness.scenes import running_bond
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 from seqopt.contact.mortar import bond_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import OVER_METHODS, RankSum, WeightedSum, equal
-from seqopt.problem.requirements import NEVER, ROUNDED, SceneFacts, crown, own_scales
+from seqopt.problem.requirements import NEVER, ROUNDED, SceneFacts, _own_scales, crown
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Sphere
-from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION
 from tests.builders import anywhere, far_reaching, rescaled, small_arch
@@ -105,7 +105,7 @@ def test_a_method_that_falls_on_its_way_gives_no_scales():
             (table,) = stand.values()
             assert facts.reference["M_sup"] == table["M_sup_Nm"].max()
         else:
-            assert facts.reference == own_scales(network)
+            assert facts.reference == _own_scales(network)
             assert facts.basis == " over payload, weight and size"
 
 
@@ -150,7 +150,7 @@ def test_scales_of_a_scene_go_with_its_units():
     scene = one_places(5)
     length, force, softness = 2.0, 8.0, 4.0
     own, other = (
-        own_scales(build_network(s)) for s in (scene, rescaled(scene, length, force, softness))
+        _own_scales(build_network(s)) for s in (scene, rescaled(scene, length, force, softness))
     )
     ratio = {name: other[name] / own[name] for name in ("F_largest", "T_max", "M_sup")}
     assert ratio == {"F_largest": force, "T_max": force, "M_sup": force * length}

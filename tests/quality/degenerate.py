@@ -34,8 +34,8 @@ import pandas as pd
 
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.interface import PlacementProblem
+from seqopt.plan.calling._guard import require_fit
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, formulations
-from seqopt.plan.calling.guard import require_fit
 from seqopt.plan.judge.certificate import judge as certified
 from tests.quality.degenerate_cases import CASES, Case, Size, enumerated
 

@@ -35,15 +35,15 @@ from matplotlib.ticker import NullLocator
 
 from experiments.harness.results import save_figure
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.diagnosis import UNRESISTED, WELL, residual, spectrum
+from seqopt.engines.diagnosis import UNRESISTED, WELL, _spectrum, residual
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Fields, Want, grip_columns
+from seqopt.engines.rigid._mixed import solve_dense, solve_mixed
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.mixed import solve_dense, solve_mixed
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.report.style import BLUE, GRAY, GREEN, VERMILION, dress, new_figure, plain, styled
+from seqopt.report._style import BLUE, GRAY, GREEN, VERMILION, dress, new_figure, plain, styled
 from tests.limit_scenes import (
     Case,
     chain,
@@ -216,7 +216,7 @@ def examine(case: Case, solvers: dict[str, Solve]) -> Iterator[dict[str, object]
             exact.append(solve_exactly(net, bricks, columns))
         except MechanismError:
             exact.append(None)
-    lowest = min(spectrum(net, bricks, columns)[0] for columns in places)
+    lowest = min(_spectrum(net, bricks, columns)[0] for columns in places)
     point = {"sweep": case.sweep, "value": case.value, "label": case.label, "bricks": bricks}
     for name, solve in solvers.items():
         tried = [attempt(net, c, e, solve) for c, e in zip(places, exact, strict=True)]

@@ -43,9 +43,9 @@ class Equivalent:
 
 COMPLIANCE = "seqopt.engines.rigid.compliance"
 TRIAL = "seqopt.engines.rigid.compliance"
-OPERATOR = "seqopt.engines.rigid.operator"
-GROWTH = "seqopt.engines.rigid.growth"
-GRIPS = "seqopt.engines.rigid.grip_equations"
+OPERATOR = "seqopt.engines.rigid._operator"
+GROWTH = "seqopt.engines.rigid._growth"
+GRIPS = "seqopt.engines.rigid._grip_equations"
 COSTS, CERTIFICATE = "seqopt.graph.layers.costs", "seqopt.plan.judge.certificate"
 CRITERIA, RANKS = "seqopt.problem.criteria", "seqopt.problem.criteria"
 LENGTHS = "both have a length: costs that have not are refused when they are made"

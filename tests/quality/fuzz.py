@@ -55,7 +55,7 @@ BLOCKS = tuple(f"block{i}" for i in range(24))
 WRITER = """
 import signal
 from pathlib import Path
-from seqopt.files import write_folder
+from seqopt._files import write_folder
 signal.signal(signal.SIGTERM, signal.default_int_handler)  # as the command line takes it
 for name in range(1000):
     write_folder(Path("{out}", str(name)), {{f"block{{i}}": "x" * 500_000 for i in range(24)}})

@@ -26,8 +26,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from seqopt.cli.answer import Status
-from seqopt.cli.main import main
+from seqopt._cli.answer import Status
+from seqopt._cli.main import main
 from seqopt.responses.quantities import RESPONSES, robot_response
 from tests.builders import ROOT
 from tests.quality.fuzz_cases import Case, Mutator, write_case

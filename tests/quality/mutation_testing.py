@@ -53,20 +53,20 @@ RIGID = (
 CHOSEN = ("formulations/test_programs", "formulations/test_degenerate")
 STANDING = ("formulations/test_equilibrium", "validation/test_limit_analysis")
 PROOFS = {
-    "seqopt.plan.judge.budget_proof": ("plan/test_proofs", "plan/test_budget_proof"),
+    "seqopt.plan.judge._budget_proof": ("plan/test_proofs", "plan/test_budget_proof"),
     "seqopt.plan.judge.certificate": (
         *("plan/test_certificate", "plan/test_values", "plan/test_proofs"),
         "agreement/test_pair_search",
     ),
-    "seqopt.plan.judge.infeasible": ("plan/test_budget_proof", "plan/test_no_choice"),
+    "seqopt.plan.judge._infeasible": ("plan/test_budget_proof", "plan/test_no_choice"),
     "seqopt.graph.duality": ("graph/test_graph", "plan/test_free_proof"),
-    "seqopt.plan.judge.proof": (
+    "seqopt.plan.judge._proof": (
         *("plan/test_proofs", "plan/test_free_proof", "plan/test_free_judge"),
     ),
-    "seqopt.plan.judge.rule_moves": ("plan/test_free_proof", "plan/test_proofs"),
+    "seqopt.plan.judge._rule_moves": ("plan/test_free_proof", "plan/test_proofs"),
     "seqopt.graph.orders": ("formulations/test_order_search",),
-    "seqopt.plan.judge.orders": ("plan/test_proofs", "formulations/test_order_search"),
-    "seqopt.graph.layers.partial_costs": ("plan/test_proofs", "agreement/test_pair_search"),
+    "seqopt.plan.judge._orders": ("plan/test_proofs", "formulations/test_order_search"),
+    "seqopt.graph.layers._partial_costs": ("plan/test_proofs", "agreement/test_pair_search"),
 }  # what says that nothing is better, or that there is nothing
 MODULES = {
     "seqopt.engines.rigid.compliance": (
@@ -74,9 +74,9 @@ MODULES = {
         *("engines/test_loose", "engines/test_planar", "responses/test_finite"),
         *("engines/test_trial", "engines/test_growth"),
     ),
-    "seqopt.engines.rigid.operator": RIGID,
-    "seqopt.engines.rigid.grip_equations": RIGID,
-    "seqopt.engines.rigid.growth": ("engines/test_operator", "engines/test_growth"),
+    "seqopt.engines.rigid._operator": RIGID,
+    "seqopt.engines.rigid._grip_equations": RIGID,
+    "seqopt.engines.rigid._growth": ("engines/test_operator", "engines/test_growth"),
     "seqopt.graph.layers.costs": ("graph/test_costs", "plan/test_values"),
     **PROOFS,
     "seqopt.problem.criteria": (

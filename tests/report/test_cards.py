@@ -12,9 +12,9 @@ from PIL import Image
 
 import seqopt
 from seqopt.problem.problem import Orders
+from seqopt.report._notebook import card, facts
 from seqopt.report.comparison import largest
 from seqopt.report.draw import ROBOT_COLORS
-from seqopt.report.notebook import card, facts
 from seqopt.stability.assessment import assess_steps
 
 HEAVIEST = 60_000  # letters of HTML

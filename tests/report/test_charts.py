@@ -10,9 +10,9 @@ from seqopt.engines.registry import make_engine
 from seqopt.graph.layers.layers import travel
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
+from seqopt.report._style import WIDTH
 from seqopt.report.charts import comparison_figures, trace_figure
 from seqopt.report.comparison import compare
-from seqopt.report.style import WIDTH
 from seqopt.study.published import CRITERIA
 from tests.builders import six_bricks
 from tests.pictures import flaws

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt.report.draw import View, drawing_order
+from seqopt.report.draw import View, _drawing_order
 from seqopt.scene.boxes import boxes
 from seqopt.scene.library import WallShape, wall
 from seqopt.scene.scene_file import load_scene
@@ -47,7 +47,7 @@ def hidden_wrongly(scene, view, order, rays):
 @given(azimuth=st.integers(-180, 180), elevation=st.integers(20, 80))
 def test_bricks_of_a_wall_hide_what_is_behind(azimuth, elevation):
     view = View(azimuth, elevation)
-    order = drawing_order(boxes(WALL.bricks).corners(), view.axes())
+    order = _drawing_order(boxes(WALL.bricks).corners(), view.axes())
     assert sorted(order) == [*range(16)]
     assert hidden_wrongly(WALL, view, order, 80) == 0
 
@@ -57,14 +57,14 @@ def test_bricks_of_a_wall_hide_what_is_behind(azimuth, elevation):
 def test_bricks_that_touch_and_are_corbelled_are_drawn_in_order(corbel, azimuth):
     """Planes that part two of them along an edge disagree: neither hides the other."""
     scene, view = load_scene(f"wall:columns=4,courses=5,corbel={corbel}"), View(azimuth, 20)
-    order = drawing_order(boxes(scene.bricks).corners(), view.axes())
+    order = _drawing_order(boxes(scene.bricks).corners(), view.axes())
     assert hidden_wrongly(scene, view, order, 150) == 0
 
 
 @pytest.mark.parametrize("name", ["arch25", "dome163", "vault338"])
 def test_built_in_scenes_are_drawn_in_order(name):
     scene, view = load_scene(name), View(35, 22)
-    order = drawing_order(boxes(scene.bricks).corners(), view.axes())
+    order = _drawing_order(boxes(scene.bricks).corners(), view.axes())
     assert sorted(order) == [*range(len(scene.bricks))]
     rays = 4000 if name == "arch25" else 400
     assert hidden_wrongly(scene, view, order, rays) == 0

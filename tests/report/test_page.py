@@ -13,15 +13,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from seqopt.cli.main import main
+from seqopt._cli.main import main
+from seqopt._files import csv_text
 from seqopt.engines.interface import Want
 from seqopt.errors import ProblemError
-from seqopt.files import csv_text
 from seqopt.network.build import build_network
 from seqopt.report import page
+from seqopt.report._pages import OVER, comparison_page, plan_page
 from seqopt.report.comparison import compare
-from seqopt.report.page import LARGEST, Build, Scatter, build_data, report_page, structure_data
-from seqopt.report.pages import OVER, comparison_page, plan_page
+from seqopt.report.page import LARGEST, Build, Scatter, _build_data, _structure_data, report_page
 from seqopt.responses.table import analyze
 from seqopt.scene.boxes import block_brick
 from seqopt.scene.imports.contacts import face_ground, flat_face
@@ -58,7 +58,7 @@ def data_of(text):
 
 def test_what_is_read_is_the_table_digit_by_digit(engine25, builds):
     build = builds["sequential"]
-    data = build_data(engine25, build)
+    data = _build_data(engine25, build)
     lines = csv_text(build.table).splitlines()
     assert [",".join(row) for row in [data["columns"], *data["rows"]]] == lines
     assert [step["grips"] for step in data["steps"]] == [list(step.grips) for step in build.steps]
@@ -67,7 +67,7 @@ def test_what_is_read_is_the_table_digit_by_digit(engine25, builds):
 
 def test_what_is_drawn_is_what_the_engine_answers(engine25, builds):
     build = builds["cantilever"]
-    data, count = build_data(engine25, build), len(build.steps)
+    data, count = _build_data(engine25, build), len(build.steps)
     twist, edge = (unpacked(data[name], count) for name in ("twist", "edge"))
     for i in (0, 7, count - 1):
         step = build.steps[i]
@@ -83,7 +83,7 @@ def test_what_is_drawn_is_what_the_engine_answers(engine25, builds):
 
 def test_reactions_are_those_of_the_table(engine25, builds):
     build = builds["cantilever"]
-    data = build_data(engine25, build)
+    data = _build_data(engine25, build)
     for name, column in (("push", "F_sup_N"), ("turn", "M_sup_Nm")):
         found = unpacked(data[name], len(build.steps)).reshape(len(build.steps), -1, 3)
         sizes = np.linalg.norm(found, axis=2).max(axis=1)
@@ -101,7 +101,7 @@ def test_a_point_for_each_build(engine25, builds):
 
 def test_the_structure_is_that_of_the_network(engine25):
     network = engine25.network
-    data = structure_data(network)
+    data = _structure_data(network)
     assert len(data["bricks"]) == 25
     assert len(data["edges"]) == len(network.edge_nodes)
     for brick, drawn in zip(network.scene.placed, data["bricks"], strict=True):
@@ -347,7 +347,7 @@ def test_blocks_of_any_shape_are_drawn_as_they_are():
         build_order=(1,),
         robots=(Robot(name="rob1", payload=1e6),),
     )
-    (drawn,) = structure_data(build_network(scene))["bricks"]
+    (drawn,) = _structure_data(build_network(scene))["bricks"]
     corners = np.array(drawn["corners"])
     area = 0.0
     for face in drawn["faces"]:

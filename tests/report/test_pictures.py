@@ -9,7 +9,7 @@ from PIL import Image
 
 from seqopt.errors import FileError, StepError
 from seqopt.plan.build import GivenSequence
-from seqopt.report.pictures import Film, spread_steps
+from seqopt.report._pictures import Film, spread_steps
 from seqopt.sequence.two_robots import sequential
 
 

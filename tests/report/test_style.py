@@ -12,9 +12,9 @@ import pandas as pd
 import pytest
 from matplotlib.colors import to_rgb
 
-from seqopt.report.charts import front_figure, merged, worst_steps
+from seqopt.report._style import COLORS, look, looks, new_figure, picture_files, plain, styled
+from seqopt.report.charts import _worst_steps, front_figure, merged
 from seqopt.report.draw import POINTS, aside
-from seqopt.report.style import COLORS, look, looks, new_figure, picture_files, plain, styled
 from seqopt.report.text import WORDS, in_words, typed
 from tests.pictures import flaws
 
@@ -118,7 +118,7 @@ def test_equal_tables_are_one_line():
     table = pd.DataFrame({"bricks": [1, 1, 2], "M": [1.0, 3.0, 2.0], "phase": list("abc")})
     other = table.assign(M=[1.0, 3.0, 2.5])
     assert merged({"a": table, "b": other, "c": table.copy()}) == {"a": ("a", "c"), "b": ("b",)}
-    assert worst_steps(table)["M"].tolist() == [3.0, 2.0]
+    assert _worst_steps(table)["M"].tolist() == [3.0, 2.0]
 
 
 def front_of(table):

@@ -12,8 +12,8 @@ from seqopt.errors import ProblemError
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import RankSum, equal
-from seqopt.responses import blocks as batches
-from seqopt.responses.choices import CHOICE_RESPONSES, evaluate_choices
+from seqopt.responses import _blocks as batches
+from seqopt.responses._choices import CHOICE_RESPONSES, evaluate_choices
 from seqopt.responses.quantities import responses_of
 from seqopt.responses.table import step_fields
 from seqopt.sequence.three_robots import SCHEDULES, three_robot_loop

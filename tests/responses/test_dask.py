@@ -10,8 +10,8 @@ import time
 import pytest
 
 from seqopt.engines.registry import make_engine
-from seqopt.responses import blocks as batches
-from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation
+from seqopt.responses import _blocks as batches
+from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation
 from seqopt.responses.resources import HERE, Resources
 from seqopt.workflow import optimize
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt.responses.choices import _PREPARED, Portion, in_places, take_turns
+from seqopt.responses._choices import _PREPARED, Portion, in_places, take_turns
 
 
 class Stub:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from seqopt.files import csv_text
+from seqopt._files import csv_text
 from seqopt.plan.solving import solve
 from seqopt.workflow import optimize
 

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.report.notebook import card
-from seqopt.responses.staged import staged_fields
+from seqopt.report._notebook import card
+from seqopt.responses._staged import staged_fields
 from seqopt.responses.table import _STRAIN, LinearRange, analyze, response_table
-from seqopt.scene.scene_file import save_scene, scene_by_words
+from seqopt.scene.scene_file import _scene_by_words, save_scene
 from seqopt.sequence.two_robots import cantilever, sequential
 from seqopt.study.published import published_plan
 from seqopt.workflow import optimize
@@ -182,7 +182,7 @@ def reached(engine, steps):
 @pytest.mark.parametrize("share", [0.2, 1.0, 5.0])
 def test_at_the_limit_the_displaced_shape_changes_displacements_by_a_tenth(share):
     """What an analysis of second order would add grows with the displacement, as it should."""
-    scene, limit = scene_by_words(WORDS), 0.1 * 0.06
+    scene, limit = _scene_by_words(WORDS), 0.1 * 0.06
     engine = make_engine("compliance", build_network(scene))
     steps = sequential(engine.network)
     most = max(shift for shift, _ in reached(engine, steps))

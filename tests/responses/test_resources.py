@@ -19,15 +19,15 @@ from seqopt.errors import MemoryShortError, ProblemError, SceneError
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
-from seqopt.responses import blocks as batches
-from seqopt.responses import choices as division
-from seqopt.responses.blocks import Block, answer, pack, worker_for
-from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation
+from seqopt.responses import _blocks as batches
+from seqopt.responses import _choices as division
+from seqopt.responses._blocks import Block, answer, pack, worker_for
+from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation
 from seqopt.responses.resources import Resources
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import CRITERIA, EQUATIONS
-from seqopt.work.workers import Processes
+from seqopt.work._workers import Processes
 
 
 def everything(_):
@@ -154,7 +154,7 @@ def test_an_engine_is_made_once_for_a_worker(small_blocks, loop25, monkeypatch):
     engine = make_engine("compliance", loop25.scene)
     send = worker_for(engine, elsewhere=True)
     monkeypatch.setattr(
-        "seqopt.responses.blocks.make_engine",
+        "seqopt.responses._blocks.make_engine",
         lambda *given, **named: made.append(given) or make_engine(*given, **named),
     )
     with ThreadPoolExecutor(1) as executor:

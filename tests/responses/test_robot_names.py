@@ -10,15 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt.cli.main import main
-from seqopt.cli.values import parse_criterion, parse_limits
+from seqopt._cli.main import main
+from seqopt._cli.values import parse_criterion, parse_limits
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import candidate_layers, robot_use
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
 from seqopt.problem.requirements import Limit, payload_limits
 from seqopt.report.comparison import compare
-from seqopt.responses.choices import CHOICE_RESPONSES
+from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses.quantities import RESPONSES, robot_response
 from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import save_scene

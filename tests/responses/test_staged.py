@@ -13,9 +13,9 @@ from scipy import linalg
 from seqopt.engines.interface import _NAMES, Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import MechanismError, StepError
+from seqopt.network._mechanics import node_motion, spring_maps
 from seqopt.network.build import build_network
-from seqopt.network.mechanics import node_motion, spring_maps
-from seqopt.responses.staged import Placing, analyze_staged, staged_fields
+from seqopt.responses._staged import Placing, analyze_staged, staged_fields
 from seqopt.responses.table import analyze
 from seqopt.scene.parts import Joint
 from seqopt.sequence.steps import Step, StepKind

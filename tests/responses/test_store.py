@@ -21,9 +21,9 @@ from seqopt.graph.scenarios import in_scenarios
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WeightedSum
 from seqopt.problem.problem import WORST_TOTAL
-from seqopt.responses import blocks
-from seqopt.responses.blocks import Store
-from seqopt.responses.choices import Evaluation
+from seqopt.responses import _blocks as blocks
+from seqopt.responses._blocks import Store
+from seqopt.responses._choices import Evaluation
 from seqopt.responses.resources import Resources
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS
@@ -46,7 +46,7 @@ def asked(monkeypatch):
         calls.append(block.key)
         return plain(engine, block)
 
-    monkeypatch.setattr("seqopt.responses.blocks.answer", counted)
+    monkeypatch.setattr("seqopt.responses._blocks.answer", counted)
     return calls
 
 
@@ -242,7 +242,7 @@ def test_a_search_without_proof_uses_it_too(tmp_path, asked):
 
 RUN = """
 import sys
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 if __name__ == "__main__":
     words = ["optimize", sys.argv[1], "--formulation", "cascade", "--out", sys.argv[2]]
     sys.exit(main([*words, "--cache", sys.argv[3], *sys.argv[4:]]))

@@ -10,7 +10,7 @@ from seqopt.contact.faces import bare_assembly
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.parts import Joint, Robot
-from seqopt.scene.scene_file import dump_scene, load_scene, parse_scene
+from seqopt.scene.scene_file import _parse_scene, dump_scene, load_scene
 from tests.blocks import with_shapes
 from tests.builders import six_bricks
 
@@ -48,15 +48,15 @@ def renamed(document, name):
 )
 def test_one_line_says_what_is_wrong(text, named):
     with pytest.raises(SceneError, match=named) as caught:
-        parse_scene(text, "broken.json")
+        _parse_scene(text, "broken.json")
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 400
 
 
 def test_numbers_that_are_whole_are_names():
     text = changed(lambda d: d["bricks"][1].update(nodes=[2.0, 3.0], placing_node=3.0))
-    assert parse_scene(text).bricks[1].nodes == (2, 3)
-    assert all(isinstance(node, int) for node in parse_scene(text).bricks[1].nodes)
+    assert _parse_scene(text).bricks[1].nodes == (2, 3)
+    assert all(isinstance(node, int) for node in _parse_scene(text).bricks[1].nodes)
 
 
 def test_a_mark_at_the_start_is_no_content(tmp_path):
@@ -111,10 +111,10 @@ def reshaped(change):
 )
 def test_a_malformed_shape_gets_one_clear_line(change, named):
     if not named:  # a joint without its face is a scene, but no contact follows from the shapes
-        scene = parse_scene(reshaped(change))
+        scene = _parse_scene(reshaped(change))
         with pytest.raises(SceneError, match="is not a box and the joint has no face"):
             bare_assembly(build_network(scene), len(scene.bricks))
         return
     with pytest.raises(SceneError, match=named) as caught:
-        parse_scene(reshaped(change), "broken.json")
+        _parse_scene(reshaped(change), "broken.json")
     assert "\n" not in str(caught.value)

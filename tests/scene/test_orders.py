@@ -7,19 +7,19 @@ import json
 import pytest
 
 import seqopt
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 from seqopt.errors import SceneError
 from seqopt.scene.library.wall import WallShape, wall
-from seqopt.scene.scene import from_all_ends, in_order, parse_order
+from seqopt.scene.scene import _from_all_ends, _parse_order, in_order
 from seqopt.sequence.schedule import islands
 from tests.builders import small_arch
 
 
 def test_orders_by_name():
     scene = small_arch(5)
-    assert parse_order(scene, "reversed") == (5, 4, 3, 2, 1)
-    assert parse_order(scene, "ends") == (1, 5, 2, 4, 3)
-    assert parse_order(scene, "1..2, 5..4,3") == (1, 2, 5, 4, 3)
+    assert _parse_order(scene, "reversed") == (5, 4, 3, 2, 1)
+    assert _parse_order(scene, "ends") == (1, 5, 2, 4, 3)
+    assert _parse_order(scene, "1..2, 5..4,3") == (1, 2, 5, 4, 3)
     assert in_order(scene, None) is scene
     network = seqopt.build_network(scene, (2, 1, 3, 4, 5))
     assert network.scene.build_order == (2, 1, 3, 4, 5)
@@ -29,7 +29,7 @@ def test_orders_by_name():
 def test_from_all_ends_leaves_nothing_that_hangs():
     scene = wall(WallShape(courses=3, columns=3))
     network = seqopt.build_network(scene, "ends")
-    assert sorted(from_all_ends(scene)) == sorted(scene.build_order)
+    assert sorted(_from_all_ends(scene)) == sorted(scene.build_order)
     assert not any(islands(network, count) for count in range(1, len(scene.bricks) + 1))
 
 

@@ -14,9 +14,9 @@ from seqopt.errors import FileError, SceneError, SeqoptError
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.scene.scene_file import (
+    _parse_scene,
     dump_scene,
     load_scene,
-    parse_scene,
     save_scene,
     scene_to_dict,
     schema,
@@ -27,8 +27,8 @@ from tests.strategies import arches, walls
 @given(scene=st.one_of(arches(), walls()))
 def test_a_round_trip_changes_nothing(scene):
     text = dump_scene(scene)
-    assert parse_scene(text) == scene
-    assert dump_scene(parse_scene(text)) == text
+    assert _parse_scene(text) == scene
+    assert dump_scene(_parse_scene(text)) == text
     jsonschema.validate(json.loads(text), schema())
 
 
@@ -42,7 +42,7 @@ def test_every_reach_survives_a_round_trip(arch25):
         Robot(name="rob4", payload=100.0, reach=Sphere(center=(0.0, 2.0, 0.5), radius=2.55)),
     )
     scene = replace(arch25, robots=robots)
-    assert parse_scene(dump_scene(scene)).robots == robots
+    assert _parse_scene(dump_scene(scene)).robots == robots
 
 
 def test_the_reference_arch(arch25):
@@ -100,7 +100,7 @@ def break_at(path, value):
 )
 def test_a_malformed_scene_gets_one_clear_line(path, value, named):
     with pytest.raises(SceneError, match=named) as caught:
-        parse_scene(break_at(path, value), "broken.json")
+        _parse_scene(break_at(path, value), "broken.json")
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 400
 
@@ -108,7 +108,7 @@ def test_a_malformed_scene_gets_one_clear_line(path, value, named):
 @pytest.mark.parametrize("text", ["", "{", "[]", "3", '"x"', "null"])
 def test_what_is_no_scene_is_refused(text):
     with pytest.raises(SceneError, match=r"scene broken\.json"):
-        parse_scene(text, "broken.json")
+        _parse_scene(text, "broken.json")
 
 
 def test_scenes_in_code_are_checked_too(arch25):

@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.harness.scenes import running_bond
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 from seqopt.errors import SceneWarning
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.scene_file import dump_scene, find_warnings, load_scene, save_scene
+from seqopt.scene.scene_file import _find_warnings, dump_scene, load_scene, save_scene
 from tests.builders import block, six_bricks, small_arch
 from tests.strategies import arches, flat_arches, walls
 
@@ -42,7 +42,7 @@ ODD = {
 
 @pytest.mark.parametrize("said", ODD)
 def test_what_is_odd_is_named(capsys, tmp_path, said):
-    assert any(doubt.startswith(said) for doubt in find_warnings(ODD[said]))
+    assert any(doubt.startswith(said) for doubt in _find_warnings(ODD[said]))
     path = tmp_path / "scene.json"
     save_scene(ODD[said], path)
     with pytest.warns(SceneWarning) as heard:
@@ -56,7 +56,7 @@ def test_what_is_odd_is_named(capsys, tmp_path, said):
 
 @given(scene=st.one_of(arches(), walls(), flat_arches()))
 def test_scenes_of_tests_are_not_odd(scene):
-    assert find_warnings(scene) == ()
+    assert _find_warnings(scene) == ()
 
 
 @pytest.mark.parametrize(

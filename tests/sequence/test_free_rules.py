@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from seqopt.errors import StepError
 from seqopt.network.build import build_network
-from seqopt.sequence.free_check import RuleBook, check_free
-from seqopt.sequence.free_rules import FreeRules, with_robots
-from seqopt.sequence.free_space import free_space, node_numbers, sort_robots
+from seqopt.sequence._rule_check import RuleBook, check_free
+from seqopt.sequence._rule_space import free_space, node_numbers, sort_robots
+from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.sequence.steps import Step, StepKind
 from tests.builders import small_arch
 from tests.strategies import free_builds

@@ -13,7 +13,7 @@ from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
 from seqopt.sequence.steps import StepKind, idle_robots
-from seqopt.sequence.three_robots import SCHEDULES, robot_loop, three_robot_loop, two_robot_loop
+from seqopt.sequence.three_robots import SCHEDULES, _two_robot_loop, robot_loop, three_robot_loop
 from seqopt.sequence.two_robots import placing_node, sequential
 from seqopt.study.published import EQUATIONS, WEIGHTED
 from tests.builders import anywhere, small_arch
@@ -44,7 +44,7 @@ def test_the_roles_of_any_number_of_robots_rotate(count, word):
 
 def test_two_robots_filled_with_placing_nodes_are_the_sequential_method(engine25, arch25):
     network = engine25.network
-    schedule = two_robot_loop(network)
+    schedule = _two_robot_loop(network)
     robots = {robot.name: robot for robot in arch25.robots}
     nodes = [
         placing_node(network, robots[move.robot], brick)
@@ -54,7 +54,7 @@ def test_two_robots_filled_with_placing_nodes_are_the_sequential_method(engine25
 
 
 def test_a_move_of_two_robots_lasts_until_the_next_brick_is_held(engine25):
-    schedule = two_robot_loop(engine25.network)
+    schedule = _two_robot_loop(engine25.network)
     assert len(schedule.moves) == 25
     assert idle_robots(schedule.scene, schedule.steps) == ("rob3",)
     for k, move in enumerate(schedule.moves[1:-1], start=1):
@@ -67,7 +67,7 @@ def test_a_move_of_two_robots_lasts_until_the_next_brick_is_held(engine25):
 
 def test_two_robots_hold_better_where_the_best_nodes_are_chosen(engine25):
     """The sequential method is one of the choices; the best is better, and proven so."""
-    schedule = two_robot_loop(engine25.network)
+    schedule = _two_robot_loop(engine25.network)
     problem = candidate_layers(engine25, schedule, WEIGHTED)
     plan = solve(problem, "overlap_dp")
     steps = sequential(engine25.network)

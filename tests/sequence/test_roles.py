@@ -13,10 +13,10 @@ from seqopt.scene.parts import Robot, Sphere
 from seqopt.sequence.steps import StepKind, idle_robots
 from seqopt.sequence.three_robots import (
     SCHEDULES,
+    _two_robot_loop,
     modified_sequential,
     robot_loop,
     three_robot_loop,
-    two_robot_loop,
 )
 from seqopt.sequence.two_robots import METHODS, cast, sequential, take_turns
 from tests.builders import anywhere, from_both_ends, small_arch
@@ -87,7 +87,7 @@ def test_from_both_ends_the_robot_beside_each_end_places_it():
     steps = sequential(net)
     who = dict(zip(scene.build_order, placers(net.scene, steps), strict=True))
     assert all(who[name] == ("left" if name < 5 else "right") for name in who if name != 5)
-    assert two_robot_loop(net).fill(filled(net)) == steps
+    assert _two_robot_loop(net).fill(filled(net)) == steps
 
 
 def filled(net):
@@ -102,7 +102,7 @@ def filled(net):
 
 def test_robots_by_name_take_the_roles_in_their_order():
     net = build_network(replace(small_arch(7), robots=anywhere(5)))
-    for method in (*METHODS.values(), two_robot_loop):
+    for method in (*METHODS.values(), _two_robot_loop):
         made = method(net, ("rob4", "rob2"))
         steps = made if isinstance(made, tuple) else made.steps
         assert placers(net.scene, steps)[:2] == ["rob4", "rob2"]

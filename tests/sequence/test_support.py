@@ -14,8 +14,8 @@ from seqopt.sequence.schedule import OpenGrip, OpenStep, check_support, islands
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.sequence.three_robots import open_schedule, three_robot_loop
 from seqopt.sequence.two_robots import (
+    _begins_elsewhere,
     alternate,
-    begins_elsewhere,
     cantilever,
     degeneration,
     lies_along,
@@ -147,7 +147,7 @@ def test_that_bricks_lie_along_is_not_enough_where_ends_take_turns():
 
 
 def test_in_a_chain_only_the_first_brick_begins_elsewhere(engine25):
-    assert begins_elsewhere(engine25.network) == {1}
+    assert _begins_elsewhere(engine25.network) == {1}
     assert degeneration(engine25.network, "cantilever") == ""
     assert degeneration(engine25.network, "sequential") == ""
 
@@ -181,7 +181,7 @@ def test_where_nothing_lies_along_the_first_brick_is_held_until_the_end():
 def test_it_is_itself_where_one_side_is_built_after_the_other():
     network = build_network(replace(from_both_ends(12, order=CROSS), robots=anywhere(2)))
     assert degeneration(network, "cantilever") == ""
-    assert begins_elsewhere(network) == {1, 12}
+    assert _begins_elsewhere(network) == {1, 12}
     assert cantilever(network) != sequential(network)
 
 

@@ -9,9 +9,9 @@ from importlib import import_module
 import pytest
 
 import seqopt
-from seqopt import showing
+from seqopt import _showing as showing
+from seqopt._showing import DISPLAYS, Page, display
 from seqopt.errors import ExtraError
-from seqopt.showing import DISPLAYS, Page, display
 
 WITHOUT = """
 import sys

@@ -16,10 +16,11 @@ from seqopt.contact.mortar import DRY, Mortar
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.two_robots import METHODS
-from seqopt.stability import assessment, limit_analysis, prover
-from seqopt.stability.assessment import Verdict, assess, bonded, verdict_of
+from seqopt.stability import _prover as prover
+from seqopt.stability import assessment, limit_analysis
+from seqopt.stability._prover import Prover
+from seqopt.stability.assessment import Verdict, _verdict_of, assess, bonded
 from seqopt.stability.limit_analysis import CAP, Claim, bound
-from seqopt.stability.prover import Prover
 
 SLIPPERY = Mortar(friction=1e-3)
 
@@ -124,7 +125,7 @@ def judged():
 
                 return true
 
-            out.append((truth, verdict_of(Prover(assembly, compiled)(case))))
+            out.append((truth, _verdict_of(Prover(assembly, compiled)(case))))
     return out
 
 
@@ -136,7 +137,7 @@ def false(verdicts):
 def test_the_true_answers_are_believed():
     for name, (assembly, mortar, truth) in structures().items():
         proven = Prover(assembly, compile_equilibrium)(bonded(assembly, mortar))
-        assert verdict_of(proven) is truth, name
+        assert _verdict_of(proven) is truth, name
 
 
 def test_no_faked_answer_turns_a_verdict():
@@ -167,7 +168,7 @@ def test_a_value_alone_says_neither_falls_nor_how_much_friction_is_needed(more):
 
 
 WEAKER = {
-    "the value makes it fall": (assessment, "verdict_of", None),
+    "the value makes it fall": (assessment, "_verdict_of", None),
     "closing is free": (limit_analysis, "LARGEST_FORCE", 0.0),
     "any closing is charged": (limit_analysis, "_CLOSING", CAP),
     "forces may violate": (prover, "violation", lambda *_: 0.0),

@@ -14,10 +14,10 @@ from seqopt.contact.mortar import DRY
 from seqopt.errors import GripError, SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.parts import Robot
-from seqopt.stability.held_states import Known
+from seqopt.stability._held_states import Known
+from seqopt.stability._margins import Margins
+from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen, decided, held_places, lacking
 from seqopt.stability.limit_analysis import CAP, EXACT, Claim, bound, violation
-from seqopt.stability.margins import Margins
-from seqopt.stability.screens import FALLS, OPEN, STANDS, Screen, decided, held_places, lacking
 from tests.builders import held, small_arch
 
 

@@ -13,9 +13,9 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY
 from seqopt.network.build import build_network
 from seqopt.sequence.two_robots import METHODS
+from seqopt.stability._prover import proven_value, sideways
 from seqopt.stability.assessment import Verdict, assess, bonded
 from seqopt.stability.limit_analysis import CAP, EXACT, Answer, Case, Claim, Sense, bound, violation
-from seqopt.stability.prover import proven_value, sideways
 
 
 def liar(change):

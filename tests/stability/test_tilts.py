@@ -13,9 +13,8 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
-from seqopt.stability.assessment import Verdict, assess, bonded
-from seqopt.stability.margins import Margins
-from seqopt.stability.prover import (
+from seqopt.stability._margins import Margins
+from seqopt.stability._prover import (
     _MORE,
     DIRECTIONS,
     Prover,
@@ -23,7 +22,8 @@ from seqopt.stability.prover import (
     safe_pull,
     sideways,
 )
-from seqopt.stability.screens import FALLS, STANDS, Screen
+from seqopt.stability._screens import FALLS, STANDS, Screen
+from seqopt.stability.assessment import Verdict, assess, bonded
 
 UP = (0.0, 0.0, 1.0)
 

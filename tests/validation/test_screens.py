@@ -12,12 +12,12 @@ from experiments.stability.parts.blocks import stack
 from formulations.contact.held_equilibrium import compile_held
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.scene.parts import Robot
+from seqopt.stability._held_states import HeldStates
+from seqopt.stability._margins import Margins, narrow
+from seqopt.stability._prover import sideways
+from seqopt.stability._screens import STANDS, Screen, decided, lacking
 from seqopt.stability.assessment import bonded
-from seqopt.stability.held_states import HeldStates
 from seqopt.stability.limit_analysis import EXACT
-from seqopt.stability.margins import Margins, narrow
-from seqopt.stability.prover import sideways
-from seqopt.stability.screens import STANDS, Screen, decided, lacking
 from tests.builders import block, held
 
 NOBODY = np.zeros((1, 0), dtype=int), np.zeros((1, 0))

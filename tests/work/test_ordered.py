@@ -17,7 +17,7 @@ import pytest
 
 from seqopt.errors import SolverError, WorkerError
 from seqopt.work import Progress, hire, map_ordered
-from seqopt.work.workers import Processes
+from seqopt.work._workers import Processes
 from tests.builders import ROOT
 
 

@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.engines.rigid.growth import grow_tree
-from seqopt.engines.rigid.operator import OperatorBuilder
+from seqopt.engines.rigid._growth import grow_tree
+from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene import Scene
@@ -282,12 +282,12 @@ MEASURES: dict[str, tuple[Callable[[Floats], Floats], int]] = {
 
 def fit(law: Law, measure: str, kept: Floats) -> tuple[float, float]:
     """Return the k_t and k_r that fit the tests in ``kept`` (T,) bool best."""
-    scale_of, power = MEASURES[measure]
+    _scale_of, power = MEASURES[measure]
     low, high = np.log(law.bounds)
     for _ in range(4):
         ratio = np.exp(np.linspace(low, high, 401))
         share = law.relative(ratio)[kept]
-        scale = scale_of(share)
+        scale = _scale_of(share)
         best = int((np.abs(scale * share - 1) ** power).sum(axis=0).argmin())
         step = (high - low) / 400
         center = np.log(ratio[best])

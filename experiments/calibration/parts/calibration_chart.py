@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from seqopt.arrays import Floats
-from seqopt.report.style import (
+from seqopt.report._style import (
     BLUE,
     GREEN,
     ORANGE,

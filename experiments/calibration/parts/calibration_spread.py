@@ -170,12 +170,12 @@ def rotational(tests: tuple[Vault, ...]) -> pd.DataFrame:
 
 def resampled(share: Floats, measure: str) -> Floats:
     """Return k_r fitted to tests drawn with replacement, infinite where joints do not turn."""
-    random, (scale_of, power) = np.random.default_rng(1), MEASURES[measure]
+    random, (_scale_of, power) = np.random.default_rng(1), MEASURES[measure]
     coarse, ratio = share[:, ::5], RATIO[::5]
     out = []
     for _ in range(DRAWS):
         drawn = coarse[random.integers(0, len(coarse), len(coarse))]
-        scale = scale_of(drawn)
+        scale = _scale_of(drawn)
         best = int((np.abs(scale * drawn - 1) ** power).sum(axis=0).argmin())
         out.append(np.inf if best == len(ratio) - 1 else scale[best] * ratio[best])
     return np.array(out)

@@ -2,7 +2,7 @@
 
 A face is springs at its corners, each with an equal share of its area. It is three times too stiff
 against bending, as the corners of a rectangle are √3 times as far out as points that stand for an
-even bed. With the spread "even" the faces are therefore drawn in by √3 and stiffened threefold.
+even bed. With the spread "even" the faces are therefore drawn in by √3 and _stiffened threefold.
 
 `AtCorners` is the discrete-element engine with such faces. For LMGC90, `padded` makes the pads of a
 `Pinch` contacts with the ground; `bed_at_corners` then says where exactly these springs let the
@@ -19,12 +19,12 @@ from numpy.typing import ArrayLike
 from scipy import linalg
 
 from seqopt.arrays import Floats
+from seqopt.contact._elastic_limits import opening_maps
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.elastic_limits import opening_maps
 from seqopt.contact.faces import bare_assembly, step_assembly
 from seqopt.contact.mortar import EPOXY
+from seqopt.engines.discrete._system import BedStiffness, System, build_system
 from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
-from seqopt.engines.discrete.system import BedStiffness, System, build_system
 from seqopt.engines.interface import Fields, Want
 from seqopt.network.network import GROUND, Network
 from seqopt.sequence.steps import Step

@@ -33,11 +33,11 @@ from experiments.harness.lmgc90 import python_with_lmgc90
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import EPOXY
+from seqopt.engines.discrete._system import BedStiffness
 from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
-from seqopt.engines.discrete.system import BedStiffness
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.network.mechanics import node_motion
+from seqopt.network._mechanics import node_motion
 from seqopt.network.network import GROUND, Network
 from seqopt.sequence.steps import Step
 from seqopt.study.published import STUDY_BED, STUDY_PADS

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from seqopt.report.style import (
+from seqopt.report._style import (
     BLUE,
     GREEN,
     ORANGE,

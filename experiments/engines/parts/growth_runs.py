@@ -77,7 +77,7 @@ def errors(engine: Engine, steps: Sequence[Step]) -> dict[str, float]:
     Against the refined mixed system, one grip set at a time: ``error`` in steps of the plan, and
     ``screen_error`` of what candidates are chosen by, at random grip sets of three.
     """
-    from seqopt.engines.rigid.mixed import solve_mixed  # noqa: PLC0415  # older versions differ
+    from seqopt.engines.rigid._mixed import solve_mixed  # noqa: PLC0415  # older versions differ
 
     network, random = engine.network, np.random.default_rng(7)
 

@@ -19,7 +19,7 @@ from scipy.sparse.linalg import splu
 from experiments.peers.parts.chain import CONTRAST, Answer, Chain, chain_of
 from seqopt.arrays import Floats, Ints, skew
 from seqopt.engines.interface import Want
-from seqopt.network.mechanics import build_statics
+from seqopt.network._mechanics import build_statics
 from seqopt.network.network import GROUND, Network
 
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from seqopt.report.style import (
+from seqopt.report._style import (
     GRAY,
     Look,
     dress,

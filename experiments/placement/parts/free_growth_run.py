@@ -13,7 +13,7 @@ import time
 
 import seqopt
 from experiments.harness.runs import scene_named
-from seqopt.sequence.free_rules import with_robots
+from seqopt.sequence.rules import with_robots
 
 ROOM = 1.7e9  # bytes
 

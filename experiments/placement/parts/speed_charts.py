@@ -14,7 +14,7 @@ from matplotlib.patches import Patch
 from experiments.harness.results import two
 from experiments.harness.runs import NO_PROOF, REFERENCE
 from seqopt.arrays import Floats
-from seqopt.report.style import (
+from seqopt.report._style import (
     BLUE,
     GRAY,
     GREEN,

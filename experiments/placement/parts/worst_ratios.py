@@ -22,9 +22,9 @@ import numpy as np
 
 import seqopt
 from seqopt.graph.states.states import build_states
-from seqopt.plan.judge.schedules import state_columns
+from seqopt.plan.judge.schedules import _state_columns
 from seqopt.plan.plan import Plan
-from seqopt.sequence.free_rules import with_robots
+from seqopt.sequence.rules import with_robots
 from seqopt.sequence.steps import Step
 from seqopt.study.published import WORST_RATIO, published_plan
 
@@ -104,7 +104,7 @@ def worst_ratio(steps: Steps, robots: int) -> float:
         scene = with_robots(scene, robots)
     engine = seqopt.make_engine(ENGINE, seqopt.build_network(scene))
     problem = build_states(engine, seqopt.FreeRules(), WORST_RATIO)
-    columns = state_columns(problem, seqopt.analyze(engine, steps))
+    columns = _state_columns(problem, seqopt.analyze(engine, steps))
     return float(np.max(WORST_RATIO.costs(columns, 1, len(steps))))
 
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from seqopt.contact.mortar import EPOXY
-from seqopt.report.style import GRAY, SMALL, dress, looks, name_panels, new_figure, plain, styled
+from seqopt.report._style import GRAY, SMALL, dress, looks, name_panels, new_figure, plain, styled
 
 
 @styled

@@ -16,8 +16,8 @@ from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import build_states
-from seqopt.graph.states.visits import explore
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.solving import pose, solve
@@ -26,13 +26,13 @@ from seqopt.responses.table import analyze, force_column
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Robot, Spring
 from seqopt.scene.scene import Scene
-from seqopt.sequence.free_rules import FreeRules
+from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS
+from seqopt.stability._prover import Prover
+from seqopt.stability._screens import Screen
 from seqopt.stability.assessment import bonded
-from seqopt.stability.prover import Prover
-from seqopt.stability.screens import Screen
 from seqopt.study.published import CRITERIA, EQUATIONS
 
 STEEPEST = 2.0  # slope of the catenary at its ends

@@ -10,7 +10,7 @@ from matplotlib.patches import Rectangle
 
 from experiments.harness.results import stored, two
 from experiments.stability.parts.witness_cra import SOUND, TORN
-from seqopt.report.style import SMALL, dress, name_panels, new_figure, styled
+from seqopt.report._style import SMALL, dress, name_panels, new_figure, styled
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.limit_analysis import EXACT
 

@@ -17,8 +17,8 @@ from experiments.study.parts.counterpart_rows import (
     bed_of_springs,
     node_displacements,
 )
+from seqopt.report._style import BLUE, INK, VERMILION, dress, look, plain
 from seqopt.report.draw import View, draw_bricks
-from seqopt.report.style import BLUE, INK, VERMILION, dress, look, plain
 from seqopt.study.published import printed
 
 OURS, STUDY, OFF = BLUE, "#222222", VERMILION

@@ -4,7 +4,7 @@
 carries), holds nodes or pinches bricks between pads (`Pinch`), and follows the structure to rest.
 """
 
+from seqopt.engines.discrete._system import BedStiffness
 from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
-from seqopt.engines.discrete.system import BedStiffness
 
 __all__ = ["Across", "BedStiffness", "DiscreteEngine", "Pinch"]

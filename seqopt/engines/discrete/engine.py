@@ -2,7 +2,7 @@
 
 A joint is its own elastic spring in series with a bed of points over the face between its bricks,
 so that within the elastic limits the answer is that of exactly rigid bricks; the bed takes over
-where tension or shear exceeds what the mortar holds (`seqopt.engines.discrete.system`). With
+where tension or shear exceeds what the mortar holds (`seqopt.engines.discrete._system`). With
 a `BedStiffness` the bed alone is the joint, as in the discrete-element models of Bruun et al.
 (section 3.2.3). Every grip holds its node, or pinches its brick between two pads.
 
@@ -22,8 +22,8 @@ from scipy import linalg, sparse
 
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.mortar import EPOXY, Mortar
-from seqopt.engines.discrete.equilibrium_path import Held, Settled, settle
-from seqopt.engines.discrete.system import BedStiffness, System, build_system
+from seqopt.engines.discrete._equilibrium_path import Held, Settled, settle
+from seqopt.engines.discrete._system import BedStiffness, System, build_system
 from seqopt.engines.interface import (
     Fields,
     NamedEngine,
@@ -34,11 +34,11 @@ from seqopt.engines.interface import (
     no_sets,
     require_finite,
 )
-from seqopt.engines.rigid.mechanism import mechanism_error, require_resistance
-from seqopt.engines.rigid.mixed import Solution, respond
+from seqopt.engines.rigid._mechanism import mechanism_error, require_resistance
+from seqopt.engines.rigid._mixed import Solution, respond
 from seqopt.errors import SeqoptError, SolverError
+from seqopt.network._mechanics import build_statics, node_motion, point_motion
 from seqopt.network.build import network_of
-from seqopt.network.mechanics import build_statics, node_motion, point_motion
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 
@@ -62,7 +62,7 @@ class Pinch:
     side: float
 
 
-def pad_stiffness(network: Network, index: int, node: Floats, pinch: Pinch) -> Floats:
+def _pad_stiffness(network: Network, index: int, node: Floats, pinch: Pinch) -> Floats:
     """Return the stiffness with which two pads beside a node hold a brick's twists.
 
     ``index``: of the brick in build order; ``node`` (3,). Result (6, 6): N/m and N m/rad.
@@ -134,7 +134,7 @@ class DiscreteEngine(NamedEngine):
         """Return the fields of one grip set."""
         network, pinch = self._network, self._pinch
         nodes = network.node_position[network.inner.ravel()[columns]]
-        held = held_nodes(network, system, columns, nodes)
+        held = _held_nodes(network, system, columns, nodes)
         if pinch is not None:
             held = _pinched(network, system, columns, nodes, pinch)
         found = settle(held)
@@ -156,7 +156,7 @@ def _not_at_rest(network: Network, held: Held, found: Settled, nodes: Ints) -> S
     )
 
 
-def held_nodes(network: Network, system: System, columns: Ints, nodes: Floats) -> Held:
+def _held_nodes(network: Network, system: System, columns: Ints, nodes: Floats) -> Held:
     """Return a system whose held nodes stand still.
 
     ``columns`` (r,): grips as indices into ``network.inner.ravel()``; ``nodes`` (r, 3): where they
@@ -178,7 +178,7 @@ def _pinched(network: Network, system: System, columns: Ints, nodes: Floats, pin
     """
     blocks = [sparse.csr_array((6, 6))] * (len(system.load) // 6)
     for body, node in zip(columns // 2, nodes, strict=True):
-        pads = pad_stiffness(network, body, node, pinch) * np.outer(
+        pads = _pad_stiffness(network, body, node, pinch) * np.outer(
             system.unit[:6], system.unit[:6]
         )
         blocks[body] = blocks[body] + sparse.csr_array(pads)

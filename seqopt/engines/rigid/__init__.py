@@ -2,11 +2,11 @@
 
 `ComplianceEngine` grows it on a spanning tree of springs, makes the operator of the gripped bricks
 from it, solves the grips' equations in batches, and has the few sets that may err more than is
-accepted corrected (`seqopt.engines.rigid.refinement`). `solve_mixed` and `solve_dense` are other
+accepted corrected (`seqopt.engines.rigid._refinement`). `solve_mixed` and `solve_dense` are other
 routes, for last resorts, tests and mechanisms.
 """
 
+from seqopt.engines.rigid._mixed import solve_dense, solve_mixed
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.mixed import solve_dense, solve_mixed
 
 __all__ = ["ComplianceEngine", "solve_dense", "solve_mixed"]

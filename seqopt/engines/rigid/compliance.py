@@ -5,7 +5,7 @@ at the nodes ``S`` exert the forces ``λ`` that hold them still, ``G[S, S] λ = 
 response is then the sum of the responses to the weight and to ``λ``. Where these nearly cancel
 (grips far out on a long chain and close together, or beyond a joint that is nearly loose), so that
 more than the accepted error may be left, and where something is loose, grip sets are corrected by
-the residuals of wrenches and motions side by side (`seqopt.engines.rigid.refinement`).
+the residuals of wrenches and motions side by side (`seqopt.engines.rigid._refinement`).
 
 Brick counts are best asked in ascending order: what all of them share grows in place.
 """
@@ -34,12 +34,12 @@ from seqopt.engines.interface import (
     one_thread,
     require_finite,
 )
-from seqopt.engines.rigid.grip_equations import Pairs, grip_forces, pairs_of, share_pairs, trusted
-from seqopt.engines.rigid.growth import grow_tree
-from seqopt.engines.rigid.mechanism import Shared, share
-from seqopt.engines.rigid.mixed import LAST_CORRECTION
-from seqopt.engines.rigid.operator import ComplianceOperator, OperatorBuilder
-from seqopt.engines.rigid.refinement import Refinement
+from seqopt.engines.rigid._grip_equations import Pairs, grip_forces, pairs_of, share_pairs, trusted
+from seqopt.engines.rigid._growth import grow_tree
+from seqopt.engines.rigid._mechanism import Shared, share
+from seqopt.engines.rigid._mixed import LAST_CORRECTION
+from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder
+from seqopt.engines.rigid._refinement import Refinement
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
@@ -51,7 +51,7 @@ _CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
 
 
 @dataclass(frozen=True)
-class Tried:
+class _Tried:
     """What an operator alone says about grip sets."""
 
     operator: ComplianceOperator
@@ -82,9 +82,9 @@ class Tried:
         return found
 
 
-def try_forces(
+def _try_forces(
     operator: ComplianceOperator, columns: Ints, *, even: bool, accuracy: float
-) -> Tried:
+) -> _Tried:
     """Return what an operator alone says about grip sets, and which of them it answers well enough.
 
     ``columns`` (S, r): grips as indices into ``network.inner.ravel()``; ``even``: whether the
@@ -102,10 +102,10 @@ def try_forces(
     force[~good] = 0.0
     if not even:
         good &= ~cancels(operator, index, force)
-    return Tried(operator, columns, index, force, pairs, good)
+    return _Tried(operator, columns, index, force, pairs, good)
 
 
-def solve_batch(
+def _solve_batch(
     operator: ComplianceOperator,
     columns: Ints,
     want: Want = Want.RESPONSES,
@@ -116,10 +116,10 @@ def solve_batch(
     """Return the fields of grip sets, and which of them are accurate.
 
     ``columns`` (S, r): grips as indices into ``network.inner.ravel()``; ``even``, ``accuracy``: as
-    of `try_forces`: joints about equally stiff, `ACCURACY`. Results: ``fields``: grip forces in the
+    of `_try_forces`: joints about equally stiff, `ACCURACY`. Results: ``fields``: forces in the
     directions of the operator; ``trusted`` (S,).
     """
-    tried = try_forces(operator, columns, even=even, accuracy=accuracy)
+    tried = _try_forces(operator, columns, even=even, accuracy=accuracy)
     return Fields(**tried.fields(want)), tried.trusted
 
 
@@ -224,11 +224,11 @@ class ComplianceEngine(NamedEngine):
                 values[wrong] = getattr(better, name)
         return require_finite(Fields(**found), bricks, grips)
 
-    def _tried(self, bricks: int, columns: Ints, want: Want) -> Tried:
+    def _tried(self, bricks: int, columns: Ints, want: Want) -> _Tried:
         """Return what the operator alone says about grip sets."""
         operator, even = self._operator(bricks, columns), bricks <= self._even
         accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
-        return try_forces(operator, columns, even=even, accuracy=accuracy)
+        return _try_forces(operator, columns, even=even, accuracy=accuracy)
 
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""

@@ -13,6 +13,7 @@ from itertools import chain
 import numpy as np
 import pandas as pd
 
+from seqopt._showing import Shown
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, ProblemError, did_you_mean
@@ -28,13 +29,12 @@ from seqopt.problem.requirements import (
     excesses,
     robots_of,
 )
-from seqopt.responses.choices import CHOICE_RESPONSES, Evaluation, StepChoices
+from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses.quantities import robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.responses.table import analyze
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.sequence.steps import Step
-from seqopt.showing import Shown
 
 
 def compared(
@@ -56,7 +56,7 @@ def compared(
     return replace(choices, moves=(move - 1, move), responses=responses)
 
 
-def spread_over_pairs(choices: StepChoices, criterion: Criterion) -> Criterion:
+def _spread_over_pairs(choices: StepChoices, criterion: Criterion) -> Criterion:
     """Return the criterion of a step from `compared`: by rows if one move was spread over pairs."""
     if len(choices.moves) == len(choices.step.moves) or not isinstance(criterion, RankSum):
         return criterion
@@ -99,7 +99,7 @@ def possible_after(schedule: Schedule, move: int, before: int) -> Bools:
     return np.asarray(candidates != schedule.moves[move - 1].candidates[before])
 
 
-def window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepChoices, ...]:
+def _window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepChoices, ...]:
     """Return the steps that a move decides after a candidate of the one before, solved anew.
 
     ``evaluation``: whose responses are not kept.
@@ -115,7 +115,7 @@ def window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepCho
     return tuple(replace(each, moves=moves[each.step.number]) for each in found.steps)
 
 
-def by_move(steps: Sequence[StepChoices]) -> Mapping[int, Sequence[StepChoices]]:
+def _by_move(steps: Sequence[StepChoices]) -> Mapping[int, Sequence[StepChoices]]:
     """Return the steps that each move decides: those in which it is the last that is open."""
     found = defaultdict[int, list[StepChoices]](list)
     for choices in steps:
@@ -123,7 +123,7 @@ def by_move(steps: Sequence[StepChoices]) -> Mapping[int, Sequence[StepChoices]]
     return found
 
 
-def window_kept(decided: Sequence[StepChoices], before: int) -> tuple[StepChoices, ...]:
+def _window_kept(decided: Sequence[StepChoices], before: int) -> tuple[StepChoices, ...]:
     """Return the steps that a move decides after a candidate of the one before, from all pairs."""
     out = []
     for choices in decided:
@@ -261,12 +261,12 @@ class Layers(Shown):
         Computed again if the responses of all choices are not kept.
         """
         if self.evaluation.streams:
-            return window_anew(self.evaluation, move, before)
-        return window_kept(self._decided.get(move, ()), before)
+            return _window_anew(self.evaluation, move, before)
+        return _window_kept(self._decided.get(move, ()), before)
 
     @cached_property
     def _decided(self) -> Mapping[int, Sequence[StepChoices]]:
-        return by_move(self.evaluation.steps)
+        return _by_move(self.evaluation.steps)
 
     @cached_property
     def others(self) -> dict[Criterion, Layers]:
@@ -281,7 +281,7 @@ class Layers(Shown):
         """
         responses = {name: values[rows] for name, values in choices.responses.items()}
         move = self.schedule.moves[choices.moves[-1]]
-        criterion = spread_over_pairs(choices, self.criterion)
+        criterion = _spread_over_pairs(choices, self.criterion)
         costs = criterion.costs(responses, move.bricks, len(move.candidates))
         costs = np.where(np.isfinite(costs), costs, np.inf)
         for limit in self.limits:

@@ -13,7 +13,7 @@ from seqopt.graph.layers.costs import TINY, LayeredCosts
 from seqopt.graph.layers.layers import Layers, compared
 from seqopt.problem.criteria import Ranked, RankSum, WeightedSum, WorstRatio
 from seqopt.problem.requirements import Criterion
-from seqopt.responses.choices import StepChoices
+from seqopt.responses._choices import StepChoices
 
 TIED_SUMS = 1e-9  # sums of ranks this close, relative to the least, are equal
 
@@ -73,14 +73,17 @@ def split_gap(problem: Layers, choice: Sequence[int]) -> GapParts | None:
     if conditional is None:
         return None
     charged = problem.sums
-    there, best = least_among_least(conditional.sums, charged), least_among_least(charged, charged)
+    there, best = (
+        _least_among_least(conditional.sums, charged),
+        _least_among_least(charged, charged),
+    )
     scale = max(sum(map(abs, charged.parts(choice))), TINY)
     if not np.isfinite([there, best]).all():
         return None
     return GapParts((charged.cost(choice) - there) / scale, (there - best) / scale)
 
 
-def least_among_least(first: LayeredCosts, second: LayeredCosts) -> float:
+def _least_among_least(first: LayeredCosts, second: LayeredCosts) -> float:
     """Return the least second cost of the choices whose first cost is least.
 
     ``first``, ``second``: of the same choices. Result: infinite if no choice is allowed.

@@ -8,6 +8,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from seqopt._showing import Shown
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
@@ -34,17 +35,16 @@ from seqopt.problem.requirements import (
     state_costs,
 )
 from seqopt.problem.standing import Standing, StandingSets
-from seqopt.responses.grip_sets import GripSets
+from seqopt.responses._grip_sets import GripSets
 from seqopt.responses.quantities import robot_response
 from seqopt.responses.resources import HERE, Resources
-from seqopt.scene.checks import short
+from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
-from seqopt.sequence.free_rules import FREE, FreeRules
-from seqopt.sequence.free_space import FreeSpace, free_space
+from seqopt.sequence._rule_space import FreeSpace, free_space
+from seqopt.sequence._schedule_space import ScheduleSpace
+from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.schedule_space import ScheduleSpace
 from seqopt.sequence.steps import Grips
-from seqopt.showing import Shown
 from seqopt.stability.assessment import Stability
 
 FREE_TITLE = "free schedule"
@@ -205,7 +205,7 @@ class States(Shown):
     ) -> tuple[Mapping[str, Floats], Bools]:
         """Return the named responses of states, and which states are within all limits.
 
-        ``states`` (n, c): as in `seqopt.sequence.free_space`; ``rough``: whether six digits are
+        ``states`` (n, c): as in `seqopt.sequence._rule_space`; ``rough``: whether six digits are
         enough, except for what is close to a limit. Results: ``responses`` (dict of str to (n,)
         float): SI units; ``within`` (n,).
         """

@@ -228,7 +228,7 @@ class Formulation:
         where a problem has its goals.
     solve : callable
         Takes the graph and named options, returns what is chosen: of layers a `Selection`, of
-        states a `seqopt.plan.calling.guard.StatePath`.
+        states a `seqopt.plan.calling._guard.StatePath`.
     reads : Reads
         Which steps it looks at with its default options.
     takes_budgets : bool

@@ -98,7 +98,7 @@ def layered_flow(problem: PlacementProblem) -> LayeredFlow:
     """
     costs = problem.sums
     costs.continuable()
-    feasible = within_each(problem)
+    feasible = _within_each(problem)
     arcs = [shared + single for shared, single in zip(costs.shared, costs.single, strict=True)]
     allowed = tuple(np.isfinite(arc) for arc in arcs)
     cost = np.concatenate([arc[mask] for arc, mask in zip(arcs, allowed, strict=True)])
@@ -120,7 +120,7 @@ def layered_flow(problem: PlacementProblem) -> LayeredFlow:
     )
 
 
-def within_each(problem: PlacementProblem) -> bool:
+def _within_each(problem: PlacementProblem) -> bool:
     """Return whether a choice is known to be within all budgets; each is tried on its own.
 
     Raises `InfeasibleError` if no choice is within one of them; `ProblemError` if one is not for
@@ -361,7 +361,7 @@ def priced_paths(problem: PlacementProblem) -> PricedPaths:
     """
     costs = problem.sums
     costs.continuable()
-    within_each(problem)
+    _within_each(problem)
     budgets = [budget for budget in problem.budgets if np.isfinite(budget.bound)]
     arcs = [shared + single for shared, single in zip(costs.shared, costs.single, strict=True)]
     largest = max(float(np.abs(arc[np.isfinite(arc)]).max()) for arc in arcs)

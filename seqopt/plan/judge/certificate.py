@@ -10,10 +10,10 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import FileError, SolverError
+from seqopt.graph.layers._partial_costs import PartialCosts, least_possible
 from seqopt.graph.layers.costs import TINY, LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.layers.partial_costs import PartialCosts, least_possible
 from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import (
@@ -23,10 +23,10 @@ from seqopt.plan.calling.formulation import (
     Selection,
     as_formulation,
 )
-from seqopt.plan.judge.budget_proof import least_within
+from seqopt.plan.judge._budget_proof import least_within
 from seqopt.problem.problem import Aim
-from seqopt.responses.blocks import pack
-from seqopt.responses.choices import Evaluation
+from seqopt.responses._blocks import pack
+from seqopt.responses._choices import Evaluation
 from seqopt.responses.quantities import CHOSEN_BY
 
 SAME = 1e-5  # over its largest, that a response may differ: ten times what a screen may err

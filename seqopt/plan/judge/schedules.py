@@ -18,16 +18,16 @@ import pandas as pd
 
 from seqopt.errors import SolverError
 from seqopt.graph.states.states import States
-from seqopt.plan.calling.guard import StatePath
+from seqopt.plan.calling._guard import StatePath
+from seqopt.plan.judge._proof import BELOW, Hint, Proof
+from seqopt.plan.judge._rule_moves import check_scheduled
+from seqopt.plan.judge._standing_proof import proven_margins, require_margin
 from seqopt.plan.judge.certificate import Certificate
-from seqopt.plan.judge.proof import BELOW, Hint, Proof
-from seqopt.plan.judge.rule_moves import check_scheduled
-from seqopt.plan.judge.standing_proof import proven_margins, require_margin
 from seqopt.problem.problem import LARGEST, Goal, Measure
 from seqopt.problem.standing import slack
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.responses.table import analyze, force_column
-from seqopt.sequence.free_check import check_free
+from seqopt.sequence._rule_check import check_free
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step, StepKind
 
@@ -158,7 +158,7 @@ def plan_values(
     if problem.each:
         return _in_all(problem, steps, [plan_values(each, steps, claimed) for each in problem.each])
     table = analyze(problem.engine, steps)
-    columns = state_columns(problem, table)
+    columns = _state_columns(problem, table)
     _require_limits(problem, columns)
     margins = _margins(problem, steps)
     out = []
@@ -205,7 +205,7 @@ def _margins(problem: States, steps: Sequence[Step]) -> Mapping[str, float]:
     return proven_margins(problem, steps)
 
 
-def state_columns(problem: States, table: pd.DataFrame) -> Mapping[str, np.ndarray]:
+def _state_columns(problem: States, table: pd.DataFrame) -> Mapping[str, np.ndarray]:
     """Return the named responses of a table of steps, SI units.
 
     ``table``: from `seqopt.analyze`. Result (dict of str to (n,) float).

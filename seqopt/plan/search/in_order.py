@@ -22,7 +22,7 @@ from seqopt.graph.layers.layers import Layers, compared
 from seqopt.graph.layers.ranking import on_a_least_path
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.problem.problem import Aim
-from seqopt.scene.checks import short
+from seqopt.scene._checks import short
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ The packages that wrote the files are not needed:
 a table of boxes: no faces
 """
 
-from seqopt.scene.imports.content import Content, Given
+from seqopt.scene.imports._content import Content, Given
 from seqopt.scene.imports.formats import FORMATS, import_scene
 
 __all__ = ["FORMATS", "Content", "Given", "import_scene"]

@@ -15,10 +15,10 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import FileError, SceneError
+from seqopt.scene._checks import positive, short
 from seqopt.scene.boxes import as_vector, spring_fields
-from seqopt.scene.checks import positive, short
-from seqopt.scene.imports.content import Content, FileJoint, Given
-from seqopt.scene.imports.meshes import Repaired
+from seqopt.scene.imports._content import Content, FileJoint, Given
+from seqopt.scene.imports._meshes import Repaired
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.shape import Polyhedron, Surface, normal_of, plane_axes

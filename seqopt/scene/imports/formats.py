@@ -13,15 +13,22 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from seqopt._files import read_bytes, read_text
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.files import read_bytes, read_text
+from seqopt.scene._checks import printable, short
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
-from seqopt.scene.checks import printable, short
-from seqopt.scene.imports.building import build_scene
-from seqopt.scene.imports.compas_models import kind, read_assembly, read_model, read_timber
-from seqopt.scene.imports.content import LARGEST, MOST_BLOCKS, Content, FileBlock, Given, parse_json
-from seqopt.scene.imports.frames import read_frame
-from seqopt.scene.imports.meshes import read_mesh, read_obj
+from seqopt.scene.imports._building import build_scene
+from seqopt.scene.imports._compas_models import kind, read_assembly, read_model, read_timber
+from seqopt.scene.imports._content import (
+    LARGEST,
+    MOST_BLOCKS,
+    Content,
+    FileBlock,
+    Given,
+    parse_json,
+)
+from seqopt.scene.imports._frames import read_frame
+from seqopt.scene.imports._meshes import read_mesh, read_obj
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import warn_of
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
+from seqopt.scene._checks import positive, settle, short, sizes, whole_between
 from seqopt.scene.arch import LETTERS, ArchShape, arch_scene
 from seqopt.scene.boxes import require_apart
-from seqopt.scene.checks import positive, settle, short, sizes, whole_between
 from seqopt.scene.library.common import MASONRY, JointLaw, few_enough, joint_width
 from seqopt.scene.parts import THICKEST, Robot
 from seqopt.scene.scene import Scene

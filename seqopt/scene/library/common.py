@@ -9,7 +9,7 @@ from heapq import heapify, heappop, heappush
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import MOST_BRICKS, positive, settle, vector
+from seqopt.scene._checks import MOST_BRICKS, positive, settle, vector
 from seqopt.scene.parts import Brick, Robot
 
 

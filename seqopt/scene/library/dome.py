@@ -11,8 +11,9 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
+from seqopt.scene._checks import positive, settle, short, whole_between
 from seqopt.scene.boxes import as_vector, require_apart
-from seqopt.scene.checks import positive, settle, short, whole_between
+from seqopt.scene.library._joints import ground_under, joints_between, shares
 from seqopt.scene.library.common import (
     MASONRY,
     REPEAT,
@@ -23,7 +24,6 @@ from seqopt.scene.library.common import (
     tiles,
     touching_order,
 )
-from seqopt.scene.library.joints import ground_under, joints_between, shares
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
 

@@ -17,8 +17,9 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
+from seqopt.scene._checks import finite, positive, settle, whole_between
 from seqopt.scene.boxes import as_vector, require_apart
-from seqopt.scene.checks import finite, positive, settle, whole_between
+from seqopt.scene.library._joints import ground_under, joints_between
 from seqopt.scene.library.common import (
     JointLaw,
     Tile,
@@ -27,7 +28,6 @@ from seqopt.scene.library.common import (
     tiles,
     touching_order,
 )
-from seqopt.scene.library.joints import ground_under, joints_between
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.scene import Scene
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene.checks import finite, settle, sizes, whole_between
+from seqopt.scene._checks import finite, settle, sizes, whole_between
+from seqopt.scene.library._joints import ground_under, joints_between
 from seqopt.scene.library.common import MASONRY, JointLaw, few_enough, joint_width, mobile_robots
-from seqopt.scene.library.joints import ground_under, joints_between
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
 

@@ -8,7 +8,7 @@
 'step,type,bricks,placed,rob1_node,rob1_b'
 """
 
+from seqopt.sequence.exports._tables import BlockState, step_states
 from seqopt.sequence.exports.formats import EXPORTS, export_plan, read_folder
-from seqopt.sequence.exports.tables import BlockState, step_states
 
 __all__ = ["EXPORTS", "BlockState", "export_plan", "read_folder", "step_states"]

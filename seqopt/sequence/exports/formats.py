@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from seqopt.errors import FileError, StepError
-from seqopt.scene.checks import short
+from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.exports.compas_plans import Source, compas_assembly, read_source, timber_plan
-from seqopt.sequence.exports.tables import plan_csv, plan_json, sequencer_json
+from seqopt.sequence.exports._compas_plans import Source, compas_assembly, read_source, timber_plan
+from seqopt.sequence.exports._tables import plan_csv, plan_json, sequencer_json
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Step
 

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seqopt.errors import SeqoptError
-from seqopt.scene.imports.building import build_scene
-from seqopt.scene.imports.content import Given
+from seqopt.scene.imports._building import build_scene
+from seqopt.scene.imports._content import Given
 from seqopt.scene.imports.formats import _DOCUMENTS as READERS
 from seqopt.scene.imports.formats import sniffed
 from tests.documents import DOCUMENTS

@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.scene.imports.compas_models import read_model, read_timber
-from seqopt.scene.imports.content import Given
+from seqopt.scene.imports._compas_models import read_model, read_timber
+from seqopt.scene.imports._content import Given
 from seqopt.scene.imports.formats import import_scene
 from tests.blocks import box
 from tests.documents import element, matrix, model, nested, timber

@@ -10,10 +10,10 @@ import trimesh
 
 from seqopt.errors import FileError, SceneError
 from seqopt.scene.arch import STANDARD_GRAVITY
-from seqopt.scene.imports.content import Given
+from seqopt.scene.imports._content import Given
 from seqopt.scene.imports.formats import import_scene
 from seqopt.scene.library.common import JointLaw
-from seqopt.scene.scene_file import dump_scene, parse_scene
+from seqopt.scene.scene_file import _parse_scene, dump_scene
 from tests.blocks import box
 from tests.documents import BOXES, DOCUMENTS, HIGH, LOW, TOP, model, obj
 
@@ -56,7 +56,7 @@ def measures(scene):
 def test_blocks_faces_and_supports(read, name, masses, areas, ends):
     scene = read(f"{name}.json", DOCUMENTS[name])
     assert measures(scene) == (masses, areas, ends)
-    assert parse_scene(dump_scene(scene)) == scene
+    assert _parse_scene(dump_scene(scene)) == scene
     heights = [brick.position[2] for brick in scene.placed]
     assert heights == sorted(heights)
 
@@ -264,7 +264,7 @@ def test_what_a_file_lacks_or_has_wrong_is_one_line(read, name, content, given, 
 def test_what_is_no_file_or_too_large_is_refused(tmp_path, monkeypatch):
     with pytest.raises(FileError, match="cannot read"):
         import_scene(tmp_path / "none.json")
-    monkeypatch.setattr("seqopt.files._LARGEST_INPUT", 10)
+    monkeypatch.setattr("seqopt._files._LARGEST_INPUT", 10)
     path = tmp_path / "large.stl"
     path.write_bytes(b"x" * 11)
     with pytest.raises(FileError, match="more than"):
@@ -272,7 +272,7 @@ def test_what_is_no_file_or_too_large_is_refused(tmp_path, monkeypatch):
 
 
 def test_an_assembly_of_nobodys_size_is_refused(read, monkeypatch):
-    monkeypatch.setattr("seqopt.scene.imports.building.MOST_CORNERS", 60)
+    monkeypatch.setattr("seqopt.scene.imports._building.MOST_CORNERS", 60)
     with pytest.raises(SceneError, match="its blocks have 72 corners; 60 is the most"):
         read("a.json", DOCUMENTS["assembly"])
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, reject
 from hypothesis import strategies as st
 
-from seqopt.cli.main import main
+from seqopt._cli.main import main
 from seqopt.errors import SceneError
 from seqopt.scene.library import (
     ArchForm,
@@ -22,7 +22,7 @@ from seqopt.scene.library import (
     dome,
     wall,
 )
-from seqopt.scene.scene_file import KINDS, dump_scene, load_scene, parse_scene, scene_by_words
+from seqopt.scene.scene_file import KINDS, _parse_scene, _scene_by_words, dump_scene, load_scene
 
 
 def off_circle(x, z, span, rise):
@@ -143,7 +143,7 @@ def test_scenes_in_words_are_those_of_the_library(words, made):
     scene = load_scene(words)
     assert replace(scene, provenance="") == replace(made(), provenance="")
     assert scene.provenance.endswith(f"In words: {words}.")
-    assert parse_scene(dump_scene(scene)) == scene
+    assert _parse_scene(dump_scene(scene)) == scene
 
 
 @pytest.mark.parametrize(
@@ -161,7 +161,7 @@ def test_scenes_in_words_are_those_of_the_library(words, made):
 )
 def test_words_that_make_no_scene(words, said):
     with pytest.raises(SceneError) as caught:
-        scene_by_words(words)
+        _scene_by_words(words)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 

@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.contact.faces import bare_assembly, face_distance
+from seqopt.contact.faces import _face_distance, bare_assembly
 from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.rigid._mixed import solve_dense
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.mixed import solve_dense
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
-from seqopt.scene.boxes import boxes, separations
+from seqopt.scene.boxes import _separations, boxes
 from seqopt.scene.scene_file import (
     ABOUT,
+    _find_warnings,
+    _parse_scene,
     builtin_scenes,
     dump_scene,
-    find_warnings,
     load_scene,
-    parse_scene,
 )
 from seqopt.sequence.schedule import islands
 from tests.builders import first, largest_difference
@@ -42,7 +42,7 @@ def network(vault):
 
 def own_pairs(scene, bricks):
     """Pairs of which one at least is not of the arch, and how far they are apart."""
-    pairs, distance = separations(bricks)
+    pairs, distance = _separations(bricks)
     kept = pairs.max(axis=1) >= 25
     names = np.array([brick.name for brick in bricks])
     return {frozenset(pair) for pair in names[pairs[kept]].tolist()}, distance[kept], pairs[kept]
@@ -53,17 +53,17 @@ def test_every_built_in_scene_is_named_drawn_from_text_and_not_odd(name):
     scene = load_scene(name)
     assert scene.name == name
     assert scene.provenance
-    assert find_warnings(scene) == ()
+    assert _find_warnings(scene) == ()
     assert ABOUT[name]
     assert "\n" not in ABOUT[name]
-    assert parse_scene(dump_scene(scene)) == scene
+    assert _parse_scene(dump_scene(scene)) == scene
     assert load_scene(name) == scene
 
 
 @pytest.mark.parametrize("name", builtin_scenes())
 def test_bricks_of_built_in_scenes_touch_and_do_not_interpenetrate(name):
     scene = load_scene(name)
-    _, distance = separations(scene.bricks)
+    _, distance = _separations(scene.bricks)
     assert distance.min() > 0
     assembly = bare_assembly(build_network(scene), len(scene.bricks))
     assert (assembly.area > 0).all()
@@ -93,7 +93,7 @@ def test_bricks_of_the_vault_are_a_joint_apart_and_all_neighbors_are_joined(vaul
 
 
 def zip_pairs(scene):
-    pairs, distance = separations(scene.bricks)
+    pairs, distance = _separations(scene.bricks)
     names = np.array([brick.name for brick in scene.bricks])
     return [(frozenset(p), d) for p, d in zip(names[pairs].tolist(), distance, strict=True)]
 
@@ -103,8 +103,8 @@ def test_joints_of_the_vault_are_between_their_faces_and_not_wide(vault):
     widths = []
     for joint in vault.joints:
         along, at = np.array(joint.along), np.array(joint.position)
-        before = face_distance(bricks[joint.bricks[0]], -along, at)
-        after = face_distance(bricks[joint.bricks[1]], along, at)
+        before = _face_distance(bricks[joint.bricks[0]], -along, at)
+        after = _face_distance(bricks[joint.bricks[1]], along, at)
         assert before == pytest.approx(after, abs=1e-9) or joint in vault.joints[:24]
         widths.append(before + after)
     assert min(widths) > NARROWEST

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt.scene.library.joints import contact_areas
+from seqopt.scene.library._joints import contact_areas
 
 numbers = st.floats(-1, 1)
 

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from seqopt.contact.faces import bare_assembly
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
+from seqopt.engines.rigid._mixed import solve_dense
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.engines.rigid.mixed import solve_dense
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.boxes import separations
+from seqopt.scene.boxes import _separations
 from seqopt.scene.library import (
     ArchForm,
     DomeShape,
@@ -30,8 +30,8 @@ from seqopt.scene.library import (
     herringbone_vault,
     wall,
 )
-from seqopt.scene.library.joints import joints_between
-from seqopt.scene.scene_file import find_warnings, load_scene, scene_by_words
+from seqopt.scene.library._joints import joints_between
+from seqopt.scene.scene_file import _find_warnings, _scene_by_words, load_scene
 from seqopt.sequence.schedule import islands
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import cantilever, sequential
@@ -111,10 +111,10 @@ GENERATED = st.one_of(chains, small_arches(), small_walls(), small_domes(), smal
 @given(scene=GENERATED)
 def test_no_two_bricks_are_in_one_place(scene):
     assume(len(scene.bricks) > 1)
-    pairs, distance = separations(scene.bricks)
+    pairs, distance = _separations(scene.bricks)
     thin = min(min(brick.dimensions) for brick in scene.bricks)
     assert distance.min(initial=0.0) >= -1e-6 * thin
-    assert find_warnings(scene) == ()
+    assert _find_warnings(scene) == ()
     joined = {frozenset(joint.bricks) for joint in scene.joints}
     assert len(joined) == len(scene.joints)
     names = [brick.name for brick in scene.bricks]
@@ -234,7 +234,7 @@ def test_compliance_agrees_with_independent_routes(scene, share):
         (lambda: WallShape(columns=300, courses=100), "wall: 30000 bricks; give numbers that make"),
         (lambda: DomeShape(courses=300, around=100), "dome: 30000 bricks; give numbers that make"),
         (lambda: arch(ArchForm(span=1e9, rise=7.0)), "arch: .* bricks; give numbers that make at"),
-        (lambda: scene_by_words("arch:span=1e300,rise=7"), "numbers are too large; give smaller"),
+        (lambda: _scene_by_words("arch:span=1e300,rise=7"), "numbers are too large; give smaller"),
         (lambda: VaultShape(bricks=0), "vault: bricks is 0; give a whole number from 1"),
         (lambda: VaultShape(bricks=30, skew=math.inf), "vault: skew is inf; give a finite number"),
         (lambda: VaultShape(bricks=30, plan_angle=5.1), "vault: plan_angle is 5.1 rad; give at"),

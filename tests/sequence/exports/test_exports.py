@@ -8,14 +8,14 @@ import json
 
 import pytest
 
+from seqopt._files import write_text
 from seqopt.errors import FileError, StepError
-from seqopt.files import write_text
 from seqopt.network.build import build_network
-from seqopt.scene.imports.content import Given
+from seqopt.scene.imports._content import Given
 from seqopt.scene.imports.formats import import_scene
 from seqopt.scene.scene_file import save_scene
+from seqopt.sequence.exports._tables import BlockState, parse_plan_json, step_states
 from seqopt.sequence.exports.formats import EXPORTS, export_plan, read_folder
-from seqopt.sequence.exports.tables import BlockState, parse_plan_json, step_states
 from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.two_robots import METHODS
 from tests.builders import six_bricks

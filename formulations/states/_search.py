@@ -1,0 +1,267 @@
+"""What formulations of states share: first plans, budgets, scenarios and orders, by any choice."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from itertools import pairwise
+from operator import le
+
+import numpy as np
+
+from formulations.states._totals import least_total
+from seqopt._interrupts import answered
+from seqopt.arrays import Ints
+from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, TimeUpError
+from seqopt.graph._budgets import Within, within_budgets
+from seqopt.graph._explore import Explorer, Visited
+from seqopt.graph.graph import Graph
+from seqopt.graph.orders import AllOrders, OrderSelection, OrderStates, TooManySetsError, Trial
+from seqopt.graph.orders import worth as worth_of
+from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
+from seqopt.graph.states._visits import FreeStates, ScenarioSums, explore
+from seqopt.graph.states.states import States
+from seqopt.plan.calling._guard import StatePath
+from seqopt.plan.calling.formulation import Watch
+from seqopt.plan.search._sturdiest import best_margin
+from seqopt.work._workers import free_memory
+from seqopt.work.progress import Stage, Tell
+
+WIDTH = 50  # new states of a brick count from which the narrow search goes on
+MOST_PARTS = 5000  # sets of bricks with a newest one, of all orders
+COPIES = 2.0  # of what is kept, that are needed at once while it grows
+
+_Choose = Callable[[Graph, Watch], tuple[tuple[int, ...], tuple[float, ...], bool]]
+Watching = Callable[[Explorer], None]
+Search = Callable[[States], StatePath]
+
+
+class StopError(Exception):
+    """Time or memory that was given is used up; says which."""
+
+
+def best_order(
+    problem: AllOrders, choose: _Choose, watch: Watch, tell: Watching, width: int | None = None
+) -> OrderSelection:
+    """Return the order of the path that is chosen through the states of all orders at once.
+
+    ``width``: how many new states of a set of bricks are kept; by default, if the first goal is a
+    peak, those below that of the scene's own order.
+    """
+    space, order = OrderStates(problem, MOST_PARTS), problem.scene.build_order
+    found, own = Explorer(space, width, tell), np.inf
+    try:
+        if width is None and problem.allows(order):
+            own = worth_of(problem, Trial(order, np.inf))
+        found.rise(own if space.peaks[0] else np.inf)
+        if not found.whole:
+            raise InfeasibleError("no order of the bricks has a plan")
+        found.refine()
+        visited = found.graph()
+        path, bounds, early = choose(_on_paths(visited.graph), watch)
+    except TooManySetsError:
+        raise ProblemError(
+            f"scene {problem.scene.name}: its orders have more than {MOST_PARTS} sets of bricks; "
+            "take order_search, or give an order"
+        ) from None
+    except StopError as stop:
+        raise _too_little(stop) from None
+    value, stopped = own, "time" * early
+    if path and worth(visited.graph, path)[0] < own:
+        value = worth(visited.graph, path)[0]
+        order = tuple(dict.fromkeys(part[1] for _, part, _ in visited.of(path)))
+    if not np.isfinite(value):
+        raise TimeUpError("no order with a plan was found yet; give more")
+    bound = min(bounds[0] if bounds else -np.inf, value)
+    return OrderSelection(order, value, bound, len(space.parts) - 1, stopped)
+
+
+def best_total(
+    problem: States, choose: _Choose, watch: Watch, tell: Watching, width: int | None = None
+) -> StatePath:
+    """Return the plan of least total over scenarios.
+
+    ``choose``: paths of least sum; ``width``: how many new states of a brick count are kept; by
+    default all, without which no plan is proven to be the least.
+    """
+    space = ScenarioSums(problem, regrips=width is None, standing=bool(problem.demands))
+
+    def cheapest(graph: Graph) -> tuple[tuple[int, ...], float]:
+        path, bounds, _ = choose(graph, watch)
+        if not path:
+            raise StopError("time")
+        return path, bounds[0] if bounds else -np.inf
+
+    try:
+        found = Explorer(space, width, tell)
+        if not found.rise():
+            if width is not None:
+                return best_total(problem, choose, watch, tell)
+            raise InfeasibleError("no plan is allowed")
+        visited = found.graph()
+        best = least_total(_on_paths(visited.graph), problem.over, cheapest, watch)
+    except StopError as stop:
+        raise _too_little(stop) from None
+    plan = _selection(visited, Best(best.path, (best.value,)))
+    prices, bound = (tuple(best.weights.tolist()),), (best.bound,)
+    return replace(plan, bound=bound, prices=prices, stopped="time" * watch.over)
+
+
+def chosen(problem: States, choose: _Choose, watch: Watch, tell: Watching) -> StatePath:
+    """Return the plan of a choice; where time was over, the better one of it and a first plan."""
+    first = None
+    try:
+        first = narrow(problem, WIDTH, tell)
+        wide = explore(problem, first.objective[0] if first else np.inf, tell=tell)
+        if not wide.whole:
+            raise InfeasibleError("no plan is allowed")
+        wide.refine()
+        graph, states = wide.graph()
+        with answered(watch.interrupt):
+            path, known, early = choose(_on_paths(graph), watch)
+    except (StopError, KeyboardInterrupt) as stop:
+        return plan_by_then(first, stop)
+    stopped = ("interrupt" if watch.interrupted else "time") * early
+    if path:
+        values = worth(graph, path)
+        found = _selection(Visited(graph, states), Best(path, values))
+    if not path or (first and early and first.objective < values):
+        found = plan_by_then(first, KeyboardInterrupt() if watch.interrupted else StopError("time"))
+    bounds = (*known, *[-np.inf] * len(graph.peaks))
+    bound = tuple(map(min, found.objective, bounds))
+    return replace(found, bound=bound, stopped=stopped)
+
+
+def _on_paths(graph: Graph) -> Graph:
+    """Return the graph with the moves that are on paths from the start to an end."""
+    to_end = np.isfinite(distances(graph, np.ones(len(graph.source)), back=True))
+    return graph.only(reached(graph)[graph.source] & to_end[graph.target])
+
+
+def worth(graph: Graph, path: Sequence[int]) -> tuple[float, ...]:
+    """Return what every goal takes of a path."""
+    moves = [a * graph.states + b for a, b in pairwise((0, *path))]
+    kept = np.isin(graph.source.astype(np.int64) * graph.states + graph.target, moves)
+    return lexicographic(graph.only(kept)).values
+
+
+def watched(problem: States, watch: Watch, most: float, progress: Tell) -> Watching:
+    """Return what is told every level: it says how far it is, and ends the search in time."""
+
+    def tell(found: Explorer) -> None:
+        share = found.level / problem.space.levels
+        progress(Stage(f"states, pass {found.passes}", share))
+        if watch.over:
+            raise StopError("time")
+        room = min(most, free_memory() + found.nbytes)
+        if COPIES * (found.nbytes + problem.nbytes) > room:
+            raise StopError("memory")
+
+    return tell
+
+
+def plan_by_then(found: StatePath | None, stop: StopError | KeyboardInterrupt) -> StatePath:
+    """Return a first plan, of which nothing is proven; raise an error if there is none yet."""
+    if found is None:
+        raise _too_little(stop) from None
+    none = (-np.inf,) * len(found.objective)
+    return StatePath(found.states, found.objective, none, stopped=str(stop) or "interrupt")
+
+
+def _too_little(stop: StopError | KeyboardInterrupt) -> SeqoptError | KeyboardInterrupt:
+    """Return what to say where no plan was found before."""
+    if isinstance(stop, KeyboardInterrupt):
+        return stop
+    if str(stop) == "memory":
+        return ProblemError("option max_memory: it is too little to find a plan; give more")
+    return TimeUpError("no plan was found yet; give more")
+
+
+def after_margins(problem: States, search: Search, tell: Watching) -> StatePath:
+    """Return what is found once margins of stability, which come first, are at their best."""
+    margins = [goal.of_margins for goal in problem.goals]
+    if sorted(margins, reverse=True) != margins:
+        named = ", ".join(map(str, problem.goals))
+        raise ProblemError(f"aims {named}: name bond, friction and tilt before all others")
+    if not margins[0]:
+        return search(problem)
+    try:
+        value, bound, rest = best_margin(problem, tell)
+    except StopError as stop:
+        raise _too_little(stop) from None
+    after = after_margins(rest, search, tell)
+    if len(problem.goals) == 1:  # what was chosen after it was nobody's wish
+        after = replace(after, objective=(), bound=())
+    return replace(after, objective=(value, *after.objective), bound=(bound, *after.bound))
+
+
+def narrow(
+    problem: States,
+    width: int,
+    tell: Watching,
+    most: Sequence[float] | None = None,
+    enough: float = -np.inf,
+) -> StatePath | None:
+    """Return the best plan through a few states of every brick count, if there is one.
+
+    Where states must stand it is asked of all of them only if the best paths fall; and if ``most``
+    is given, only where goals take no more than that without it; ``enough``: as of `Explorer`.
+    """
+    for standing in (False, True)[: 1 + bool(problem.demands)]:
+        space = FreeStates(problem, regrips=False, standing=standing)
+        found = Explorer(space, width, tell, enough)
+        if found.rise():
+            best = exact_best(found, problem.budgets)[1]
+            if most is not None and not all(map(le, best.values, most)):
+                return None
+            with suppress(InfeasibleError):
+                return best_standing(problem, found)
+    return None
+
+
+def best_standing(problem: States, found: Explorer) -> StatePath:
+    """Return the best path through visited states that stand as is demanded.
+
+    Those on the best path are asked, once; where one falls, it is left out.
+    """
+    known: set[tuple[int, ...]] = set()
+    while True:
+        visited, best = exact_best(found, problem.budgets)
+        fallen = False
+        for level, part, state in visited.of(best.path) if problem.demands else ():
+            row = (level, *state.tolist())
+            if row not in known and not problem.stand(level, state[None])[0]:
+                found.close((level, part), state[None])
+                fallen = True
+            known.add(row)
+        if not fallen:
+            return _selection(visited, best)
+
+
+def exact_best(found: Explorer, budgets: Sequence[float] = ()) -> tuple[Visited, Best | Within]:
+    """Return the best path through visited states, values close to its own being exact."""
+    while True:
+        visited = found.graph()
+        graph = visited.graph
+        best = within_budgets(graph, budgets) if budgets else lexicographic(graph)
+        if not found.refine(best.values):
+            return visited, best
+
+
+def _selection(visited: Visited, best: Best | Within) -> StatePath:
+    """Return a path as a plan, and with it the states that a better one could pass."""
+    rows = tuple((level, *state.tolist()) for level, _, state in visited.of(best.path))
+    hint = _passable(visited, best.values[0])
+    if isinstance(best, Within):
+        return StatePath(rows, best.values, best.bounds, hint, best.prices)
+    return StatePath(rows, best.values, best.values, hint)
+
+
+def _passable(visited: Visited, value: float) -> tuple[Ints, ...]:
+    """Return the states that paths within a value of the first goal can pass, by brick count."""
+    graph, states = visited
+    kept = graph.amounts[:, 0] <= tied(value) if graph.peaks[0] else None
+    ends = np.cumsum([len(rows) for *_, rows in states])
+    parts = np.split(reached(graph, kept), ends[:-1])
+    return tuple(rows[inside] for (*_, rows), inside in zip(states, parts, strict=True))

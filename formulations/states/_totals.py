@@ -1,0 +1,123 @@
+r"""The path of least worst or tail total over scenarios: weights, then labels that they bound.
+
+A path :math:`p` has a total :math:`c_s(p)` in every scenario, and the aim makes
+:math:`\max_{w \in W} \sum_s w_s \, c_s(p)` of them, with the weights of
+`formulations.scenarios.scenario_search`. At fixed weights the cheapest path is what a formulation
+finds for a single sum, and a bound on all. What the best weights leave open is closed by labels,
+vectors of totals: with the least from every state on, under each of some weights, a label has a
+bound, and the one with the lowest is continued first. Labels whose bound is not below the best path
+are left out, and so is one of a state where another one is nowhere above.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import NamedTuple
+
+import numpy as np
+
+from formulations._weights import CLOSE, Weighed, best_weights
+from seqopt.arrays import Floats, Ints
+from seqopt.graph.graph import Graph
+from seqopt.graph.paths import distances
+from seqopt.plan.calling.formulation import Watch
+from seqopt.problem.problem import RobustAim
+
+LABELS = 50_000  # that are continued at most
+
+_Cheapest = Callable[[Graph], tuple[tuple[int, ...], float]]
+
+
+class LeastTotal(NamedTuple):
+    """A path, its value, what no path stays below, and the weights (S,) that prove most of it."""
+
+    path: tuple[int, ...]
+    value: float
+    bound: float
+    weights: Floats
+
+
+def least_total(graph: Graph, aim: RobustAim, cheapest: _Cheapest, watch: Watch) -> LeastTotal:
+    """Return the path of least total.
+
+    ``graph``: with a sum for every scenario, all of it on paths from the start to ends;
+    ``cheapest``: returns the path of least sum through a graph with one goal, and what none stays
+    below.
+    """
+    paths = _Paths(graph, aim, cheapest)
+    weighed = best_weights(paths, watch)
+    if watch.over or weighed.bound >= _below(weighed.value):
+        bound = min(weighed.bound, weighed.value)
+        return LeastTotal(weighed.choice, weighed.value, bound, weighed.weights)
+    return _labeled(paths, weighed, watch)
+
+
+@dataclass(frozen=True)
+class _Paths:
+    """The paths of a graph as choices with totals."""
+
+    graph: Graph
+    aim: RobustAim
+    best: _Cheapest
+
+    @property
+    def scenarios(self) -> int:
+        return len(self.graph.peaks)
+
+    def cheapest(self, weights: Floats) -> tuple[tuple[int, ...], float]:
+        graph = self.graph
+        sums = (graph.amounts @ weights)[:, None]
+        return self.best(Graph(graph.source, graph.target, sums, (False,), graph.ends))
+
+    def totals(self, choice: tuple[int, ...]) -> Floats:
+        codes = self.graph.source.astype(np.int64) * self.graph.states + self.graph.target
+        moves = [a * self.graph.states + b for a, b in zip((0, *choice), choice, strict=False)]
+        return np.asarray(self.graph.amounts[np.searchsorted(codes, moves)].sum(axis=0))
+
+
+def _below(value: float) -> float:
+    return value - CLOSE * abs(value)
+
+
+def _labeled(paths: _Paths, weighed: Weighed, watch: Watch) -> LeastTotal:
+    """Return the best path, by labels continued in the order of what they come to at least."""
+    graph, best, path = paths.graph, weighed.value, weighed.choice
+    provers = weighed.weights[None]
+    if paths.aim.most(paths.scenarios) == 1:
+        provers = np.vstack([provers, np.eye(paths.scenarios)])
+    left = np.array([distances(graph, graph.amounts @ w, back=True) for w in provers])
+    starts = np.searchsorted(graph.source, np.arange(graph.states + 1))
+    heap = [(weighed.bound, 0, 0, -1, np.zeros(paths.scenarios))]
+    kept: dict[int, Floats] = {}
+    popped: list[tuple[int, int]] = []  # state, and which label it continues
+    count = 0
+    while heap and heap[0][0] < _below(best):
+        if len(popped) == LABELS or (len(popped) % 1000 == 0 and watch.over):
+            return LeastTotal(path, best, max(weighed.bound, heap[0][0]), weighed.weights)
+        _, _, state, before, totals = heappop(heap)
+        others = kept.get(state, np.zeros((0, paths.scenarios)))
+        if (others <= totals).all(axis=1).any():
+            continue
+        kept[state] = np.vstack([others, totals])
+        popped.append((state, before))
+        if graph.ends[state] and paths.aim.value(totals) < best:
+            path, best = _back(popped), paths.aim.value(totals)
+        moves: Ints = np.arange(starts[state], starts[state + 1])
+        then = totals + graph.amounts[moves]
+        bounds = (then @ provers.T + left[:, graph.target[moves]].T).max(axis=1)
+        for k in np.flatnonzero(bounds < _below(best)).tolist():
+            count += 1
+            row = (float(bounds[k]), -count, int(graph.target[moves[k]]), len(popped) - 1, then[k])
+            heappush(heap, row)
+    return LeastTotal(path, best, best, weighed.weights)
+
+
+def _back(popped: list[tuple[int, int]]) -> tuple[int, ...]:
+    """Return the states of the last label's path by where each comes from, the start left out."""
+    path, last = list[int](), len(popped) - 1
+    while last > 0:
+        state, last = popped[last]
+        path.append(state)
+    return tuple(reversed(path))

@@ -1,0 +1,140 @@
+"""What a command answers, the three forms in which it is printed, and how a command ends."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+from importlib.metadata import version
+from pathlib import Path
+
+from seqopt._cli.terminal import complain, note, show, show_text
+from seqopt.errors import (
+    InfeasibleError,
+    MechanismError,
+    SeqoptError,
+    SolverError,
+    TimeUpError,
+    WorkerError,
+)
+
+LESS = "take fewer bricks, robots that reach less, or a computer with more memory"
+
+
+class Status(IntEnum):
+    """How a command ended: its exit status."""
+
+    DONE = 0
+    DOES_NOT_HOLD = 1  # done, and something asked for does not hold
+    BAD_INPUT = 2
+    NO_ANSWER = 3  # infeasible, or a mechanism
+    FAILED = 4  # a solver, workers, or memory; says nothing about the structure
+    INTERRUPTED = 130
+
+
+def status_of(error: BaseException) -> Status:
+    """Say in a line on standard error what went wrong, and return the exit status."""
+    if isinstance(error, KeyboardInterrupt):
+        complain(f"seqopt: interrupted{f'; {error}' if str(error) else ''}")
+        return Status.INTERRUPTED
+    if isinstance(error, MemoryError):
+        advice = "" if isinstance(error, SeqoptError) else f"; {LESS}"
+        complain(f"seqopt: out of memory: {str(error) or 'no more is to be had'}{advice}")
+        return Status.FAILED
+    if isinstance(error, SolverError):
+        what = "time is over" if isinstance(error, TimeUpError) else "solver failed"
+        complain(f"seqopt: {what}: {error}")
+        return Status.FAILED
+    if isinstance(error, OSError) and not isinstance(error, SeqoptError):
+        complain(f"seqopt: error: cannot write standard output: {error.strerror or error}")
+        return Status.BAD_INPUT
+    complain(f"seqopt: error: {error}")
+    if isinstance(error, WorkerError):
+        return Status.FAILED
+    none = isinstance(error, MechanismError | InfeasibleError)
+    return Status.NO_ANSWER if none else Status.BAD_INPUT
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command answers, as facts for scripts and as text for people."""
+
+    facts: Mapping[str, object]  # values, mappings, sequences and tables
+    text: str = ""  # lines on standard output
+    headings: tuple[str, ...] = ()  # lines of the text that are headings
+    data: str = ""  # a table as CSV for standard output, where no file is written for it
+    written: tuple[Path, ...] = ()
+    notes: tuple[str, ...] = ()  # what else is worth knowing: lines on standard error
+    failures: tuple[str, ...] = ()  # what went wrong although there is an answer: as notes
+    status: Status = Status.DONE
+
+    def document(self, command: str) -> dict[str, object]:
+        """Return what scripts are told of a command, ready for JSON."""
+        return {
+            "command": command,
+            "seqopt": version("seqopt"),
+            **{name: plain(value) for name, value in self.facts.items()},
+            "written": [str(path) for path in self.written],
+            "notes": list(self.notes),
+            "failures": list(self.failures),
+            "exit_status": int(self.status),
+        }
+
+
+def print_answer(answer: Answer, options: argparse.Namespace) -> Status:
+    """Print an answer in the form that is asked for; return its status.
+
+    Where its files are written, nothing is lost if nobody hears.
+    """
+    if options.json:
+        show(json.dumps(answer.document(options.command), indent=2, allow_nan=False) + "\n")
+    elif options.quiet:
+        paths = "".join(f"{path}\n" for path in answer.written)
+        show(answer.data or paths or f"{answer.text}\n")
+    else:
+        if answer.data:
+            show(answer.data)
+        if answer.text and not (answer.written and sys.stdout is None):
+            show_text(answer.text, answer.headings)
+    for text in () if options.quiet else answer.notes:
+        note(text)
+    for text in answer.failures:
+        complain(text)
+    return answer.status
+
+
+def plain(value: object) -> object:
+    """Return a value as JSON can hold it, numbers with all of their digits.
+
+    What is not known (NaN) is null, what is infinite the text ``inf`` or ``-inf``; a table is a
+    list of rows.
+
+    Examples
+    --------
+    >>> plain({"gap": float("nan"), "bond": float("inf"), "nodes": (1, 20)})
+    {'gap': None, 'bond': 'inf', 'nodes': [1, 20]}
+    """
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)
+    if isinstance(value, str | int | float | None):
+        return value
+    if isinstance(value, Mapping):
+        return {str(name): plain(part) for name, part in value.items()}
+    if isinstance(value, Sequence | set | frozenset):
+        return [plain(part) for part in value]
+    return _unpacked(value)
+
+
+def _unpacked(value: object) -> object:
+    """Return what a table, an array, a member of an enumeration or anything else holds."""
+    import pandas as pd  # noqa: PLC0415  # help needs none of it
+
+    if isinstance(value, pd.DataFrame):
+        return plain(value.to_dict(orient="records"))
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    return plain(value.value) if isinstance(value, Enum) else str(value)

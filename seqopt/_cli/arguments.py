@@ -1,0 +1,172 @@
+"""The words of the command line: commands, their arguments, and the help that they print."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import version
+from types import ModuleType
+from typing import Any, NoReturn
+
+from seqopt._cli.answer import Status
+from seqopt._cli.terminal import columns, complain, show, wrapped
+from seqopt.errors import did_you_mean
+
+EXAMPLES = """Three examples:
+
+  seqopt compare arch25
+      all methods and formulations on the arch of Bruun et al., side by side
+  seqopt optimize arch25 --schedule free --aim minmax --out best
+      the best build by three robots; best/report.html shows it step by step
+  seqopt optimize arch:span=2,rise=0.8 --formulation overlap_dp --out mine
+      where to hold an arch of your own
+
+seqopt --help names all commands, seqopt COMMAND --help what each can do.
+"""
+WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
+UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
+MISSING = "the following arguments are required"
+
+
+def _nearest(message: str, options: Iterable[str]) -> str:
+    """Return a hint at the word that a message of the parser is about, or nothing.
+
+    Examples
+    --------
+    >>> _nearest("unrecognized arguments: --formulaton=beam", ["--formulation", "--out"])
+    ' (did you mean --formulation?)'
+    >>> _nearest("invalid choice: 'optimise' (choose from 'optimize', 'scene')", [])
+    ' (did you mean optimize?)'
+    """
+    if found := WRONG_CHOICE.search(message):
+        return did_you_mean(found[1], [word.strip(" '") for word in found[2].split(",")])
+    found = UNKNOWN.search(message)
+    if found is None:
+        return ""
+    known = {option.lstrip("-"): option for option in options}
+    if found[1] in known.values():
+        return " (options stand after the command)"
+    return did_you_mean(found[1].lstrip("-"), known).replace("mean ", "mean --")
+
+
+def _first_wrong(message: str, given: Sequence[str], options: Sequence[str]) -> str:
+    """Return a message about a missing argument, or one about a mistyped option that explains it.
+
+    Examples
+    --------
+    >>> given = ["arch25", "--ot", "best"]
+    >>> _first_wrong("the following arguments are required: --out", given, ["--out"])
+    'unrecognized arguments: --ot'
+    """
+    if not message.startswith(MISSING) or message.endswith("COMMAND"):
+        return message
+    for word in given:
+        name = word.partition("=")[0]
+        if name.startswith("--") and not any(option.startswith(name) for option in options):
+            return f"unrecognized arguments: {word}"
+    return message
+
+
+def _layout(prog: str) -> argparse.HelpFormatter:
+    return argparse.RawDescriptionHelpFormatter(prog, width=columns())
+
+
+@dataclass(frozen=True)
+class _Command:
+    """A command in a few words, and its module of `seqopt._cli`, loaded when it is asked for.
+
+    That has ``add_arguments``, ``run``, ``DESCRIPTION``, ``EXAMPLES``, and ``USAGE`` where it has
+    more options than a reader takes in at once.
+    """
+
+    about: str
+    module: str
+
+    def load(self) -> ModuleType:
+        """Return the module."""
+        return import_module(f"seqopt._cli.{self.module}")
+
+
+COMMANDS = {
+    "compare": _Command("show all ways to build a scene side by side", "commands.compare"),
+    "optimize": _Command("choose where robots hold, and write the plan", "commands.optimize"),
+    "pareto": _Command("find all plans that no other one beats in every aim", "commands.pareto"),
+    "analyze": _Command("compute forces and displacements in every step", "commands.analyze"),
+    "assess": _Command("prove which steps stand, and with what margins", "commands.assess"),
+    "report": _Command("make a page that shows plans step by step", "commands.report"),
+    "scene": _Command("check, describe, export or list scenes", "commands.scene"),
+    "import": _Command(
+        "make a scene of an assembly of COMPAS, a mesh or a table", "commands.importing"
+    ),
+    "export": _Command("write a plan in a format of others", "commands.exporting"),
+    "completion": _Command("let the shell complete words of seqopt", "commands.completion"),
+}
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser whose errors are one line, and whose help is a result like others."""
+
+    color: bool  # of Python 3.14
+    given: Sequence[str] = ()  # what it was asked to parse: a missing word may be a mistyped one
+    asked = ""  # the command that is asked for, and its options
+    spoken: tuple[str, ...] = ()
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        self.given = args or ()
+        return super().parse_known_args(args, namespace)
+
+    def print_help(self, file: object = None) -> None:
+        show(self.format_help())
+
+    def error(self, message: str) -> NoReturn:
+        own = tuple(self._option_string_actions)
+        message = _first_wrong(message, self.given, own)
+        hint = _nearest(message, self.spoken or own)
+        where = f"{self.prog} {self.asked}".rstrip()
+        complain(f"{self.prog}: error: {message}{hint} (see {where} --help)")
+        self.exit(Status.BAD_INPUT)
+
+
+def parser(asked: str | None = None) -> argparse.ArgumentParser:
+    """Return the parser of the command line, or of the one command that is asked for.
+
+    ``command`` names what is to be run. A wrong word ends the program with `Status.BAD_INPUT`.
+    """
+    whole = _Parser(
+        prog="seqopt",
+        formatter_class=_layout,
+        description="Where should each robot hold a half-built structure, over the whole build?",
+        epilog="seqopt COMMAND --help has the options of a command, and examples.",
+    )
+    whole.add_argument("--version", action="version", version=f"seqopt {version('seqopt')}")
+    whole.color = False  # signs of color would be printed as codes
+    whole.set_defaults(quiet=False, json=False)
+    commands = whole.add_subparsers(
+        required=True, title="commands", metavar="COMMAND", dest="command"
+    )
+    for name, command in COMMANDS.items():
+        added = commands.add_parser(name, help=command.about, formatter_class=_layout)
+        added.color = False
+        if asked in (None, name):
+            _fill(added, command.load())
+        if asked == name:
+            whole.asked, whole.spoken = name, tuple(added._option_string_actions)
+    return whole
+
+
+def _fill(command: argparse.ArgumentParser, module: ModuleType) -> None:
+    """Give a command what its module says."""
+    if usages := getattr(module, "USAGE", ()):
+        command.usage = "\n       ".join(f"{command.prog} {usage}" for usage in usages)
+    lines = "\n".join(f"  {example}" for example in module.EXAMPLES)
+    command.description = wrapped(module.DESCRIPTION)
+    command.epilog = f"example{'s' * (len(module.EXAMPLES) > 1)}:\n{lines}"
+    module.add_arguments(command)
+
+
+def asked_command(words: Sequence[str]) -> str:
+    """Return the command that words after ``seqopt`` ask for, empty if there is none."""
+    return next((word for word in words if not word.startswith("-")), "")

@@ -1,0 +1,128 @@
+"""What several commands are asked for, and what they say of it."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pandas as pd
+
+from seqopt._cli.answer import Answer, Status
+from seqopt._cli.terminal import wrapped
+from seqopt._cli.values import parse_robots
+from seqopt.contact.mortar import MORTARS
+from seqopt.engines._auto import AutoEngine
+from seqopt.engines.interface import Engine
+from seqopt.engines.registry import make_engine
+from seqopt.errors import ProblemError, SceneError, StepError
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
+from seqopt.problem.requirements import overloads
+from seqopt.report.comparison import idle_note
+from seqopt.responses.table import OUTSIDE, REMEDY
+from seqopt.scene.scene import Scene, in_order
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.schedule_file import read_plan
+from seqopt.sequence.steps import AnyStep, Step
+from seqopt.sequence.two_robots import METHODS
+from seqopt.study.published import PUBLISHED, is_reference_arch, published_plan
+
+
+def scene_facts(scene: Scene) -> dict[str, object]:
+    """Return what a scene is called, and how large it is."""
+    return {
+        "name": scene.name,
+        "bricks": len(scene.bricks),
+        "joints": len(scene.joints),
+        "ground_ends": len(scene.grounds),
+        "robots": [robot.name for robot in scene.robots],
+    }
+
+
+def asked_scene(options: argparse.Namespace) -> Scene:
+    """Return the scene that a command is asked for, in the order that it is asked for."""
+    if options.order == "search":
+        raise ProblemError(
+            "--order search: only the free schedule has it; give optimize --schedule free"
+        )
+    return in_order(load_scene(options.scene), options.order)
+
+
+def asked_engine(options: argparse.Namespace, network: Network) -> Engine:
+    """Return the engine that a command is asked for."""
+    mortar = None if options.mortar is None else MORTARS[options.mortar]
+    try:
+        return make_engine(options.engine, network, mortar)
+    except SceneError as error:
+        raise SceneError(f"--engine {options.engine}: {error}") from error
+
+
+def asked_steps(options: argparse.Namespace, scene: Scene) -> tuple[Step, ...]:
+    """Return the closed sequence that a command is asked for.
+
+    Raises `SceneError`, `StepError` if the method is not for the scene, or robots are named beside
+    a plan.
+    """
+    robots = parse_robots(options.robots)
+    if robots and options.method not in METHODS:
+        raise StepError(
+            f"--robots {options.robots}: a plan says itself who holds; leave it out, or give "
+            f"--method {' or '.join(METHODS)}"
+        )
+    if options.plan is not None:
+        return read_plan(scene, options.plan)
+    if options.method != PUBLISHED:
+        return METHODS[options.method](build_network(scene), robots)
+    if not is_reference_arch(scene):
+        raise SceneError(
+            f"scene {scene.name}: --method {PUBLISHED} is the printed plan for arch25; "
+            "give --plan FILE for another scene"
+        )
+    return published_plan(scene)
+
+
+def level_notes(engine: Engine) -> tuple[str, ...]:
+    """Return which levels an engine that picks them took, and why."""
+    if not isinstance(engine, AutoEngine):
+        return ()
+    said = [
+        f"engine: {choice.level.value} for {sets} grip sets: {choice.reason}"
+        for choice, sets in engine.tally.items()
+    ]
+    return (*said, *([f"engine: {engine.unchecked}"] if engine.unchecked else []))
+
+
+def idle_notes(scene: Scene, steps: Sequence[AnyStep]) -> tuple[str, ...]:
+    """Return the robots that never grip, in words."""
+    return tuple(idle_note(scene, "robots", steps))
+
+
+def exceeded(scene: Scene, *tables: pd.DataFrame) -> tuple[str, ...]:
+    """Return the payloads that are exceeded in responses of steps, in words."""
+    return tuple(str(excess) for table in tables for excess in overloads(scene, table))
+
+
+def marked(answer: Answer, outside: Sequence[object]) -> Answer:
+    """Return an answer that begins with how results leave the linear range, and what to do."""
+    left = [str(departure) for departure in outside]
+    answer = replace(answer, facts={**answer.facts, "outside_linear_range": left})
+    if not left:
+        return answer
+    lines = (*(f"{OUTSIDE}: {each}" for each in left), REMEDY)
+    if not answer.text:
+        return replace(answer, notes=(*lines, *answer.notes))
+    return replace(answer, text="\n".join([*map(wrapped, lines), answer.text]))
+
+
+def strictly(
+    answer: Answer, options: argparse.Namespace, over: Sequence[str], outside: Sequence[object] = ()
+) -> Answer:
+    """Return an answer, `marked`, with payloads that are `exceeded` and the status of --strict."""
+    answer = marked(answer, outside)
+    answer = replace(answer, facts={**answer.facts, "payloads_exceeded": list(over)})
+    wrong = {"payload exceeded": over, OUTSIDE: [*map(str, outside)]}
+    said = [f"seqopt: {name}: {'; '.join(each)}" for name, each in wrong.items() if each]
+    if not options.strict or not said or answer.status is not Status.DONE:
+        return answer
+    return replace(answer, failures=(*answer.failures, *said), status=Status.DOES_NOT_HOLD)

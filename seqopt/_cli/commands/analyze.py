@@ -1,0 +1,152 @@
+"""The command ``analyze``: responses of every step of one sequence."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterable, Iterator, Sequence
+
+from seqopt._cli.answer import Answer, Status
+from seqopt._cli.asked import (
+    asked_engine,
+    asked_scene,
+    asked_steps,
+    exceeded,
+    idle_notes,
+    level_notes,
+    scene_facts,
+    strictly,
+)
+from seqopt._cli.options import (
+    CSV_OUT,
+    declare,
+    engine_options,
+    form_options,
+    scene_options,
+    steps_options,
+)
+from seqopt._cli.outputs import keep_apart, put_table
+from seqopt._cli.values import parse_time_limit
+from seqopt._files import write_bytes
+from seqopt._interrupts import ending
+from seqopt.engines.interface import Engine, Fields
+from seqopt.engines.registry import provenance
+from seqopt.errors import SceneError
+from seqopt.network.build import build_network
+from seqopt.responses._staged import Placing, staged_fields
+from seqopt.responses.table import LinearRange, archive, response_table, step_fields
+from seqopt.sequence.steps import Step
+from seqopt.work.progress import told
+
+DESCRIPTION = (
+    "Compute how the structure responds in every step of one sequence, and write a table with the "
+    "columns of Table A.1 of Bruun et al.: forces in N, moments in N m, displacements in 0.001 mm."
+)
+USAGE = (
+    "[SCENE] --method NAME [--out FILE] [other options]",
+    "[SCENE] --plan FILE [--out FILE] [other options]",
+)
+EXAMPLES = (
+    "seqopt analyze arch25 --method cantilever --out cantilever.csv",
+    "seqopt analyze my.json --plan plan.csv --out responses.csv",
+    "seqopt analyze arch25 --method sequential --json",
+)
+
+
+UNITS = "in the name of each column: N, Nm, 1e-3mm"
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``analyze``."""
+    basic = command.add_argument_group("what is analyzed")
+    scene_options(basic)
+    steps_options(basic)
+    declare(basic, CSV_OUT)
+    how = engine_options(command)
+    how.add_argument(
+        "--staged",
+        choices=tuple(way.value for way in Placing),
+        help="carry what each step locks in on to the next, instead of analyzing every step from "
+        "scratch: bricks come without stress, fitted to the deformed structure or set down where "
+        "they are planned, and grips close where they find their nodes",
+    )
+    about = {
+        "--fields FILE": "also write every edge force, node displacement and reaction, as a NumPy "
+        "archive (.npz)",
+        "--time-limit SECONDS": "stop after it, with the steps that were computed by then",
+    }
+    declare(how, about)
+    form_options(command, strict=True)
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Analyze every step of a sequence."""
+    keep_apart(options, options.out, options.fields)
+    scene = asked_scene(options)
+    network = build_network(scene)
+    engine, steps = asked_engine(options, network), asked_steps(options, scene)
+    limit = parse_time_limit(options.time_limit)
+    answers: Iterable[tuple[Step, Fields]] = _timely(_step_answers(options, engine, steps), limit)
+    if options.fields is not None:
+        answers = list(answers)
+    table = response_table(network, answers)
+    late = _late(options, len(table), len(steps))
+    if table.empty:
+        return Answer(facts={"steps": ()}, failures=late, status=Status.FAILED)
+    within, computed = LinearRange(engine), steps[: len(table)]
+    staged = None if options.staged is None else staged_fields(network, computed, options.staged)
+    outside = within.departures(table, staged)
+    if options.fields is not None:
+        write_bytes(options.fields, archive(network, answers))
+    said = put_table(options.out, table, f"{len(table)} steps")
+    if options.fields is not None:
+        said["written"] = (*said.get("written", ()), options.fields)
+    answer = Answer(
+        facts={"scene": scene_facts(scene), "units": UNITS, "steps": table, **provenance(engine)},
+        notes=(*level_notes(engine), *within.unchecked, *idle_notes(scene, steps)),
+        failures=late,
+        status=Status.FAILED if late else Status.DONE,
+        **said,
+    )
+    return strictly(answer, options, exceeded(scene, table), outside)
+
+
+def _late(options: argparse.Namespace, computed: int, steps: int) -> tuple[str, ...]:
+    """Return a line if the time limit came before the last step, else none."""
+    if computed == steps:
+        return ()
+    so_far = f"{computed} of {steps} steps" if computed else "no step"
+    return (
+        f"seqopt: error: --time-limit {options.time_limit}: {so_far} computed; give more seconds",
+    )
+
+
+def _step_answers(
+    options: argparse.Namespace, engine: Engine, steps: Sequence[Step]
+) -> Iterator[tuple[Step, Fields]]:
+    """Return steps with their fields, each from scratch or with what earlier ones lock in."""
+    each = told("steps", steps, options.tell)
+    if options.staged is None:
+        return ((step, step_fields(engine, step)) for step in each)
+    if options.engine != "compliance":
+        raise SceneError(
+            f"--engine {options.engine}: --staged goes with exactly rigid bricks alone; "
+            "give --engine compliance"
+        )
+    return zip(each, staged_fields(engine.network, steps, options.staged), strict=True)
+
+
+def _timely(
+    answers: Iterator[tuple[Step, Fields]], seconds: float
+) -> Iterator[tuple[Step, Fields]]:
+    """Yield the answers that come in time, from the first one that is asked for."""
+    end = time.perf_counter() + seconds
+    while True:
+        try:
+            with ending(end - time.perf_counter()):
+                answer = next(answers, None)
+        except TimeoutError:
+            return
+        if answer is None:
+            return
+        yield answer

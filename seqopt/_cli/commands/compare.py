@@ -1,0 +1,323 @@
+"""The command ``compare``: all ways to build a scene, side by side, in at most 80 columns."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from seqopt._cli.answer import Answer
+from seqopt._cli.asked import (
+    asked_engine,
+    asked_scene,
+    exceeded,
+    level_notes,
+    scene_facts,
+    strictly,
+)
+from seqopt._cli.options import (
+    criterion_options,
+    declare,
+    engine_options,
+    form_options,
+    robots_option,
+    scene_options,
+)
+from seqopt._cli.outputs import comparison_files, figure_notes, require_out, write_outputs
+from seqopt._cli.terminal import wrapped
+from seqopt._cli.values import asked_criterion, parse_robots
+from seqopt.engines.registry import provenance
+from seqopt.network.build import build_network
+from seqopt.plan.calling.formulation import FormulationKind, formulations
+from seqopt.problem.criteria import RankSum
+from seqopt.problem.requirements import Criterion
+from seqopt.report._pages import PAGE, comparison_page
+from seqopt.report.comparison import CLOSED, Comparison, compare
+from seqopt.report.text import format_details
+from seqopt.responses.table import builds_in_words
+from seqopt.scene.scene import Scene
+from seqopt.sequence.rules import FREE
+from seqopt.study.published import PUBLISHED
+
+DESCRIPTION = (
+    "Build a scene in every way that seqopt knows, on paper: the fixed sequences, a loop of robots "
+    "whose grips each formulation chooses, and the free schedule. Show the largest forces, moments "
+    "and displacements side by side; for the arch of Bruun et al. beside the figures that they "
+    "print, with a list of the inconsistencies in print."
+)
+USAGE = ("[SCENE] [--out DIR] [--details] [other options]",)
+EXAMPLES = (
+    "seqopt compare",
+    "seqopt compare wall:columns=6,courses=4 --out wall",
+    "seqopt compare arch25 --criteria worst-ratio --json",
+)
+WRITTEN = {
+    "--out DIR": "write tables, figures and a page with all builds",
+    "--details": "also show the largest force of each robot, every formulation under both "
+    "objectives of ranks, and where the grips of the published plan rank",
+}
+NAME = 21  # columns of a name
+RESPONSES = {
+    "F_rob": ("grip", "force, N", 15),
+    "M_sup": ("support", "moment, N m", 14),
+    "T_max": ("", "tension, N", 14),
+    "D_max": ("displacement,", "0.001 mm", 14),
+}  # above each column of responses, and how wide it is
+OF_PAPER = "In the paper: "  # with which notes about it begin
+MODIFIED = "modified-sequential"
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``compare``."""
+    basic = command.add_argument_group("what is compared")
+    scene_options(basic)
+    robots_option(basic, "all methods, each of which takes as many as it needs")
+    declare(basic, WRITTEN)
+    criterion_options(command)
+    engine_options(command)
+    form_options(command, strict=True)
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Compare all ways to build a scene."""
+    scene = asked_scene(options)
+    engine = asked_engine(options, build_network(scene))
+    criterion = asked_criterion(options)
+    require_out(options)
+    result = compare(engine, criterion, options.tell, parse_robots(options.robots))
+    about = {"scene": scene.name, "criteria": _criteria(result), **provenance(engine)}
+    text, headings = _tell(result, scene, criterion)
+    blocks = [text]
+    if options.details:
+        blocks.append(format_details(result, scene))
+    written: tuple[Path, ...] = ()
+    if options.out is not None:
+        options.tell("drawing figures")
+        files = comparison_files(result) | {"summary.json": json.dumps(about, indent=2) + "\n"}
+        page = {PAGE: comparison_page(engine, result)}
+        written = write_outputs(options, lambda: files | page)
+        blocks.append(_where(options.out))
+    else:
+        more = "" if options.details else "; --details shows more here"
+        blocks.append(wrapped(f"--out DIR writes tables, figures and a step viewer{more}."))
+    answer = Answer(
+        facts={**about, "scene": scene_facts(scene), "criterion": criterion.name, **_facts(result)},
+        text="\n\n".join(blocks),
+        headings=headings,
+        written=written,
+        notes=(*level_notes(engine), *(figure_notes() if written else ())),
+    )
+    over = exceeded(scene, *result.tables.values())
+    return strictly(answer, options, over, builds_in_words(result.departures))
+
+
+def _where(folder: Path) -> str:
+    """Return which file of a folder is for what."""
+    return (
+        f"written to {folder}\n"
+        f"  {PAGE}: every build step by step; open it in a browser\n"
+        "  comparison.csv: a row per way to build; steps_NAME.csv: a row per step of each\n"
+        "  summary.json: the criteria with their numbers, the engine, and versions of packages"
+    ) + ("" if figure_notes() else "\n  *.png, *.svg: the figures")
+
+
+def _criteria(result: Comparison) -> dict[str, object]:
+    """Return the criteria of the rows that have an objective, with all of their numbers."""
+    return {
+        problem: {"criterion": criterion.name, **criterion.settings}
+        for problem, criterion in result.criteria.items()
+    }
+
+
+def _facts(result: Comparison) -> dict[str, object]:
+    """Return rows, notes and what the paper prints, for scripts."""
+    table = result.table.assign(
+        steps=[len(result.tables[name]) for name in result.table.index],
+        paper=pd.Series({name: _printed_largest(result, name) for name in result.table.index}),
+    )
+    loop = result.loop
+    return {
+        "rows": table.rename_axis("name").reset_index(),
+        "largest_by_robot": result.maxima.to_dict(),
+        "paper_by_robot": None if result.printed is None else _paper(result),
+        "loop": None
+        if loop is None
+        else {
+            "method": loop.method,
+            "seconds": dict(loop.seconds),
+            "models_paper_count": loop.paper_models,
+            "published_ranks": loop.ranks,
+        },
+        "why_no_loop": result.refusal or None,
+        "findings": list(result.notes),
+    }
+
+
+def _paper(result: Comparison) -> dict[str, object]:
+    """Return the largest responses that the paper prints, by method and quantity."""
+    assert result.printed is not None  # asked for
+    table = result.printed.set_axis(result.maxima.columns, axis=1)
+    return {str(name): column.to_dict() for name, column in table.items()}
+
+
+def _tell(
+    comparison: Comparison, scene: Scene, criterion: Criterion
+) -> tuple[str, tuple[str, ...]]:
+    """Return what a comparison found, its columns explained and its notes in order; headings."""
+    blocks = [
+        [f"{scene.name}: {len(scene.bricks)} bricks, {len(scene.robots)} robots"],
+        ["Largest response of any step", *_responses(comparison), "", _about(comparison)],
+    ]
+    if comparison.loop is None:
+        blocks.append([wrapped(f"Loop of robots: not possible here; {comparison.refusal}")])
+    if comparison.table["objective"].notna().any():
+        about = _about_choices(comparison, criterion)
+        blocks.append(["How the grips were chosen", *_choices(comparison), "", about])
+    blocks += _notes(comparison)
+    return "\n\n".join("\n".join(block) for block in blocks), tuple(b[0] for b in blocks)
+
+
+def _responses(comparison: Comparison) -> Iterator[str]:
+    """Yield the table of the largest responses; rows with the same figures are one."""
+    for line in (0, 1):
+        cells = (f"{names[line]:>{names[2]}}" for names in RESPONSES.values())
+        yield f"{'':{NAME}}{''.join(cells)}".rstrip()
+    for problem, rows in comparison.table.groupby("problem", sort=False):
+        yield _title_of(str(problem))
+        figures = rows[[*RESPONSES]].round(3).apply(tuple, axis=1)
+        ranked = figures[sorted(figures.index, key=_plainness)]
+        shown = {*ranked.index[~ranked.duplicated()]}
+        for name in (name for name in figures.index if name in shown):
+            more = int((figures == figures[name]).sum()) - 1
+            label = f"  {name}{f' +{more}' if more else ''}"
+            row = "".join(_cells(comparison, str(name), rows.loc[name]))
+            yield f"{label:{NAME}}{row}".rstrip()
+
+
+def _plainness(name: str) -> tuple[bool, bool, str]:
+    """Return what sorts names: rows with the same figures go by the first of them."""
+    found = formulations().get(name)
+    if found is None:
+        return False, False, name
+    return found.kind is not FormulationKind.EXACT, found.takes_budgets, name
+
+
+def _cells(comparison: Comparison, name: str, row: pd.Series[float]) -> Iterator[str]:
+    """Yield the largest responses of a row, each with what the paper prints."""
+    paper = _printed_largest(comparison, name)
+    for response, (_, _, width) in RESPONSES.items():
+        value = float(row[response])
+        said = f"{value:.1f}" if abs(value) < 1e6 else f"{value:.0e}"
+        said += f" ({paper[response]:.1f})" if response in paper else ""
+        if response == "F_rob":
+            said += "!" if row["overloaded"] else " "
+        yield f"{said + ('?' if response == 'D_max' and row['outside'] else ''):>{width}}"
+
+
+def _printed_largest(comparison: Comparison, name: str) -> dict[str, float]:
+    """Return the largest responses of a method as the paper prints them, in its units, if any."""
+    if comparison.printed is None or name not in comparison.maxima:
+        return {}
+    column = list(comparison.maxima).index(name)  # printed ones have names of their own
+    quantity = [str(text).partition(" [")[0] for text in comparison.maxima.index]
+    values = dict(zip(quantity, comparison.printed.to_numpy(float)[:, column], strict=True))
+    forces = [value for key, value in values.items() if key not in RESPONSES]
+    found = {key: value for key, value in values.items() if key in RESPONSES}
+    return {"F_rob": float(np.nanmax(forces)), **found}
+
+
+def _about(comparison: Comparison) -> str:
+    said = (
+        "Grip force: of any robot. Support moment: at any ground end. Tension: in any edge of "
+        "the network of bricks and joints. Displacement: of any node."
+    )
+    if comparison.table["overloaded"].astype(bool).any():
+        said += " !: a robot holds more than its payload."
+    if comparison.departures:
+        said += " ?: outside the linear range, not reliable."
+    if comparison.printed is not None:
+        said += " In brackets: what Bruun et al. print."
+    if " +" in "".join(_responses(comparison)):
+        said += " +1, +2 …: so many other formulations reach the same figures."
+    return wrapped(said)
+
+
+def _choices(comparison: Comparison) -> Iterator[str]:
+    """Yield the table of objectives and of what choosing took."""
+    kinds = {name: found.kind.value for name, found in formulations().items()}
+    kinds |= {MODIFIED: kinds.get("cascade", ""), FREE: "exact"}
+    yield f"{'':{NAME}}{'objective':>10}{'gap':>9}{'steps':>7}{'models':>9}{'seconds':>9}  kind"
+    chosen = comparison.table[comparison.table["objective"].notna()]
+    for problem, rows in chosen.groupby("problem", sort=False):
+        yield _title_of(str(problem))
+        for name, row in rows.iterrows():
+            steps = len(comparison.tables[str(name)])
+            yield (
+                f"{f'  {name}':{NAME}}{row['objective']:10.2f}{100 * row['gap']:7.2f} %{steps:7}"
+                + _known(row["models"], 9, ".0f")
+                + _known(row["seconds"], 9, ".3f")
+                + f"  {kinds.get(str(name), 'in print')}"
+            )
+
+
+def _known(value: float, width: int, form: str) -> str:
+    return f"{format(value, form) if np.isfinite(value) else '-':>{width}}"
+
+
+def _about_choices(comparison: Comparison, criterion: Criterion) -> str:
+    said = (
+        f"Objective: what the criterion {criterion.name} adds up to over all steps; "
+        f"{_of_steps(comparison, criterion)}. Only rows under one heading, and of one aim, "
+        "compete. Gap: how far the objective is above the proven optimum of that aim. Models: "
+        f"how many partial structures with different grips it looks at{_counted(comparison)}. "
+        "Seconds: to choose and to check"
+    )
+    if comparison.loop is not None:
+        seconds = comparison.loop.seconds
+        said += (
+            f"; the responses of all choices, which all rows of the loop share, took "
+            f"{seconds['respond']:.2f} s more and their ranks {seconds['rank']:.2f} s"
+        )
+    return wrapped(said + ".")
+
+
+def _of_steps(comparison: Comparison, criterion: Criterion) -> str:
+    """Return what the objective is of aims that are about the worst step, in words."""
+    if not isinstance(criterion, RankSum):
+        return "of minimax and the free schedule its largest step"
+    known = "the fixed sequences" + (" and the published plan" * (PUBLISHED in comparison.tables))
+    return (
+        "of minimax its largest step, of the free schedule, which has no ranks, its worst response "
+        f"over the least that {known} reach"
+    )
+
+
+def _counted(comparison: Comparison) -> str:
+    """Return how many models the paper counts, in words; nothing where it counts none."""
+    if comparison.loop is None or comparison.loop.paper_models is None:
+        return ""
+    cascading, overlap = comparison.loop.paper_models
+    return f" (the paper counts {cascading:,} for its cascade and {overlap:,} with full overlap)"
+
+
+def _notes(comparison: Comparison) -> Iterator[list[str]]:
+    """Yield notes about the builds, then about the paper, each list under a heading."""
+    for heading, of_paper in (("Notes", False), ("Inconsistencies in the paper", True)):
+        found = [text for text in comparison.notes if text.startswith(OF_PAPER) == of_paper]
+        if found:
+            lines = [wrapped(text.removeprefix(OF_PAPER), first="- ") for text in found]
+            yield [heading, *lines]
+
+
+def _title_of(problem: str) -> str:
+    """Return what a problem is called above its rows."""
+    titles = {
+        CLOSED: "fixed sequences, nothing to choose",
+        MODIFIED: "modified sequential method, some grips chosen",
+        FREE: "free schedule: any robot may place, hold or release next",
+    }
+    return titles.get(problem, f"{problem} loop, grips chosen by a formulation")

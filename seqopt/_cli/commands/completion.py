@@ -1,0 +1,117 @@
+"""The command ``completion``: what a shell needs to complete words of seqopt.
+
+The script is written once, by shtab, and holds all names: completing a word takes no time, where a
+program that is asked at every key would take as long as it takes to start.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Iterable, Iterator
+from hashlib import sha256
+from typing import Any
+
+import shtab
+
+from seqopt._cli.answer import Answer
+from seqopt._cli.arguments import COMMANDS, parser
+from seqopt._cli.values import RULES
+from seqopt.plan.calling.formulation import formulation_names
+from seqopt.responses._choices import CHOICE_RESPONSES
+from seqopt.scene.scene import ORDERS
+from seqopt.scene.scene_file import KINDS, builtin_scenes
+from seqopt.sequence.rules import FREE
+from seqopt.sequence.three_robots import SCHEDULES
+from seqopt.sequence.two_robots import METHODS
+from seqopt.study.published import CRITERIA, PUBLISHED
+
+SHELLS = ("bash", "zsh", "fish")
+DESCRIPTION = (
+    "Print a script with which the shell completes commands, options, files, and the names of "
+    "scenes, formulations, criteria, engines, schedules and aims. Print it again once a "
+    "formulation of your own is installed."
+)
+EXAMPLES = (
+    'eval "$(seqopt completion bash)"      in ~/.bashrc, or for this shell alone',
+    'eval "$(seqopt completion zsh)"       in ~/.zshrc, after compinit',
+    "seqopt completion fish > ~/.config/fish/completions/seqopt.fish",
+)
+AIMS = ("minmax", "sum", "steps", "regrips", "travel", "bond", "friction", "tilt")
+SHORT = re.compile(r"[:;(]|, (?:as|if|or) ")  # where what matters of a help text ends
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``completion``."""
+    command.add_argument("shell", choices=SHELLS, help="for which shell")
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Return the script with which a shell completes words of seqopt."""
+    script = shtab.complete(_completed(parser()), options.shell)
+    return Answer(facts={"shell": options.shell, "script": script}, data=script + "\n")
+
+
+def _completed(whole: argparse.ArgumentParser) -> argparse.ArgumentParser:
+    """Return the parser of all commands, changed: its arguments know what may follow them."""
+    known = {name: words(names) for name, names in _names().items()}
+    known |= {
+        "scene": words([*builtin_scenes(), *(f"{kind}:" for kind in KINDS)], files=True),
+        "schedule": words([*SCHEDULES, FREE], files=True),
+    }
+    paths: dict[Any, object] = dict.fromkeys(("DIR", "PLAN_DIR"), shtab.DIRECTORY)
+    paths["FILE"] = shtab.FILE
+    for command in _commands(whole):
+        command.description = COMMANDS[command.prog.split()[-1]].about
+        for action in command._actions:
+            if found := known.get(action.dest, paths.get(action.metavar)):
+                action.complete = found  # type: ignore[attr-defined]
+            if action.help and action.help != argparse.SUPPRESS:
+                action.help = SHORT.split(action.help)[0]
+    return whole
+
+
+def _commands(whole: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    """Yield the parsers of all commands."""
+    for action in whole._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            yield from action.choices.values()
+
+
+def _names() -> dict[str, list[str]]:
+    """Return the names that an argument takes, by its place among the options."""
+    responses = [*CHOICE_RESPONSES]
+    return {
+        "formulation": [*formulation_names()],
+        "criteria": [*CRITERIA, *responses],
+        "aim": [*AIMS, *responses],
+        "pick": [*responses, "steps", "regrips"],
+        "limit": ["payload", *responses],
+        "order": [*ORDERS, "search"],
+        "stands": ["dry", "epoxy", "bond="],
+        "under": [*METHODS, PUBLISHED],
+        "robust": ["worst-peak", "worst-total", "cvar="],
+        "vary": ["stiffness=", "density=", "position="],
+        "budget": ["travel=", "steps_over:", "robot_use:"],
+        "candidates": ["near:", "within:"],
+        "rule": [f"{name}=" for name in RULES],
+    }
+
+
+def words(names: Iterable[str], *, files: bool = False) -> dict[str, object]:
+    """Return how each shell completes one of some words, or the path of a file too, for shtab."""
+    listed = " ".join(names)
+    name = f"_seqopt_{sha256(listed.encode()).hexdigest()[:8]}"
+    more = '; compgen -f -- "$1"' if files else ""
+    also = " 'files:file:_files'" if files else ""
+    path = "; __fish_complete_path (commandline -ct)" if files else ""
+    zsh = listed.replace(":", "\\:")
+    return {
+        "bash": name,
+        "zsh": name,
+        "fish": f"(printf '%s\\n' {listed}{path})",
+        "preamble": {
+            "bash": f'{name}() {{ compgen -W "{listed}" -- "$1"{more}; }}',
+            "zsh": f"{name}() {{ _alternative 'names:name:({zsh})'{also} }}",
+        },
+    }

@@ -1,0 +1,46 @@
+"""The command ``export``: a plan in a format of others."""
+
+from __future__ import annotations
+
+import argparse
+
+from seqopt._cli.answer import Answer
+from seqopt._cli.asked import scene_facts
+from seqopt._cli.options import declare, form_options
+from seqopt._files import require_apart, write_text
+from seqopt.sequence.exports.formats import EXPORTS, export_plan, read_folder
+
+DESCRIPTION = (
+    "Write the plan of a folder, as seqopt optimize --out makes it, in a format of others: which "
+    "block is absent, placed or held in which step."
+)
+EXAMPLES = ("seqopt export best --format csv --out blocks.csv",)
+
+
+SOURCE = {
+    "--source FILE": "with a format of COMPAS: the file that was imported, to name its elements or "
+    "to write the plan into"
+}
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``export``."""
+    basic = command.add_argument_group("what is written")
+    declare(basic, {"folder PLAN_DIR": "folder of a plan"})
+    basic.add_argument("--format", choices=tuple(EXPORTS), required=True, help="what to write")
+    declare(basic, {"--out FILE": "file to write"}, required=True)
+    declare(basic, SOURCE)
+    form_options(command)
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Write the plan of a folder in a format of others."""
+    inputs = [options.folder / name for name in ("scene.json", "plan.csv")]
+    require_apart([options.out], [*inputs, *filter(None, [options.source])])
+    scene, steps = read_folder(options.folder)
+    write_text(options.out, export_plan(scene, steps, options.format, options.source))
+    return Answer(
+        facts={"scene": scene_facts(scene), "steps": len(steps), "format": options.format},
+        text=f"{len(steps)} steps written to {options.out}",
+        written=(options.out,),
+    )

@@ -1,0 +1,265 @@
+"""The command ``optimize``: choose every open grip of a build, or every step."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from seqopt._cli.answer import Answer, Status
+from seqopt._cli.asked import exceeded, idle_notes, level_notes, scene_facts, strictly
+from seqopt._cli.options import (
+    LIMIT,
+    RULE,
+    STANDING,
+    criterion_options,
+    declare,
+    engine_options,
+    form_options,
+    robots_option,
+    scene_options,
+)
+from seqopt._cli.outputs import plan_files, write_outputs, written_to
+from seqopt._cli.posing import Asked, asked_problem
+from seqopt._cli.terminal import wrapped
+from seqopt._cli.values import parse_options, parse_size, parse_time_limit
+from seqopt.errors import ProblemError
+from seqopt.graph.states.states import States
+from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation, formulation_names
+from seqopt.plan.out_of_sample import Trial, judge_unseen, worst_values
+from seqopt.plan.plan import Plan
+from seqopt.plan.solving import solve, usual
+from seqopt.problem.problem import Problem
+from seqopt.problem.requirements import OWN
+from seqopt.sequence.rules import FREE
+from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.three_robots import SCHEDULES
+from seqopt.study.published import paper_models
+from seqopt.work.progress import within
+
+DESCRIPTION = (
+    "Choose where robots hold, over all steps of a sequence, by one formulation; or, with "
+    "--schedule free, choose every step. The answer is checked from the problem's own data, and "
+    "plan, selection, responses, summary and a page for the browser are written."
+)
+USAGE = (
+    "[SCENE] [--formulation NAME] [--out DIR] [other options]",
+    "[SCENE] --schedule free [--out DIR] [other options]",
+    "[SCENE] --robust AIM [--out DIR] [other options]",
+)
+EXAMPLES = (
+    "seqopt optimize arch25 --out best",
+    "seqopt optimize arch25 --schedule free --out free",
+    "seqopt optimize wall:columns=6,courses=4 --schedule free --out wall",
+    "seqopt optimize my.json --formulation minimax --limit payload --out mine",
+    "seqopt optimize arch25 --robust worst-peak --out robust",
+)
+INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
+BUDGET = {
+    "--budget BUDGET ...": "cap on a total over the build, with the formulations labels, "
+    "lagrangian, overlap_mip and overlap_lp: travel=0.8 (of what the optimum without budgets "
+    "travels), travel=3.5m, steps_over:F_largest=250:10 (at most 10 open steps over 250 N), "
+    "robot_use:rob1=100:5 (at most 5 in which rob1 carries over 100 N); with --aim or --schedule "
+    "free: steps=N, regrips=N, travel=METERS or sum(RESPONSE)=VALUE"
+}
+AIM = {
+    "--aim NAME,NAME": "what is to be as small as possible, the most important first: minmax (the "
+    "worst step by the criterion, by default worst-ratio), sum, steps, regrips, travel, bond, "
+    "friction, tilt, a response, or sum(RESPONSE) (free: by default minmax; other schedules: by "
+    "default the total of what their moves cost); with --order search, the best order of the "
+    "bricks is found too"
+}
+SEARCH = {
+    "--option NAME=VALUE ...": "option of the formulation, as horizon=2 or width=10",
+    "--no-proof": "with cascade or rank_search: compute only the responses that the search meets, "
+    "about a fifth; how far the choice is from the optimum stays unknown",
+    "--lazy": "with an exact formulation: compute only the responses that the proof needs; stopped "
+    "before it is done, it leaves its best choice and a bound; with --aim or --schedule free it is "
+    "done at any rate",
+    "--candidates RULE": "look at fewer nodes per move: near:12 for those at most 12 joints from "
+    "the newest bricks, within:1.5 for those at most 1.5 m from them; makes any formulation a "
+    "heuristic (free: of grips on bricks that stand; what is proven holds among these)",
+}
+ROBUST = {
+    "--robust AIM": "what is to be as small as possible over all scenarios, in place of "
+    "--formulation: worst-peak (the largest cost of any step), worst-total (the largest total), or "
+    "cvar=0.9 (the mean total of the worst tenth)",
+    "--scenarios N": "how many samples of the scene (default: 30)",
+    "--unseen N": "how many other samples, of the next seed, judge the plan (default: as many)",
+    "--seed N": "which samples are drawn (default: 0)",
+    "--vary NAME=VALUE ...": "how far samples are from the scene: stiffness=3 (of each joint, by a "
+    "factor up to it, up or down), density=0.1 (of each brick, up to this share), position=0.002 "
+    "(of each brick and joint, up to so many m); these are the defaults",
+}
+TIME = {
+    "--time-limit SECONDS": "stop choosing after it, with the best choice so far and a bound; with "
+    "--no-proof, where choosing and computing are one, with the moves that were chosen by then"
+}
+WORKERS = {
+    "--workers N": "processes to share the work among; pays from about ten seconds (default: "
+    "%(default)s)"
+}
+MEMORY = {
+    "--cache DIR": "keep answers there and use what is there: a run that was ended goes on",
+    "--max-memory SIZE": "what responses and costs may take, as 500MB or 2GB (default: four fifths "
+    "of what is free); of a free schedule states and moves, with a bound where it ends",
+}
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``optimize``, those of a first use before those of an expert."""
+    _basic(command)
+    declare(command.add_argument_group("what is allowed"), LIMIT | BUDGET)
+    form_options(command, strict=True)
+    states = "what plans are compared by, state after state, with any schedule"
+    declare(command.add_argument_group(states), AIM | STANDING)
+    declare(command.add_argument_group("with --schedule free"), RULE)
+    criterion_options(command)
+    engine_options(command)
+    declare(command.add_argument_group("how far the search goes (advanced)"), SEARCH)
+    scenarios = "a plan that is good in many scenarios (advanced)"
+    declare(command.add_argument_group(scenarios), ROBUST)
+    means = command.add_argument_group("time and memory (advanced)")
+    declare(means, TIME)
+    declare(means, WORKERS, default="1")
+    declare(means, MEMORY)
+
+
+def _basic(command: argparse.ArgumentParser) -> None:
+    takes = command.add_argument_group("what is built, and how grips are chosen")
+    about = {
+        "--formulation NAME": "which mathematical program chooses: "
+        f"{', '.join(formulation_names())} (default: overlap_dp, which is exact and the fastest, "
+        "labels with --budget, minimax with --robust worst-peak, scenario_search with other aims "
+        "over scenarios; schedule_search with --aim, --stands or --schedule free, order_search "
+        "with --order search)",
+        "--schedule NAME|FILE": f"which sequence has the open grips: {', '.join(SCHEDULES)} (of "
+        "all robots), a CSV file of steps in which open grips are marked ?, or "
+        f"{FREE}: any robot may release, hold or place next (default: the loop of three robots, or "
+        "of two where there is no third)",
+    }
+    scene_options(takes)
+    declare(takes, about)
+    robots_option(takes, "a loop, or a schedule that is named")
+    declare(takes, {"--out DIR": "folder to write plan, tables, summary and page to"})
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A plan, what was asked, and how the plan does in scenarios that it was not chosen by."""
+
+    asked: Asked
+    plan: Plan
+    assemble: float
+
+    @cached_property
+    def trial(self) -> Trial | None:
+        """Beside other plans, where candidates were chosen over scenarios."""
+        if self.asked.unseen is None or isinstance(self.plan.graph, States):
+            return None
+        return judge_unseen(self.plan, self.asked.unseen)
+
+    @cached_property
+    def report(self) -> dict[str, object]:
+        """The summary, and what the command adds to it."""
+        out = self.plan.summary() | {
+            "seconds": {"assemble": self.assemble, **self.plan.seconds},
+            "models_paper_count": _paper_count(self.plan),
+        }
+        known, unseen = self.asked.known, self.asked.unseen
+        if known is None or unseen is None:
+            return out
+        out |= {"robust": str(self.asked.aim), "scenarios": known.settings}
+        if self.trial is None:
+            worst = worst_values(self.plan, unseen)
+            return out | {"unseen": {**unseen.settings, "worst": worst}}
+        return out | {"unseen": unseen.settings, "worth": self.trial.summary()}
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Choose every open grip of a build, or every step, and write the plan."""
+    limit = parse_time_limit(options.time_limit)
+    start = time.perf_counter()
+    asked = asked_problem(options)
+    formulation = as_formulation(options.formulation or usual(asked.problem))
+    how = _how(options, formulation)
+    assemble = time.perf_counter() - start
+    tell = options.tell if formulation.on is On.STATES else within(options.tell, limit)
+    plan = solve(asked.problem, formulation, time_limit=limit, progress=tell, **how)
+    found = _Found(asked, plan, assemble)
+    written = write_outputs(options, lambda: plan_files(plan, found.report, found.trial))
+    return _answer(options, found, written)
+
+
+def _how(options: argparse.Namespace, formulation: Formulation) -> dict[str, Any]:
+    """Return how a formulation is to be run, its own options among it."""
+    how: dict[str, Any] = parse_options(formulation, options.option)
+    if options.max_memory is not None and formulation.on is On.ORDERS:
+        raise ProblemError(
+            "--max-memory: the search of orders has none; leave it out, or give --option most=N"
+        )
+    if options.max_memory is not None and "max_memory" in formulation.options:
+        how["max_memory"] = parse_size(options.max_memory)
+    return {"proof": not options.no_proof, "lazy": options.lazy, **how}
+
+
+def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]) -> Answer:
+    """Return what a plan is worth, once it is written."""
+    plan = found.plan
+    table, scene = plan.responses(), plan.engine.network.scene
+    stopped = plan.ended is End.INTERRUPTED
+    over = () if stopped else exceeded(scene, table)
+    lines = [f"{_said(found)}; {written_to(options.out)}"]
+    facts: dict[str, object] = {"scene": scene_facts(scene), "summary": found.report}
+    if plan.order is not None:
+        order = plan.order.selection.order
+        facts["order"] = order
+        lines.append(wrapped(", ".join(map(str, order)), first="order: "))
+    answer = Answer(
+        facts={**facts, "plan": table},
+        text="\n".join([*lines, *(f"payload exceeded: {excess}" for excess in over)]),
+        written=written,
+        notes=(*_posed_notes(found.asked.problem), *idle_notes(scene, plan.steps)),
+        failures=(INTERRUPTED,) if stopped else (),
+        status=Status.INTERRUPTED if stopped else Status.DONE,
+    )
+    return strictly(answer, options, over, plan.departures)
+
+
+def _said(found: _Found) -> str:
+    """Return what a plan is worth, in a line."""
+    plan = found.plan
+    how = f"{plan.formulation.name} ({plan.formulation.kind.value})"
+    if plan.order is not None:
+        values = ", ".join(f"{name} {value:.6g}" for name, value in plan.objective.items())
+        bound = plan.order.bound_said
+        return f"{how}: {values}, {plan.status}, {bound}; {len(plan.steps)} steps"
+    if found.trial is not None:
+        unseen = found.trial.summary()["unseen"]
+        return (
+            f"{how}: {plan.worth} over {len(found.trial.known)} scenarios ({plan.title}); over "
+            f"unseen ones {unseen['robust']:.6g}, the nominal plan {unseen['nominal']:.6g}"
+        )
+    counts = f"{plan.models} models"
+    if isinstance(plan.graph, States):
+        counts = f"{len(plan.steps)} steps, {plan.regrips} regrips, {counts}"
+        return f"{how}: {plan.worth}; {counts}"
+    return f"{how}: {plan.worth}, {counts}"
+
+
+def _posed_notes(problem: Problem) -> tuple[str, ...]:
+    """Return which levels the engine took, and whether scales are not those of fixed methods."""
+    said, name = level_notes(problem.engine), problem.criterion.name
+    if not name.endswith(OWN):
+        return said
+    return (*said, f"criterion: {name}: no fixed method builds this scene to take scales from")
+
+
+def _paper_count(plan: Plan) -> dict[str, int] | None:
+    """Return how many models the paper counts for the loop of three robots; none for others."""
+    if plan.method != "three-robot" or isinstance(plan.graph, States):
+        return None
+    schedule: Schedule = plan.layers.schedule
+    return dict(zip(("cascading", "overlap"), paper_models(schedule), strict=True))

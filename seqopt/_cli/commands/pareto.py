@@ -1,0 +1,190 @@
+"""The command ``pareto``: all plans that no other one beats in every aim at once."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Mapping, Sequence
+
+import pandas as pd
+
+from seqopt._cli.answer import Answer
+from seqopt._cli.asked import level_notes, marked, scene_facts
+from seqopt._cli.options import (
+    LIMIT,
+    RULE,
+    STANDING,
+    declare,
+    engine_options,
+    form_options,
+    scene_options,
+)
+from seqopt._cli.outputs import figure_notes, write_outputs, written_to
+from seqopt._cli.posing import asked_problem
+from seqopt._cli.values import parse_numbers
+from seqopt._files import csv_text, require_folder
+from seqopt.engines.registry import provenance
+from seqopt.errors import ProblemError, did_you_mean
+from seqopt.graph.states.states import States
+from seqopt.plan.front import Front, find_front, pick
+from seqopt.plan.solving import states_of
+from seqopt.problem.problem import judged_by
+from seqopt.report._pages import PAGE, front_page
+from seqopt.report.comparison import fixed_methods, shown_table, worst_of
+from seqopt.responses.table import LinearRange, analyze, builds_in_words
+from seqopt.scene.scene_file import dump_scene
+from seqopt.sequence.rules import FREE
+from seqopt.sequence.steps import Step
+from seqopt.sequence.three_robots import SCHEDULES
+from seqopt.work.progress import told, within
+
+FOUR = "F_largest,M_sup,T_max,D_max"
+DESCRIPTION = (
+    "Find every plan of the free schedule, or of a sequence with open grips, that no other plan "
+    "beats in all aims at once (the Pareto set); check each, and write a table, the plans, a chart "
+    "and a page for the browser."
+)
+USAGE = ("[SCENE] --out DIR [--aim NAME,NAME] [other options]",)
+EXAMPLES = (
+    "seqopt pareto arch25 --out front",
+    "seqopt pareto arch25 --pick D_max --under F_largest=250 --out front",
+    "seqopt pareto arch25 --aim D_max,steps --seconds 60 --out front",
+)
+AIM = {
+    "--aim NAME,NAME": "what is to be small: responses and, of the free schedule, steps and "
+    "regrips (default: %(default)s)"
+}
+SCHEDULE = {
+    "--schedule NAME|FILE": f"{FREE} (default): any robot may place, hold or release next; or a "
+    f"sequence with open grips: {', '.join(SCHEDULES)}, or a CSV file"
+}
+ROBOTS = {"--robots N|NAME,NAME": "how many robots (further ones are mobile), or which take part"}
+CHOICE = {
+    "--pick NAME": "also write the plan with the least of a column of the table",
+    "--round NAME=STEP ...": "round a number up to multiples of a step (SI units)",
+    "--under BOUND ...": "for --pick: only plans below it: NAME=VALUE (SI units), or a method that "
+    "is to be beaten in everything: sequential, cantilever, published",
+}
+SECONDS = {"--seconds S": "end the search after so long"}
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``pareto``."""
+    basic = command.add_argument_group("what is built, and what is to be small")
+    scene_options(basic)
+    declare(basic, AIM, default=FOUR)
+    declare(basic, SCHEDULE, default=FREE)
+    declare(basic, ROBOTS, default="")
+    declare(basic, LIMIT)
+    declare(basic, {"--out DIR": "folder to write"}, required=True)
+    choice = command.add_argument_group("which plan is picked, and when the search ends")
+    declare(choice, CHOICE)
+    declare(choice, SECONDS, default="inf", type=float)
+    form_options(command)
+    declare(command.add_argument_group("with --schedule free"), RULE | STANDING)
+    engine_options(command)
+    command.set_defaults(criteria=None, crown=None)
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Find all plans that no other beats in every aim, and write them."""
+    require_folder(options.out)
+    asked = asked_problem(options)
+    scene, free = asked.scene, states_of(asked.problem)
+    rounding = parse_numbers("--round", options.round, [str(goal) for goal in free.goals])
+    seconds = float(options.seconds)
+    front = find_front(
+        asked.problem, rounding=rounding, seconds=seconds, progress=within(options.tell, seconds)
+    )
+    methods = fixed_methods(free.engine)
+    files, left = _front_files(front, free, methods, options)
+    said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
+    picked = None
+    if options.pick:
+        chosen = pick(front.table, options.pick, _under(options.under, methods))
+        files["pick.csv"] = csv_text(analyze(free.engine, front.steps[chosen]))
+        values = shown_table(front.table).iloc[chosen]
+        picked = {"point": chosen + 1, **values}
+        row = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
+        said += f"; picked row {chosen + 1}: {row}"
+    write_outputs(options, lambda: files | {"scene.json": dump_scene(scene)})
+    answer = Answer(
+        facts={
+            "scene": scene_facts(scene),
+            "complete": front.complete,
+            "seconds": dict(front.seconds),
+            "points": shown_table(front.table),
+            "picked": picked,
+        },
+        text=f"{said}; {written_to(options.out)}",
+        written=(options.out,),
+        notes=(*level_notes(free.engine), *figure_notes()),
+    )
+    return marked(answer, left)
+
+
+def _front_files(
+    front: Front, free: States, methods: Mapping[str, pd.DataFrame], options: argparse.Namespace
+) -> tuple[dict[str, bytes | str], tuple[str, ...]]:
+    """Return the files of a Pareto set by name, and which points leave the linear range."""
+    engine, tell = free.engine, options.tell
+    known: dict[tuple[Step, ...], pd.DataFrame] = {}
+    plans = []
+    for number, steps in enumerate(told("analyzing plans", front.steps, tell), start=1):
+        table = known.setdefault(steps, analyze(engine, steps))
+        plans.append(table.assign(point=number))
+    tell("drawing and writing the page")
+    within = LinearRange(engine)
+    departures = [within.departures(known[steps]) for steps in front.steps]
+    said = builds_in_words({f"point {k}": each for k, each in enumerate(departures, start=1)})
+    posed = {
+        "scene": engine.network.scene.name,
+        "schedule": str(options.schedule),
+        "aims": [str(goal) for goal in free.goals],
+        **judged_by(free.goals, free.criterion),
+        "limits": {limit.response: limit.bound for limit in free.limits},
+    }
+    summary = {
+        "points": len(front.steps),
+        "complete": front.complete,
+        "seconds": dict(front.seconds),
+        "outside_linear_range": list(said),
+        **posed,
+        **provenance(engine),
+    }
+    numbered = shown_table(front.table)
+    numbered.insert(0, "point", range(1, len(numbered) + 1))
+    if said:
+        numbered["outside_linear_range"] = ["yes" if each else "" for each in departures]
+    tables = [known[steps] for steps in front.steps]
+    return {
+        PAGE: front_page(engine, shown_table(front.table), tables, departures),
+        "pareto.csv": csv_text(numbered),
+        "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
+        **_picture(front, methods),
+        "summary.json": json.dumps(summary, indent=2) + "\n",
+    }, said
+
+
+def _picture(front: Front, methods: Mapping[str, pd.DataFrame]) -> Mapping[str, bytes | str]:
+    """Return the chart of a Pareto set by file name, if it can be drawn."""
+    if figure_notes():
+        return {}
+    from seqopt.report._style import picture_files  # noqa: PLC0415
+    from seqopt.report.charts import front_figure  # noqa: PLC0415  # matplotlib is an extra
+
+    return picture_files("pareto", front_figure(front, methods))
+
+
+def _under(texts: Sequence[str], methods: Mapping[str, pd.DataFrame]) -> dict[str, float]:
+    """Return bounds from words: RESPONSE=VALUE, or the name of a method to beat."""
+    out: dict[str, float] = {}
+    for text in texts:
+        if "=" not in text and text not in methods:
+            known = ", ".join(methods)
+            why = f"no such method{did_you_mean(text, methods)}"
+            raise ProblemError(f"--under {text}: {why}; give {known}, or a bound as F_largest=250")
+        bounds = worst_of(methods[text]) if text in methods else parse_numbers("--under", [text])
+        for name, value in bounds.items():
+            out[name] = min(value, out.get(name, value))
+    return out

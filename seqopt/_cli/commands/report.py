@@ -1,0 +1,70 @@
+"""The command ``report``: a page for the browser that shows plans step by step."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from seqopt._cli.answer import Answer
+from seqopt._cli.asked import asked_engine, asked_scene, scene_facts
+from seqopt._cli.options import declare, engine_options, form_options, scene_options
+from seqopt._cli.outputs import figure_notes, keep_apart
+from seqopt._files import require_folder, write_folder, write_text
+from seqopt.network.build import build_network
+from seqopt.report._pages import PAGE, folder_builds, folder_page
+
+DESCRIPTION = (
+    "Write a page with a step viewer of the plans in a folder: the structure in three dimensions, "
+    "who holds what, axial forces, displacements, and responses along the build. It is one file "
+    "and needs no network. If the folder has a scene.json, that is the scene."
+)
+EXAMPLES = (
+    "seqopt report best",
+    "seqopt report my.json plans --out plans.html",
+    "seqopt report best --figures pictures",
+)
+
+
+SHOWN = {
+    "folder DIR": "folder that holds plans as CSV",
+    "--out FILE": f"page to write (default: {PAGE} in DIR)",
+    "--figures FOLDER": "also write figures there as PNG and SVG: steps, who holds what when, and "
+    "responses along the build (needs matplotlib)",
+}
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``report``."""
+    basic = command.add_argument_group("what is shown")
+    scene_options(basic)
+    declare(basic, SHOWN)
+    engine_options(command)
+    form_options(command)
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Write the page of the plans in a folder."""
+    own = options.folder / "scene.json"
+    if own.is_file():  # plans go with the scene that stands beside them
+        options.scene = str(own)
+    scene = asked_scene(options)
+    path = options.folder / PAGE if options.out is None else options.out
+    keep_apart(options, path)
+    written: tuple[Path, ...] = (path,)
+    if options.figures is not None:
+        require_folder(options.figures)
+        written += () if figure_notes() else (options.figures,)
+    options.tell("analyzing plans and writing the page")
+    engine = asked_engine(options, build_network(scene))
+    write_text(path, folder_page(engine, options.folder))
+    if options.figures in written:
+        from seqopt.report.charts import plan_figures  # noqa: PLC0415  # needs an extra
+
+        options.tell("drawing figures")
+        write_folder(options.figures, plan_figures(engine, folder_builds(engine, options.folder)))
+    return Answer(
+        facts={"scene": scene_facts(scene)},
+        text=f"written to {' and '.join(map(str, written))}",
+        written=written,
+        notes=() if options.figures is None else figure_notes(),
+    )

@@ -1,0 +1,107 @@
+"""The command ``scene``: check, describe and export a scene, or list those that there are."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+
+import numpy as np
+
+from seqopt._cli.answer import Answer
+from seqopt._cli.asked import asked_scene, scene_facts
+from seqopt._cli.options import declare, form_options, scene_options
+from seqopt._cli.outputs import keep_apart
+from seqopt._files import write_text
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, dump_scene, load_scene
+from seqopt.work.progress import told
+
+DESCRIPTION = (
+    "Check a scene, say what is in it, and write it as a JSON file if asked; or list all built-in "
+    "scenes and the words that make others."
+)
+EXAMPLES = (
+    "seqopt scene --list",
+    "seqopt scene arch:span=2,rise=0.8",
+    "seqopt scene arch25 --export my.json",
+)
+
+
+WHAT = {
+    "--list": "name all built-in scenes, and the words that make others",
+    "--export FILE": "JSON file to write",
+}
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``scene``."""
+    basic = command.add_argument_group("which scene")
+    scene_options(basic)
+    declare(basic.add_mutually_exclusive_group(), WHAT)
+    form_options(command)
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Describe a scene and export it, or list all that there are."""
+    if options.list:
+        return _list(options)
+    keep_apart(options, options.export)
+    scene = asked_scene(options)
+    facts = {**scene_facts(scene), **_network_facts(build_network(scene))}
+    lines = [*_described(scene, facts)]
+    if options.export is not None:
+        write_text(options.export, dump_scene(scene))
+        lines.append(f"written to {options.export}")
+    return Answer(
+        facts={"scene": facts},
+        text="\n".join(lines),
+        headings=(lines[0],),
+        written=() if options.export is None else (options.export,),
+    )
+
+
+def _network_facts(network: Network) -> dict[str, object]:
+    """Return how large the network of a scene is, what it weighs, and what its robots can do."""
+    scene = network.scene
+    count = len(scene.bricks)
+    return {
+        "nodes": network.count_nodes(count),
+        "edges": network.count_edges(count),
+        "weight_N": float(np.linalg.norm(network.weight.sum(axis=0))),
+        "payloads_N": {robot.name: robot.payload for robot in scene.robots},
+        "reaches": {robot.name: type(robot.reach).__name__.lower() for robot in scene.robots},
+        "provenance": scene.provenance,
+    }
+
+
+def _list(options: argparse.Namespace) -> Answer:
+    """Return all built-in scenes and kinds of scenes."""
+    found = {
+        name: load_scene(name)
+        for name in told("reading built-in scenes", builtin_scenes(), options.tell)
+    }
+    lines = [f"{name}: {_size(scene)}; {ABOUT[name]}" for name, scene in found.items()]
+    lines += [kind.about for kind in KINDS.values()]
+    facts = {
+        "scenes": [{**scene_facts(scene), "about": ABOUT[name]} for name, scene in found.items()],
+        "kinds": {name: kind.about for name, kind in KINDS.items()},
+    }
+    return Answer(facts=facts, text="\n".join(lines))
+
+
+def _size(scene: Scene) -> str:
+    return f"{len(scene.bricks)} bricks, {len(scene.joints)} joints"
+
+
+def _described(scene: Scene, facts: dict[str, object]) -> Iterator[str]:
+    """Yield what is in a scene, line by line."""
+    yield f"{scene.name}: {_size(scene)}, {len(scene.grounds)} ground ends"
+    yield f"network: {facts['nodes']} nodes, {facts['edges']} edges"
+    for robot in scene.robots:
+        reach = type(robot.reach).__name__.lower()
+        yield f"{robot.name}: payload {robot.payload:g} N, reach {reach}"
+    yield f"weight: {facts['weight_N']:.1f} N"
+    for i, line in enumerate(scene.provenance.splitlines()):
+        yield line if i else f"provenance: {line}"

@@ -1,0 +1,136 @@
+"""What commands write: folders that appear whole, apart from what the command reads."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from collections.abc import Callable, Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from seqopt._files import csv_text, require_apart, require_folder, write_csv, write_folder
+from seqopt.graph.layers.layers import Layers
+from seqopt.graph.states.states import States
+from seqopt.plan.calling.formulation import trace_rows
+from seqopt.plan.out_of_sample import Trial
+from seqopt.plan.plan import Plan
+from seqopt.report._pages import PAGE, plan_page
+from seqopt.report.comparison import Comparison
+from seqopt.scene.scene_file import builtin_scenes, dump_scene
+
+
+def figure_notes() -> tuple[str, ...]:
+    """Return why figures are left out, if they are: what draws them is an extra."""
+    if find_spec("matplotlib") is not None:
+        return ()
+    return ("figures are left out, they need matplotlib: pip install 'seqopt[plot]'",)
+
+
+def comparison_files(result: Comparison) -> dict[str, bytes | str]:
+    """Return the tables of a comparison by file name, and its figures if they can be drawn."""
+    files: dict[str, bytes | str] = {
+        "comparison.csv": result.table.to_csv(float_format="%.6g"),
+        **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
+    }
+    if result.loop is not None and result.loop.ranks is not None:
+        files["published_ranks.csv"] = result.loop.ranks.to_csv(index=False)
+    if figure_notes() or result.loop is None:
+        return files
+    from seqopt.report._style import picture_files  # noqa: PLC0415
+    from seqopt.report.charts import comparison_figures  # noqa: PLC0415  # matplotlib is an extra
+
+    for name, figure in comparison_figures(result).items():
+        files |= picture_files(name, figure)
+    return files
+
+
+def plan_files(
+    plan: Plan, report: Mapping[str, object], trial: Trial | None = None
+) -> dict[str, bytes | str]:
+    """Return the tables of a plan, its summary, scene and page, by file name.
+
+    The trial is of the plan in other scenarios.
+    """
+    table = plan.responses()
+    files: dict[str, bytes | str] = {
+        "plan.csv": csv_text(table),
+        "summary.json": json.dumps(_plain(report), indent=2) + "\n",
+        "scene.json": dump_scene(plan.engine.network.scene),
+    }
+    stands: list[str] = []
+    if not isinstance(plan.graph, States):
+        files["selection.csv"] = csv_text(plan.table())
+    elif plan.graph.standing is not None:
+        verdicts = plan.stability()
+        files["stability.csv"] = csv_text(verdicts)
+        stands = [str(verdict) for verdict in verdicts["verdict"]]
+    if isinstance(plan.graph, Layers):
+        files["responses.csv"] = csv_text(plan.alternatives())
+    if rows := trace_rows(plan.trace):
+        files["trace.csv"] = csv_text(pd.DataFrame(rows))
+    if trial is not None:
+        files["scenarios.csv"] = csv_text(trial.table)
+    files[PAGE] = plan_page(plan.engine, plan.title, table, plan.worth, stands)
+    return files
+
+
+def _plain(value: object) -> object:
+    """Return what JSON can hold: null in the place of numbers that are not finite."""
+    if isinstance(value, Mapping):
+        return {str(name): _plain(part) for name, part in value.items()}
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def put_table(path: Path | None, table: pd.DataFrame, said: str) -> dict[str, Any]:
+    """Write a table, and return what an answer says of it: without a file it is the data."""
+    if path is None:
+        return {"data": csv_text(table)}
+    write_csv(path, table)
+    return {"text": f"{said} written to {path}", "written": (path,)}
+
+
+def written_to(folder: Path | None) -> str:
+    """Return where a folder with a page was written, and what shows it, or how to have one."""
+    if folder is None:
+        return "--out DIR writes the plan, its tables and a page that shows it step by step"
+    return f"written to {folder}; {folder / PAGE} shows it step by step"
+
+
+def write_outputs(
+    options: argparse.Namespace, files: Callable[[], Mapping[str, bytes | str]]
+) -> tuple[Path, ...]:
+    """Write the folder that a command was asked for, whole, if it was asked for one; return it.
+
+    Raises `FileError` if a file would overwrite what the command reads, or cannot be written.
+    """
+    if options.out is None:
+        return ()
+    options.tell("writing the plan")
+    made = files()
+    require_apart([options.out / name for name in made], _inputs(options))
+    write_folder(options.out, made)
+    return (options.out,)
+
+
+def require_out(options: argparse.Namespace) -> None:
+    """Raise `FileError`, before anything is computed, if the folder asked for cannot be made."""
+    if options.out is not None:
+        require_folder(options.out)
+
+
+def keep_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
+    """Raise `FileError` if outputs are one file, or one that the command reads."""
+    require_apart([path for path in outputs if path is not None], _inputs(options))
+
+
+def _inputs(options: argparse.Namespace) -> list[Path]:
+    """Return the files that a command reads."""
+    scene = None if options.scene in builtin_scenes() else options.scene
+    named = (scene, getattr(options, "plan", None), getattr(options, "schedule", None))
+    return [Path(name) for name in named if name is not None]

@@ -1,0 +1,178 @@
+"""The problem that the words of the command line pose, over scenarios too."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass, replace
+from typing import Any
+
+from seqopt._cli.asked import asked_engine, asked_scene
+from seqopt._cli.outputs import require_out
+from seqopt._cli.values import (
+    asked_criterion,
+    asked_resources,
+    asked_standing,
+    count_word,
+    parse_criterion,
+    parse_limits,
+    parse_numbers,
+    parse_robots,
+    parse_rules,
+)
+from seqopt.errors import ProblemError, StepError
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
+from seqopt.plan.calling.formulation import On, find_formulation
+from seqopt.problem.problem import (
+    Orders,
+    Problem,
+    RobustAim,
+    parse_budgets,
+    parse_caps,
+    parse_robust,
+)
+from seqopt.problem.requirements import Criterion
+from seqopt.scene.scenarios import MOST, Scenarios, scenarios
+from seqopt.scene.scene import Scene
+from seqopt.sequence.rules import FREE, FreeRules, with_robots
+from seqopt.sequence.schedule import Schedule, thin
+from seqopt.sequence.schedule_file import find_schedule
+from seqopt.workflow import SEARCH, posed
+
+ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone
+COUNT = 30
+SPREADS = ("stiffness", "density", "position")
+_NOT_FREE = "the free schedule has no such; leave it out"
+_NOT_STATES = "aims and --stands have no such; leave it out"
+_MORE = f"it needs more; give --stands MORTAR, or --schedule {FREE}"
+_WRONG = {
+    "free": {"ranked": _NOT_FREE, "among": _NOT_FREE},
+    "states": {"ranked": _NOT_STATES, "among": _NOT_STATES, "rule": _NOT_STATES},
+    "candidates": {
+        "rule": f"it needs more; give --schedule {FREE}",
+        "tilt": _MORE,
+        "friction": _MORE,
+    },
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """What a command is asked for: the problem, the scenarios, and those that judge the plan."""
+
+    scene: Scene
+    problem: Problem
+    aim: RobustAim | None = None
+    known: Scenarios | None = None
+    unseen: Scenarios | None = None
+
+
+def asked_problem(options: argparse.Namespace) -> Asked:
+    """Return the problem that the command ``optimize`` or ``pareto`` is asked for.
+
+    Raises `ProblemError` or `StepError` if words do not go together, naming one.
+    """
+    of_states = _wants_states(options)
+    _require_known(options, of_states=of_states)
+    sought = options.order == SEARCH
+    options.order = None if sought else options.order
+    criterion = _criterion(options, of_states=of_states)
+    scene = asked_scene(options)
+    if options.robots.isdecimal():
+        scene = with_robots(scene, int(options.robots))
+    words: dict[str, Any] = {"limits": parse_limits(options.limit, scene)}
+    budgets = getattr(options, "budget", [])
+    (parse_caps if of_states else parse_budgets)(budgets)  # said before anything is built
+    aim = known = unseen = None
+    if options.command == "optimize":
+        words["resources"] = asked_resources(options, None if of_states else options.tell)
+        words["formulation"] = options.formulation
+        if options.robust is not None:
+            aim = _asked_aim(options)
+            known, unseen = _asked_scenarios(options, scene)
+            words |= {"scenarios": known, "over": aim}
+    require_out(options)
+    engine = asked_engine(options, build_network(scene))
+    moves = _asked_moves(options, engine.network)
+    words |= {"stands": asked_standing(options), "budgets": budgets}
+    words |= {"orders": Orders.TIED} if sought else {}
+    problem = posed(engine, moves, criterion, options.aim, **words)
+    return Asked(scene, problem, aim, known, unseen)
+
+
+def _wants_states(options: argparse.Namespace) -> bool:
+    """Return whether states of the build are to be chosen, and not candidates of moves."""
+    if options.schedule == FREE or options.aim or options.stands or options.order == SEARCH:
+        return True
+    named = getattr(options, "formulation", None)
+    return named is not None and find_formulation(named).on in (On.STATES, On.ORDERS)
+
+
+def _criterion(options: argparse.Namespace, *, of_states: bool) -> Criterion | None:
+    """Return the criterion that is asked for; None leaves it to what is posed."""
+    if of_states:
+        asked = options.criteria is not None
+        return parse_criterion(options.criteria, options.crown) if asked else None
+    said = (options.criteria, options.crown, options.ranked, options.among)
+    return None if said == (None,) * 4 else asked_criterion(options)
+
+
+def _asked_moves(options: argparse.Namespace, network: Network) -> Schedule | FreeRules:
+    """Return the open grips or the rules that a command is asked for."""
+    rule = getattr(options, "candidates", None)
+    if options.schedule != FREE:
+        schedule = find_schedule(network, options.schedule, parse_robots(options.robots))
+        return schedule if rule is None else thin(schedule, rule)
+    names = () if options.robots.isdecimal() else parse_robots(options.robots)
+    rules = parse_rules(options.rule, names)
+    return replace(rules, candidates=rule) if rule else rules
+
+
+def _require_known(options: argparse.Namespace, *, of_states: bool) -> None:
+    """Raise an error if options are given that states, or candidates, do not have."""
+    if options.command == "optimize" and options.robust is None:
+        for name in ALONE:
+            if getattr(options, name):
+                raise ProblemError(
+                    f"--{name}: plans over scenarios alone have it; give --robust worst-peak, "
+                    "worst-total or as cvar=0.9"
+                )
+    free = options.schedule == FREE
+    for name, why in _WRONG["free" if free else "states" if of_states else "candidates"].items():
+        if getattr(options, name, None):
+            raise ProblemError(f"--{name}: {why}")
+    if options.robots.isdecimal() and not free:
+        said = "a count of robots goes with"
+        where = (
+            f"--schedule {options.schedule}: {said}"
+            if of_states
+            else f"--robots: {said} --schedule"
+        )
+        raise StepError(f"{where} {FREE}")
+
+
+def _asked_aim(options: argparse.Namespace) -> RobustAim:
+    try:
+        return parse_robust(options.robust)
+    except ProblemError as error:
+        raise ProblemError(f"--robust: {error}") from error
+
+
+def _asked_scenarios(options: argparse.Namespace, scene: Scene) -> tuple[Scenarios, Scenarios]:
+    """Return the scenarios to choose by, and those of the next seed that judge."""
+    count, other, seed = COUNT, None, 0
+    if options.scenarios is not None:
+        count = count_word(options.scenarios, "--scenarios", MOST)
+    if options.unseen is not None:
+        other = count_word(options.unseen, "--unseen", MOST)
+    if options.seed is not None:
+        seed = count_word(options.seed, "--seed", MOST, least=0)
+    return _drawn(scene, options, count, seed), _drawn(scene, options, other or count, seed + 1)
+
+
+def _drawn(scene: Scene, options: argparse.Namespace, count: int, seed: int) -> Scenarios:
+    asked = parse_numbers("--vary", options.vary, SPREADS, zero=True, advice=", as stiffness=3")
+    factor = asked.pop("stiffness", 3.0)
+    if factor < 1:
+        raise ProblemError(f"--vary stiffness={factor:g}: give a factor from 1")
+    return scenarios(scene, stiffness=(1 / factor, factor), count=count, seed=seed, **asked)

@@ -1,0 +1,188 @@
+"""What a command says, and what it does where nobody can hear it.
+
+Results go to standard output, everything else a line each to standard error, which a terminal has
+wrapped. Names come from files of others: what steers a terminal is written as its code.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import sys
+import textwrap
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, TextIO
+
+from seqopt.errors import FileError, SceneWarning
+
+NARROWEST, WIDEST = 40, 100  # columns that text is wrapped to
+STYLES = {"heading": "1", "bad": "1;31", "doubt": "33"}  # of terminals: bold, bold red, yellow
+CLEAR = "\r\033[K"  # of a terminal: the line it is on
+LONGEST = 2000  # characters of a line on standard error
+BEGIN = re.compile(
+    r"seqopt: (error|warning|solver failed|time is over|out of memory|payload exceeded)(?=:)"
+)
+
+
+def columns() -> int:
+    """Return how many columns text may take: those of ``COLUMNS`` or the terminal, else 80."""
+    return min(max(shutil.get_terminal_size((80, 24)).columns, NARROWEST), WIDEST)
+
+
+def wrapped(text: str, width: int | None = None, first: str = "", rest: str | None = None) -> str:
+    """Return a text as lines that fit the terminal; words longer than a line stay whole.
+
+    ``first`` and ``rest`` are what the first line and all others begin with; the latter by default
+    blanks as wide as the former.
+
+    Examples
+    --------
+    >>> print(wrapped("one two three four", 12, "- "))
+    - one two
+      three four
+    """
+    return textwrap.fill(
+        text,
+        columns() if width is None else width,
+        initial_indent=first,
+        subsequent_indent=" " * len(first) if rest is None else rest,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def is_terminal(stream: TextIO | None) -> bool:
+    """Return whether a person looks at a stream."""
+    try:
+        return stream is not None and stream.isatty()
+    except ValueError:  # it is closed
+        return False
+
+
+def colored(stream: TextIO | None) -> bool:
+    """Return whether a stream takes colors: ``NO_COLOR`` and ``FORCE_COLOR`` go before it."""
+    if os.environ.get("NO_COLOR"):
+        return False
+    if os.environ.get("FORCE_COLOR"):
+        return stream is not None
+    return is_terminal(stream) and os.environ.get("TERM") != "dumb"
+
+
+def painted(text: str, style: str, stream: TextIO | None) -> str:
+    """Return text in one of `STYLES` where the stream that it goes to takes colors."""
+    return f"\033[{STYLES[style]}m{text}\033[0m" if colored(stream) else text
+
+
+def harmless(text: str, kept: str = "") -> str:
+    r"""Return text in which what steers a terminal, save what is kept, is replaced by its code.
+
+    Examples
+    --------
+    >>> harmless("rob" + chr(27) + "[2J")
+    'rob\\x1b[2J'
+    """
+    if text.translate(dict.fromkeys(map(ord, kept))).isprintable():
+        return text
+    from seqopt.scene._checks import steers  # noqa: PLC0415  # names of others come with scenes
+
+    return "".join(repr(sign)[1:-1] if sign not in kept and steers(sign) else sign for sign in text)
+
+
+def show(text: str) -> None:
+    """Write a result to standard output, its last end of line too.
+
+    Raises `FileError` if standard output is closed.
+    """
+    if sys.stdout is None:
+        raise FileError("standard output is closed, and there is a result to write; open it")
+    sys.stdout.write(harmless(text, "\n\t"))
+
+
+def show_text(text: str, headings: Sequence[str] = ()) -> None:
+    """Write lines for people to standard output, some as headings; a terminal has them wrapped.
+
+    Raises `FileError` if standard output is closed.
+    """
+    if is_terminal(sys.stdout):
+        fits = columns()
+        lines = (wrapped(x, rest="  ") if len(x) > fits else x for x in text.split("\n"))
+        text = "\n".join(lines)
+    for line in text.split("\n"):
+        if line and line in headings and colored(sys.stdout):
+            sys.stdout.write(painted(harmless(line), "heading", sys.stdout) + "\n")
+        else:
+            show(line + "\n")
+
+
+def complain(text: str, style: str = "bad") -> None:
+    """Print a line on standard error, or nothing where that is closed or full."""
+    if len(text) > LONGEST:
+        text = f"{text[: LONGEST // 2]} … {text[-LONGEST // 4 :]}"
+    text = harmless(text)
+    try:
+        if sys.stderr is not None:
+            clear = CLEAR if is_terminal(sys.stderr) else ""  # what a watcher shows there
+            print(clear + _for_people(text, style), file=sys.stderr, flush=True)
+    except OSError:
+        silence(sys.stderr)
+
+
+def note(text: str) -> None:
+    """Print what is worth knowing on standard error; else as `complain`."""
+    complain(text, "doubt")
+
+
+def _for_people(text: str, style: str) -> str:
+    """Return a line as it is, or wrapped and with its first word in color for a terminal."""
+    if is_terminal(sys.stderr):
+        text = wrapped(text, rest="  ")
+    begin = BEGIN.match(text)
+    if begin is None:
+        return text
+    return painted(begin[0], style, sys.stderr) + text[begin.end() :]
+
+
+def flush() -> None:
+    """Write what standard output still holds back.
+
+    Raises `OSError` if it cannot be written; what is left is given up.
+    """
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:
+        silence(sys.stdout)
+        raise
+
+
+def silence(stream: TextIO) -> None:
+    """Let a stream that failed lead nowhere, so that the end of the program is quiet."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+@contextmanager
+def quiet_numbers(*, quiet: bool = False) -> Iterator[None]:
+    """Print warnings about a scene as a line each, or leave them out if it is to be quiet.
+
+    What is not finite is an error of its own.
+    """
+    import numpy as np  # noqa: PLC0415  # help needs none of it
+
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore", RuntimeWarning)
+        warnings.simplefilter("ignore" if quiet else "always", SceneWarning)
+        warnings.showwarning = _as_a_line(warnings.showwarning)
+        yield
+
+
+def _as_a_line(otherwise: Callable[..., None]) -> Callable[..., None]:
+    def show_warning(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+        if issubclass(category, SceneWarning):
+            note(f"seqopt: warning: {message}")
+        else:
+            otherwise(message, category, *rest)
+
+    return show_warning

@@ -1,0 +1,246 @@
+"""What the words of the command line stand for: limits, criteria, rules, mortars, numbers."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from math import radians
+from typing import Any
+
+from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
+from seqopt.errors import ProblemError, SeqoptError, StepError, did_you_mean
+from seqopt.plan.calling.formulation import Formulation, as_formulation
+from seqopt.problem.criteria import Among, Ranked, RankSum
+from seqopt.problem.requirements import NEVER, Criterion, Limit, payload_limits
+from seqopt.problem.standing import Standing
+from seqopt.responses._choices import CHOICE_RESPONSES
+from seqopt.responses.resources import Resources
+from seqopt.scene.scene import Scene
+from seqopt.sequence.rules import FreeRules
+from seqopt.study.published import CRITERIA
+from seqopt.work.progress import Tell
+from seqopt.workflow import DEFAULTS
+
+BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
+SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
+MOST_WORKERS = 1024
+LARGEST = 1e100  # number: products of larger ones overflow
+COUNTS = ("least_grips", "regrips")
+RULES = ("newest", "payload", "ending", "placers", "candidates", *COUNTS)
+
+
+def number_word(text: str, where: str, *, zero: bool = False) -> float:
+    """Return a positive number, or zero too; ``where`` is the argument, for messages."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0 < value <= LARGEST and not (zero and value == 0):
+        raise ProblemError(
+            f"{where}: {text!r} is not a positive number"
+            + (" or zero" if zero else "")
+            + (f" up to {LARGEST:g}" if value > LARGEST else "")
+        )
+    return value
+
+
+def count_word(text: str, where: str, most: int, least: int = 1) -> int:
+    """Return a whole number from the least to the most; ``where`` is the argument."""
+    if not (text.isascii() and text.isdecimal()) or not least <= int(text[:12]) <= most:
+        raise ProblemError(f"{where} {text}: give a whole number from {least} to {most}")
+    return int(text)
+
+
+def _known_word(
+    name: str,
+    known: Iterable[str],
+    where: str,
+    error: type[SeqoptError] = ProblemError,
+    advice: str = "",
+) -> str:
+    """Return a name if it is known; else raise an error that says which are."""
+    if name not in known:
+        names = ", ".join(known)
+        hint = did_you_mean(name, known)
+        raise error(f"{where} does not exist{hint}; give one of {names}{advice}")
+    return name
+
+
+def _split_word(text: str) -> tuple[str, str]:
+    """Return a response, whose brackets may hold anything, and the number after ``=``, if any."""
+    end = text.rfind("]") + 1
+    name, _, number = text[end:].partition("=")
+    return text[:end] + name, number
+
+
+def _response_word(name: str, where: str) -> str:
+    if name not in (*CHOICE_RESPONSES, "F_each") and not name.startswith("F_"):
+        criteria = (*CRITERIA, *CHOICE_RESPONSES, "F_each")
+        names = criteria if where == "--criteria" else ("payload", *CHOICE_RESPONSES)
+        hint = did_you_mean(name, names)
+        raise ProblemError(f"{where} {name} does not exist{hint}; give {', '.join(names)}, F_ROBOT")
+    return name
+
+
+def parse_robots(text: str) -> tuple[str, ...]:
+    """Return names of robots from words with commas between them; nothing for none."""
+    return tuple(name.strip() for name in text.split(",")) if text else ()
+
+
+def parse_numbers(
+    where: str,
+    texts: Sequence[str],
+    known: Iterable[str] | None = None,
+    *,
+    zero: bool = False,
+    advice: str = "",
+) -> dict[str, float]:
+    """Return positive numbers by name, each from ``NAME=VALUE``; any name is known by default."""
+    out: dict[str, float] = {}
+    for text in texts:
+        name, value = _split_word(text)
+        if known is not None:
+            _known_word(name, known, f"{where} {text}", advice=advice)
+        out[name] = number_word(value, f"{where} {text}", zero=zero)
+    return out
+
+
+def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
+    """Return limits, each from ``payload``, of the scene's robots, or ``RESPONSE=VALUE``, SI."""
+    out: list[Limit] = []
+    for text in texts:
+        if text == "payload":
+            out += payload_limits(scene)
+        else:
+            name, value = _split_word(text)
+            response = _response_word(name, "--limit")
+            out.append(Limit(response, number_word(value, f"--limit {text}")))
+    return tuple(out)
+
+
+def parse_time_limit(text: str | None) -> float:
+    """Return seconds from words, infinite where none are given."""
+    return math.inf if text is None else number_word(text, "--time-limit", zero=True)
+
+
+def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[str, Any]:
+    """Return options of a formulation, whose ``solve`` says which there are and of which type."""
+    formulation = as_formulation(formulation)
+    known = formulation.options
+    out: dict[str, Any] = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        if name not in known:
+            hint = did_you_mean(name, known)
+            raise ProblemError(
+                f"--option {text}: {formulation.name} has {', '.join(known) or 'no options'}{hint}"
+            )
+        kind = type(known[name])
+        try:
+            out[name] = kind(value)
+        except ValueError as error:
+            raise ProblemError(
+                f"--option {text}: {name} is {value!r}; give an {kind.__name__}"
+            ) from error
+    return out
+
+
+def asked_mortar(options: argparse.Namespace) -> Mortar:
+    """Return the named mortar with the numbers that are given instead of its own."""
+    given = {
+        name: number_word(text, f"--{name.replace('_', '-')}", zero=True)
+        for name in ("friction", "tensile_strength", "cohesion")
+        if (text := getattr(options, name)) is not None
+    }
+    return replace(MORTARS[options.mortar], **given)
+
+
+def asked_standing(options: argparse.Namespace) -> Standing | None:
+    """Return what is demanded of the stability of states, if anything is."""
+    names = [name for name in ("tilt", "friction") if getattr(options, name) is not None]
+    if options.stands is None:
+        if names:
+            raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands dry, say")
+        return None
+    mortar = find_mortar(options.stands)
+    given = {name: number_word(getattr(options, name), f"--{name}", zero=True) for name in names}
+    tilt = radians(given.pop("tilt", 0.0))
+    return Standing(replace(mortar, **given), tilt)
+
+
+def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:
+    """Return the rules of a free schedule, each from ``NAME=VALUE``, for these robots or all."""
+    given: dict[str, object] = {"robots": robots}
+    for text in texts:
+        name, _, value = text.partition("=")
+        _known_word(name, RULES, f"--rule {text}", StepError)
+        given[name] = value
+        if name in COUNTS and value.isdecimal():
+            given[name] = int(value)
+        elif name == "placers":
+            given[name] = () if value == "any" else parse_robots(value)
+        elif (name, value) == ("regrips", "any"):
+            given[name] = None
+        elif (name, value) == ("candidates", "all"):
+            given[name] = ""
+    return FreeRules(**given)  # type: ignore[arg-type]
+
+
+def asked_criterion(options: argparse.Namespace) -> Criterion:
+    """Return the criterion that a command is asked for, with what it ranks among."""
+    usual = DEFAULTS["any other"].criterion.name
+    criterion = parse_criterion(options.criteria or usual, options.crown)
+    kinds: dict[str, Any] = {"ranked": Ranked, "among": Among}
+    given = {name: text for name in kinds if (text := getattr(options, name)) is not None}
+    if not given:
+        return criterion
+    if not isinstance(criterion, RankSum):
+        name, text = next(iter(given.items()))
+        raise ProblemError(f"--{name} {text}: {criterion.name} has no ranks; leave it out")
+    return replace(criterion, **{name: kinds[name](text) for name, text in given.items()})
+
+
+def parse_criterion(text: str, crown: str | None = None) -> Criterion:
+    """Return a criterion by name, or a rank sum of responses, as ``T_max,M_sup=2``.
+
+    A weight is 1 by default; ``crown`` has the bricks placed at the crown, or ``none``.
+    """
+    if crown is not None:
+        named = CRITERIA.get(text)
+        if not isinstance(named, RankSum):
+            raise ProblemError(f"--crown {crown}: {text} has none; leave it out")
+        return replace(named, crown=NEVER if crown == "none" else number_word(crown, "--crown"))
+    if text in CRITERIA:
+        return CRITERIA[text]
+    terms = []
+    for part in BETWEEN.split(text):
+        name, weight = _split_word(part)
+        response = _response_word(name, "--criteria")
+        terms.append((response, number_word(weight or "1", f"--criteria {part}")))
+    return RankSum(text, tuple(terms), tuple(terms))
+
+
+def asked_resources(options: argparse.Namespace, progress: Tell | None = None) -> Resources:
+    """Return what a computation may use."""
+    workers = count_word(options.workers, "--workers", MOST_WORKERS)
+    most = None if options.max_memory is None else parse_size(options.max_memory)
+    return Resources(workers, None, options.cache, most, progress)
+
+
+def parse_size(text: str) -> float:
+    """Return a number of bytes from words as ``2GB``, ``500 MB`` or ``1.5GiB``.
+
+    Examples
+    --------
+    >>> parse_size("1.5GB")
+    1500000000.0
+    """
+    found = SIZE.fullmatch(text.strip())
+    if found is None or not 0 < float(found[1]) < LARGEST:
+        raise ProblemError(f"--max-memory {text}: give a size, as 500MB or 2GB")
+    unit = found[2].upper()
+    power = "BKMGT".find(unit[:1] or "B")
+    return float(found[1]) * float(1024 if "I" in unit else 1000) ** power

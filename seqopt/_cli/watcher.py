@@ -1,0 +1,115 @@
+"""How far a command is, on the terminal of whoever waits for it: one line, gone when it is done."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from typing import TYPE_CHECKING
+
+from seqopt._cli.terminal import columns, harmless, is_terminal
+from seqopt.work.progress import Stage, duration
+
+if TYPE_CHECKING:
+    from tqdm import tqdm
+
+PATIENCE = 1.0  # s for which a command says nothing
+TICK = 0.5  # s between two looks at the clock
+KNOWN = "{desc}: {percentage:3.0f} % |{bar:20}|"
+TAIL = ": 100 % |12345678901234567890| about 100 min left "  # beside which words have to find room
+
+
+class Watcher:
+    """Shows on standard error what a command does, how far it is and how long it will take.
+
+    A stage whose share is known has a bar and the time left; of any other the time that it took so
+    far is shown. Nothing is shown unless standard error is a terminal, nor in the first second.
+
+    Examples
+    --------
+    >>> with Watcher() as tell:  # of a test standard error is no terminal
+    ...     tell("looking")
+    """
+
+    def __init__(self, *, shows: bool = True) -> None:
+        self._shows = shows and is_terminal(sys.stderr)
+        self._start = self._told = time.perf_counter()
+        self._began: dict[str, tuple[float, float]] = {}  # of each stage, and its last share
+        self._stage = Stage("working", -1.0)  # no share is below zero
+        self._bar: tqdm[None] | None = None
+        self._lock = threading.Lock()
+        self._over = threading.Event()
+        self._clock = threading.Thread(target=self._tick, daemon=True)
+
+    def __enter__(self) -> Watcher:
+        if self._shows:
+            self._clock.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Clear the line, also where an error or an interrupt ends the command."""
+        self._over.set()
+        self._shows = False
+        if self._lock.acquire(timeout=TICK):  # an interrupt may have met whoever has it
+            self._close()
+            self._lock.release()
+
+    def __call__(self, told: object) -> None:
+        """Take note of what is being done: a stage with its share, or words."""
+        if not self._shows:
+            return
+        with self._lock:
+            new = told if isinstance(told, Stage) else Stage(str(told), -1.0)
+            began, share = self._began.get(new.what, (time.perf_counter(), 0.0))
+            if new.share < share:  # it begins anew
+                began = time.perf_counter()
+            if new.share >= 0:
+                self._began[new.what] = began, new.share
+            self._stage, self._told = new, time.perf_counter()
+            self._show()
+
+    def _tick(self) -> None:
+        """Look at the clock now and then: a stage may be silent for long."""
+        while not self._over.wait(TICK):
+            with self._lock:
+                self._show()
+
+    def _show(self) -> None:
+        """Show the stage, from a second after the start of the command on."""
+        now = time.perf_counter()
+        if self._over.is_set() or now - self._start < PATIENCE:
+            return
+        if self._bar is None:
+            self._bar = _bar()
+        stage, bar = self._stage, self._bar
+        what, left = harmless(stage.what), self._left(now)
+        if stage.share > 0 and left > 0:
+            said = f"about {duration(max(left, 1.0))} left"
+            bar.n, bar.bar_format = min(stage.share, 1.0), f"{KNOWN} {said}"
+            bar.desc = what[: columns() - len(TAIL)]
+        else:
+            bar.bar_format = "{desc}"
+            bar.desc = f"{what[: columns() - 24]} … {duration(now - self._start)} so far"
+        bar.refresh()
+
+    def _left(self, now: float) -> float:
+        """Return how long the stage will still take, s; nothing where that is not known."""
+        stage = self._stage
+        if stage.left is not None:
+            return stage.left - (now - self._told)
+        took = now - self._began[stage.what][0] if stage.share > 0 else 0.0
+        return took * (1 - stage.share) / max(stage.share, 1e-9)
+
+    def _close(self) -> None:
+        if self._bar is not None:
+            self._bar.close()
+            self._bar = None
+
+
+def _bar() -> tqdm[None]:
+    """Return an empty bar of tqdm on standard error, which its own clock leaves alone."""
+    from tqdm import tqdm  # noqa: PLC0415  # of a command that is done within a second nobody needs
+
+    tqdm.monitor_interval = 0
+    tqdm.set_lock(threading.RLock())  # its own would start a process
+    return tqdm(total=1.0, leave=False, file=sys.stderr, dynamic_ncols=True, bar_format="{desc}")

@@ -1,0 +1,222 @@
+"""Reading and writing files so that nothing is left half-written."""
+
+from __future__ import annotations
+
+import os
+import stat
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from seqopt._interrupts import undisturbed
+from seqopt.errors import FileError
+
+_FORMULA = ("=", "+", "-", "@")
+_MARK = "'"
+
+
+def harmless(text: str) -> str:
+    """Return a cell that spreadsheets show as it is, after an apostrophe if need be.
+
+    Examples
+    --------
+    >>> harmless("=cmd_node"), harmless("rob1_node"), plain(harmless("'=x"))
+    ("'=cmd_node", 'rob1_node', "'=x")
+    """
+    return _MARK + text if text.lstrip(_MARK).startswith(_FORMULA) else text
+
+
+def plain(text: str) -> str:
+    """Return what a cell said before `harmless`."""
+    return text[1:] if text.startswith(_MARK) and harmless(text) != text else text
+
+
+def _harmless_table(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table whose columns and texts are `harmless`; numbers stay as they are."""
+    texts = [k for k, kind in enumerate(table.dtypes) if not pd.api.types.is_numeric_dtype(kind)]
+    columns = [table.iloc[:, k] for k in range(table.shape[1])]
+    for k in texts:
+        columns[k] = columns[k].map(lambda v: harmless(v) if isinstance(v, str) else v)
+    out = pd.concat(columns, axis=1) if columns else table
+    return out.rename(columns=lambda name: harmless(name) if isinstance(name, str) else name)
+
+
+_LARGEST_INPUT = 64_000_000  # bytes; a scene of 100,000 bricks has 40 million
+HIDDEN = ".seqopt-"  # start of the names of what is not complete yet
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a UTF-8 file.
+
+    Raises `FileError` if it cannot be read, is a pipe or device, is too large, or is not UTF-8.
+    """
+    try:
+        return read_bytes(path).decode("utf-8-sig")  # spreadsheets start text with a mark
+    except UnicodeError as error:
+        raise FileError(f"cannot read {path}: {_reason(error)}; name a readable file") from error
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return the content of a file; as `read_text`."""
+    try:
+        if not stat.S_ISREG(Path(path).stat().st_mode):  # a pipe would be waited for
+            raise FileError(f"cannot read {path}: it is not a regular file; name one")
+        with Path(path).open("rb") as stream:
+            content = stream.read(_LARGEST_INPUT + 1)
+        if len(content) > _LARGEST_INPUT:
+            most = _LARGEST_INPUT / 1e6
+            raise FileError(f"cannot read {path}: it has more than {most:g} MB; name a smaller one")
+        return content
+    except (OSError, ValueError) as error:
+        if isinstance(error, FileError):
+            raise
+        raise FileError(f"cannot read {path}: {_reason(error)}; name a readable file") from error
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a UTF-8 file; else as `write_bytes`."""
+    _write(path, text)
+
+
+def csv_text(table: pd.DataFrame) -> str:
+    """Return a table as CSV, without its index, six digits a number; no text begins a formula."""
+    safe = _harmless_table(table)
+    return str(safe.to_csv(index=False, float_format="%.6g", lineterminator="\n"))
+
+
+def write_csv(path: Path, table: pd.DataFrame) -> None:
+    """Write a table as a CSV file, as `csv_text` and `write_bytes` do."""
+    write_text(path, csv_text(table))
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file whole: it appears under its name only once complete.
+
+    A link is followed to its target; a file that is there keeps its mode. Raises `FileError` if it
+    cannot be written, or what is there is no regular file: a device, say.
+    """
+    _write(path, content)
+
+
+def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
+    """Write files by name into a folder, which is made, all of them or none.
+
+    A new folder appears under its name with all of its files at once. In one that is there all
+    files are complete beside their places before the first is put in its place. Raises `FileError`.
+    """
+    target = Path(os.path.realpath(folder))
+    try:
+        if target.exists():
+            _put_all([(target / name, content) for name, content in files.items()])
+            return
+        make_folder(target.parent)
+        with undisturbed(), tempfile.TemporaryDirectory(dir=target.parent, prefix=HIDDEN) as hidden:
+            whole = Path(hidden) / "whole"
+            whole.mkdir()  # as open as any new folder; the one around it is private
+            _put_all([(whole / name, content) for name, content in files.items()])
+            whole.rename(target)
+    except (OSError, ValueError) as error:
+        raise _unwritable(folder, error) from error
+
+
+def require_apart(outputs: Sequence[Path], inputs: Sequence[Path] = ()) -> None:
+    """Raise an error if two outputs are one file, or one is an input."""
+    seen: list[Path] = []
+    for path in outputs:
+        if any(_is_same(path, other) for other in inputs):
+            raise FileError(f"cannot write {path}: it is the input; name another file")
+        if any(_is_same(path, other) for other in seen):
+            raise FileError(f"cannot write {path}: two outputs go there; name another file")
+        seen.append(path)
+
+
+def require_folder(path: Path) -> None:
+    """Raise `FileError`, before anything is computed, if a folder cannot be made or written."""
+    there = Path(os.path.realpath(path))
+    while not os.path.lexists(there) and there != there.parent:
+        there = there.parent
+    if not there.is_dir() or not os.access(there, os.W_OK | os.X_OK):
+        what = "cannot be written" if there.is_dir() else "is not a folder"
+        raise FileError(f"cannot make folder {path}: {there} {what}; name another")
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder, and those above it, unless it is there. Raises `FileError`."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot make folder {path}: {error.strerror}; name another") from error
+
+
+def _write(path: Path, content: bytes | str) -> None:
+    try:
+        _put_all([(path, content)])
+    except (OSError, ValueError) as error:
+        raise _unwritable(path, error) from error
+
+
+def _stage(path: Path, content: bytes | str) -> tuple[Path, Path]:
+    """Write content beside its place; return the file that has it, and the place."""
+    content = content.encode() if isinstance(content, str) else content
+    target = Path(os.path.realpath(path))
+    mode = 0o666 & ~_umask()
+    if target.exists():
+        if not target.is_file():
+            what = "folder" if target.is_dir() else "device or pipe"
+            raise FileError(f"cannot write {path}: it is a {what}; name a regular file")
+        mode = stat.S_IMODE(target.stat().st_mode)
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=HIDDEN)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+        Path(name).chmod(mode)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+    return Path(name), target
+
+
+def _put_all(files: Sequence[tuple[Path, bytes | str]]) -> None:
+    """Write files; then put them in their places, one right after the other."""
+    staged: list[tuple[Path, Path]] = []
+    with undisturbed():
+        try:
+            for path, content in files:
+                staged.append(_stage(path, content))
+            for hidden, target in staged:
+                hidden.replace(target)
+        finally:
+            for hidden, _ in staged:
+                hidden.unlink(missing_ok=True)
+
+
+def _is_same(path: Path, other: Path) -> bool:
+    """Return whether two paths lead to one file, whether or not it is there."""
+    try:
+        return path.samefile(other)
+    except OSError:  # one of them is not there
+        return os.path.realpath(path) == os.path.realpath(other)
+
+
+def _unwritable(path: Path, error: Exception) -> FileError:
+    if isinstance(error, FileError):
+        return error
+    return FileError(f"cannot write {path}: {_reason(error)}; name a writable file")
+
+
+def _reason(error: Exception) -> str:
+    """Return why a file cannot be read or written, in a few words."""
+    if isinstance(error, OSError):
+        return error.strerror or str(error)
+    if isinstance(error, UnicodeEncodeError):
+        return f"{error.object[error.start]!r} in it is half a character"
+    return "it is not UTF-8 text" if isinstance(error, UnicodeError) else str(error)
+
+
+def _umask() -> int:
+    """Return the mask that an ordinary new file would get (a temporary one is private)."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,87 @@
+"""How values find the functions that draw them, although they may not import these.
+
+Pictures are made in `seqopt.report`, which imports scenes and plans, so these cannot import it in
+turn: they call `display`, which loads the function when a picture is needed.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import webbrowser
+from collections.abc import Callable
+from dataclasses import dataclass
+from html import escape
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from seqopt._files import write_text
+from seqopt.errors import ExtraError
+
+DISPLAYS = {
+    "card": "seqopt.report._notebook",
+    "scene_picture": "seqopt.report._pictures",
+    "network_picture": "seqopt.report._pictures",
+    "steps_picture": "seqopt.report._pictures",
+    "tilt_picture": "seqopt.report._pictures",
+    "gantt_picture": "seqopt.report._pictures",
+    "Film": "seqopt.report._pictures",
+    "build_page": "seqopt.report._pages",
+}
+"""The functions that draw, by name, and the module of each."""
+
+
+def display(name: str) -> Callable[..., Any]:
+    """Return a function of `DISPLAYS`, loaded when it is first asked for.
+
+    Raises `ExtraError` if it needs matplotlib and that is not installed.
+    """
+    try:
+        found: Callable[..., Any] = getattr(import_module(DISPLAYS[name]), name)
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] != "matplotlib":
+            raise
+        raise ExtraError(
+            "pictures need matplotlib, which is not installed: pip install 'seqopt[plot]'"
+        ) from None
+    return found
+
+
+class Shown:
+    """Base class of values that a notebook shows as a small table with a small picture."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        """Return the table and, where matplotlib is installed, the picture, as HTML."""
+        return str(display("card")(self))
+
+
+@dataclass(frozen=True, repr=False)
+class Page:
+    """A self-contained page of HTML, shown in a notebook or, by `open`, in a browser."""
+
+    text: str  # the whole page
+    height: int = 900  # height of the frame that shows it in a notebook, pixels
+
+    def __repr__(self) -> str:
+        size = len(self.text.encode()) / 1e6
+        return f"<Page of {size:.1f} MB: save('report.html') writes it, open() shows it>"
+
+    def _repr_html_(self) -> str:
+        """Return a frame that holds the page."""
+        return (
+            f'<iframe srcdoc="{escape(self.text)}" width="100%" height="{self.height}" '
+            'style="border:0;background:#fff" title="step viewer"></iframe>'
+        )
+
+    def save(self, path: str | Path) -> Path:
+        """Write the page to a file. Raises `FileError` if it cannot be written."""
+        write_text(Path(path), self.text)
+        return Path(path)
+
+    def open(self, path: str | Path | None = None) -> Path:
+        """Write the page to a file, or a temporary one, and show it in a browser."""
+        written = self.save(path or Path(tempfile.mkdtemp(prefix="seqopt-")) / "report.html")
+        webbrowser.open(written.resolve().as_uri())
+        return written

@@ -1,0 +1,158 @@
+"""Elastic limits: whether the stress in joints stays below the strength of their mortar.
+
+The wrench of a joint is distributed linearly over its face, force over area and moment over second
+moment, and checked at the corners, where the stress is largest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.contact.assembly import Assembly
+from seqopt.contact.faces import bare_assembly
+from seqopt.contact.mortar import Mortar
+from seqopt.network._mechanics import point_motion
+from seqopt.network.network import Network
+from seqopt.scene.shape import fans
+
+_CUTS = 2  # times that each triangle of a face is cut into four
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Quadrature(FrozenValue):
+    """Points that stand for faces; a face is a contact of an assembly."""
+
+    point: Floats  # (P, 3); m
+    face: Ints  # (P,)
+    area: Floats  # (P,); share of its face that a point stands for, m²
+
+
+def face_quadrature(assembly: Assembly, cuts: int = _CUTS) -> Quadrature:
+    """Return the bed of all contacts, in their order.
+
+    The middles of the edges of triangles, each cut into four ``cuts`` times, integrate squares
+    exactly.
+    """
+    triangles, face = [], []
+    for c in range(len(assembly.bodies)):
+        corner = assembly.corner[assembly.contact == c]
+        fan = [*corner[fans([range(len(corner))])]]
+        for _ in range(cuts):
+            fan = [part for triangle in fan for part in _quarters(triangle)]
+        triangles += fan
+        face += [c] * len(fan)
+    corners = np.array(triangles).reshape(-1, 3, 3)
+    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(sides, axis=1) / 6  # a third of the triangle
+    middles = 0.5 * (corners + np.roll(corners, 1, axis=1))
+    return Quadrature(
+        middles.reshape(-1, 3), np.repeat(np.array(face, np.int64), 3), np.repeat(area, 3)
+    )
+
+
+def _quarters(triangle: Floats) -> list[Floats]:
+    a, b, c = triangle
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    return [np.array(t) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+
+
+def opening_maps(assembly: Assembly, points: Floats, face: Ints, center: Floats) -> Floats:
+    """Return the motions (P, 3, 6) of points for unit twists of their faces' second bodies.
+
+    ``points`` (P, 3), ``face`` (P,): with their contacts; ``center`` (C, 3): where twists are
+    taken, m. The parts of a motion are along `Assembly.axes`.
+    """
+    return np.asarray(assembly.axes[face] @ point_motion(points - center[face]))
+
+
+def quadrature_stiffness(bed: Quadrature, maps: Floats, moduli: Floats) -> Floats:
+    """Return the stiffness (C, 6, 6) of the beds of faces at their centers, N/m and N m/rad.
+
+    ``maps`` (P, 3, 6): from `opening_maps`; ``moduli`` (C, 2): normal and tangential, N/m³.
+    """
+    slope = bed.area[:, None] * moduli[bed.face][:, [0, 1, 1]]
+    each = np.einsum("pij,pi,pik->pjk", maps, slope, maps)
+    return np.asarray(np.add.reduceat(each, first_points(bed.face, len(moduli)), axis=0))
+
+
+def first_points(face: Ints, faces: int) -> Ints:
+    """Return the first point of every face. ``face`` (P,): of every point, ascending."""
+    return np.searchsorted(face, np.arange(faces))
+
+
+_STRESS_MARGIN = 1e-6  # stress above a limit that counts as none, over the stress scale
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ElasticLimits(FrozenValue):
+    """The faces of a structure and the strength of their mortar; joints in the network's order.
+
+    Attributes
+    ----------
+    assembly : Assembly
+    mortar : Mortar
+    stress : (K, 3, 6) float
+        Compression and shear at the corners for unit wrenches of their joints, Pa/N, Pa/(N m).
+    """
+
+    assembly: Assembly
+    mortar: Mortar
+    stress: Floats
+
+    def excess(self, wrench: Floats) -> Floats:
+        """Return by how much wrenches (S, J, 6) exceed the limits of the joints, (S, J), Pa."""
+        face, mortar = self.assembly.contact, self.mortar
+        stress = np.einsum("kij,skj->ski", self.stress, wrench[:, face])
+        shear = np.linalg.norm(stress[..., 1:], axis=2)
+        beyond = np.maximum(
+            -stress[..., 0] - mortar.tensile_strength,
+            shear - mortar.cohesion - mortar.friction * stress[..., 0],
+        )
+        most = np.maximum.reduceat(beyond, first_points(face, wrench.shape[1]), axis=1)
+        return np.asarray(np.where(np.any(wrench, axis=2), most, -np.inf))
+
+    def exceeded(self, wrench: Floats) -> Bools:
+        """Return which grip sets (S,) leave the elastic limits anywhere, beyond rounding."""
+        margin = _STRESS_MARGIN * self.assembly.stress_scale
+        if self._bound(wrench) <= margin:  # as a rule, and a tenth of the work
+            return np.zeros(len(wrench), dtype=bool)
+        return np.asarray(self.excess(wrench).max(axis=1, initial=-np.inf) > margin)
+
+    def _bound(self, wrench: Floats) -> float:
+        """Return what no wrench (S, J, 6) exceeds its limits by, Pa, from the largest of each."""
+        most, least = wrench.max(axis=0, initial=0.0), wrench.min(axis=0, initial=0.0)
+        largest = np.maximum(most, -least)[self.assembly.contact]
+        stress = (np.abs(self.stress) @ largest[:, :, None])[:, :, 0]
+        shear = np.linalg.norm(stress[:, 1:], axis=1) + self.mortar.friction * stress[:, 0]
+        tension = stress[:, 0] - self.mortar.tensile_strength
+        return float(np.maximum(tension, shear - self.mortar.cohesion).max())
+
+
+def find_elastic_limits(network: Network, mortar: Mortar) -> ElasticLimits:
+    """Return the elastic limits of a structure's joints.
+
+    Parameters
+    ----------
+    network : Network
+    mortar : Mortar
+        Of all joints.
+
+    Returns
+    -------
+    ElasticLimits
+
+    Raises
+    ------
+    SceneError
+        If the faces of a joint do not overlap.
+    """
+    assembly = bare_assembly(network, len(network.inner))
+    where = network.springs.position
+    bed = face_quadrature(assembly)
+    maps = opening_maps(assembly, bed.point, bed.face, where)
+    evenly = quadrature_stiffness(bed, maps, np.ones((len(where), 2)))
+    corner = opening_maps(assembly, assembly.corner, assembly.contact, where)
+    return ElasticLimits(assembly, mortar, corner @ np.linalg.inv(evenly)[assembly.contact])

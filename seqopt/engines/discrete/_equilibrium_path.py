@@ -1,0 +1,190 @@
+"""Settle a system of bodies on beds: Newton's method, and the load in steps where bonds break."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from seqopt.arrays import Bools, Floats, FrozenValue, frozen
+from seqopt.engines.discrete._system import System
+
+_ITERATIONS = 60
+_BALANCED = 1e-10  # largest force left on a body, over the heaviest body's weight
+_ROUNDING = 1e-13  # relative
+LARGEST_STEP, SMALLEST_STEP = 0.1, 1e-3  # of the load, once a bond breaks
+_FIRST_RESISTANCE = 1.0  # resistance to motion at first, over the stiffness
+_MOVES = 120  # against a resistance
+_HALVINGS = 4
+FAR = 0.1  # motion over a brick's length beyond which a structure has gone
+_LENT_STIFFNESS = 1e-12  # lent to every motion, over its own: a loose body can come to rest
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Held(FrozenValue):
+    """A system and what its grips do."""
+
+    system: System
+    free: sparse.csr_array  # (6n, m); motions that the grips leave
+    pads: sparse.csr_array  # (6n, 6n); stiffness of grips that give way
+
+    def left(self, motion: Floats, force: Floats, load: Floats) -> Floats:
+        """Return what is not balanced in the free motions.
+
+        ``motion``, ``force``, ``load``: as of `reaction`. Result (m,): N.
+        """
+        return np.asarray(self.free.T @ self.reaction(motion, force, load))
+
+    def reaction(self, motion: Floats, force: Floats, load: Floats) -> Floats:
+        """Return what is not balanced on the bodies: what the grips must take.
+
+        ``motion`` (m,): in the free motions; ``force`` (P, 3): of the points, N; ``load`` (6n,).
+        Result (6n,).
+        """
+        system = self.system
+        carried = system.gap.T @ system.bed_wrenches(force).ravel()
+        return np.asarray(load + carried - (system.layers + self.pads) @ (self.free @ motion))
+
+    def rounding(self, motion: Floats, force: Floats) -> float:
+        """Return what rounding leaves of a balance between large forces.
+
+        ``motion`` (m,); ``force`` (P, 3): N. Result: N.
+        """
+        moved = np.abs(self.free @ motion)
+        return _ROUNDING * float((self._sizes @ moved).max() + np.abs(force).sum())
+
+    @cached_property
+    def _sizes(self) -> sparse.csr_array:
+        return frozen(sparse.csr_array(abs(self.system.layers) + abs(self.pads)))
+
+    def gone(self, state: Settled) -> bool:
+        """Return whether a state has moved too far for the bricks to be where they were."""
+        return bool(np.abs(state.motion).max(initial=0.0) > FAR * self.system.length)
+
+    @cached_property
+    def diagonal(self) -> Floats:
+        """The diagonal of the unbroken stiffness in the free motions, (m,)."""
+        points = self.system.points
+        none = np.zeros((len(points.area), 3))
+        _, slope = points.forces(none, none[:, 1:], np.zeros(len(none), bool))
+        matrix = self.free.T @ (self.system.stiffness(slope) + self.pads) @ self.free
+        return frozen(np.asarray(matrix.diagonal()))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Settled(FrozenValue):
+    """A state of the bodies.
+
+    ``motion`` (m,): in the free motions; ``force`` (P, 3): of the points on second bodies, N;
+    ``slip`` (P, 2); ``broken`` (P,); ``left``: largest force not balanced, over the heaviest body's
+    weight or what rounding makes of it.
+    """
+
+    motion: Floats
+    force: Floats
+    slip: Floats
+    broken: Bools
+    left: float
+
+    @classmethod
+    def start(cls, held: Held, *, broken: bool) -> Settled:
+        """Return the state without load. ``broken``: whether all bonds are lost at once."""
+        points = len(held.system.points.area)
+        none = np.zeros((points, 3))
+        motion = np.zeros(held.free.shape[1])
+        return cls(motion, none, none[:, 1:], np.full(points, broken), np.inf)
+
+    @property
+    def rests(self) -> bool:
+        """Whether this is an equilibrium."""
+        return self.left <= _BALANCED
+
+
+def settle(held: Held) -> Settled:
+    """Return where a structure comes to rest within all limits, or as far as it was followed.
+
+    Where no bond breaks under the whole load at once, none would on the way to it: the limits are
+    convex. Otherwise the load grows in steps, and a bond once broken stays so.
+
+    Result: an equilibrium if it rests.
+    """
+    points = held.system.points
+    dry = points.mortar.tensile_strength == 0 and points.mortar.cohesion == 0
+    state = _balance(held, Settled.start(held, broken=dry), 1.0)
+    if dry or (state.rests and not points.exceeds(state.force).any()):
+        return state
+    return _in_steps(held)
+
+
+def _in_steps(held: Held) -> Settled:
+    """Return the state under the whole load, reached in steps that shrink where none is found."""
+    state, at, step = Settled.start(held, broken=False), 0.0, LARGEST_STEP
+    while at < 1.0:
+        target = min(at + step, 1.0)
+        found = _after_breaking(held, state, target)
+        if found.rests:
+            state, at, step = found, target, min(2 * step, LARGEST_STEP)
+        elif step > SMALLEST_STEP:
+            step /= 2
+        else:
+            return found
+    return state
+
+
+def _after_breaking(held: Held, state: Settled, share: float) -> Settled:
+    """Return the state under a share of the load once no further bond breaks."""
+    while True:
+        found = _balance(held, state, share)
+        breaks = held.system.points.exceeds(found.force) & ~found.broken
+        if not found.rests or not breaks.any():
+            return found
+        state = replace(found, broken=found.broken | breaks)
+
+
+def _balance(held: Held, state: Settled, share: float) -> Settled:
+    """Return where a state moves to under a share of the load with the bonds it has.
+
+    By Newton at once; else by letting the structure move against a resistance that fades
+    (pseudo-transient continuation, Kelley and Keyes 1998), friction keeping track of every slip.
+    """
+    found = _newton(held, state, share, 0.0)
+    state = replace(state, left=np.inf)
+    resistance = _FIRST_RESISTANCE
+    for _ in range(_MOVES):
+        if found is not None and (found.rests or held.gone(found)):
+            return found
+        found = _newton(held, state, share, resistance)
+        if found is None:
+            resistance *= 8
+        else:
+            state, resistance = found, resistance / 2
+    return state
+
+
+def _newton(held: Held, state: Settled, share: float, resistance: float) -> Settled | None:
+    """Return where a state moves to against a resistance, over the stiffness of every motion."""
+    system, motion, shorter = held.system, state.motion, 0
+    drag = np.maximum(resistance, _LENT_STIFFNESS) * held.diagonal
+    step, best = np.zeros_like(motion), np.inf
+    for _ in range(_ITERATIONS):
+        opening = system.openings(held.free @ motion)
+        force, slope = system.points.forces(opening, state.slip, state.broken)
+        left = held.left(motion, force, share * system.load)
+        missing = left - resistance * held.diagonal * (motion - state.motion)
+        size = np.linalg.norm(missing)
+        unit = max(system.scale, held.rounding(motion, force) / _BALANCED)
+        if np.abs(missing).max() <= _BALANCED * unit:
+            slip = system.points.slipped(opening, force)
+            return Settled(motion, force, slip, state.broken, float(np.abs(left).max() / unit))
+        if size >= best and shorter < _HALVINGS:
+            step *= 0.5
+            motion, shorter = motion - step, shorter + 1
+            continue
+        best, shorter = float(size), 0
+        matrix = held.free.T @ (system.stiffness(slope) + held.pads) @ held.free
+        step = splu((matrix + sparse.diags_array(drag)).tocsc()).solve(missing)
+        motion = motion + step
+    return None

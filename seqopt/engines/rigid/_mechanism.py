@@ -1,0 +1,271 @@
+"""The stiffness of a partial structure, and whether it resists every motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import linalg, sparse
+
+from seqopt.arrays import Floats, FrozenValue, Ints, frozen
+from seqopt.engines.interface import one_thread
+from seqopt.errors import MechanismError
+from seqopt.network._mechanics import (
+    Statics,
+    build_statics,
+    deformation,
+    node_motion,
+    point_motion,
+    spring_maps,
+)
+from seqopt.network.network import Network
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Shared(FrozenValue):
+    """What the systems of all brick counts are cut from.
+
+    ``statics``: of the network; ``gap`` (6S, 6B): deformation of every spring, in its own axes, for
+    unit twists; ``inner`` (6B, 6B): displacements of the inner nodes for unit twists, in the order
+    of ``network.inner``.
+    """
+
+    statics: Statics
+    gap: sparse.csr_array
+    inner: sparse.csr_array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Ungripped(FrozenValue):
+    """What the systems of all grip sets of a partial structure have in common, scaled to order one.
+
+    ``inner`` (6b, 6b): those of the inner nodes for scaled twists, in the order of
+    ``network.inner``, m; ``statics``: of the network; ``deformation`` (6s, 6b): scaled deformation
+    of the acting springs, in their own axes, for scaled twists; ``stiffness`` (6s,): over ``unit``;
+    ``matrix`` (6s + 6b,): the system without grips; ``load`` (6b,): the weight, scaled; ``acting``
+    (s,); ``twist_unit``, ``wrench_unit`` (6b,), (6s,): what turns scaled twists into m and rad,
+    scaled wrenches into N and N m; ``unit``: N/m.
+    """
+
+    network: Network
+    bricks: int
+    inner: sparse.csr_array
+    statics: Statics
+    deformation: sparse.csr_array
+    stiffness: Floats
+    matrix: sparse.csc_array
+    load: Floats
+    acting: Ints
+    twist_unit: Floats
+    wrench_unit: Floats
+    unit: float
+
+    @cached_property
+    def motion(self) -> sparse.csr_array:
+        """Displacements of the nodes for unit twists, (3n, 6b)."""
+        return frozen(node_motion(self.network, self.bricks))
+
+
+def share(network: Network) -> Shared:
+    """Return what the systems of all brick counts are cut from."""
+    springs, size = network.springs, network.inner.size
+    brick = np.repeat(np.arange(len(network.inner)), 2)
+    arm = network.node_position[network.inner.ravel()] - network.centroid[brick]
+    column = np.repeat(6 * brick[:, None] + np.arange(6), 3, axis=0).ravel()
+    inner = (point_motion(arm).ravel(), column, np.arange(0, 18 * size + 1, 6))
+    return Shared(
+        statics=build_statics(network),
+        gap=deformation(springs.bodies, springs.position, network.centroid, springs.axes),
+        inner=sparse.csr_array(inner, shape=(3 * size, 3 * size)),
+    )
+
+
+def ungripped_system(network: Network, bricks: int, shared: Shared | None = None) -> Ungripped:
+    """Return what all systems of a partial structure have in common.
+
+    ``shared``: from `share`; made anew by default.
+    """
+    shared = share(network) if shared is None else shared
+    springs = network.springs
+    acting = springs.acting(bricks)
+    steps = np.diff(network.node_position[network.inner[:bricks]], axis=1)
+    length = float(np.linalg.norm(steps, axis=2).max())
+    lever = np.array([1.0, 1.0, 1.0, length, length, length])
+    raw = (springs.stiffness[acting] / lever**2).ravel()
+    unit = float(np.median(raw[raw > 0])) if raw.any() else 1.0
+    stiffness = raw / unit
+    twist_unit = np.tile(1 / lever, bricks)
+    gap = _scaled_gap(shared, acting, twist_unit, lever)
+    inner = _leading(shared.inner, twist_unit)
+    weight = network.inner_weight[: 2 * bricks].ravel()
+    return Ungripped(
+        network=network,
+        bricks=bricks,
+        inner=inner,
+        statics=shared.statics,
+        deformation=gap,
+        stiffness=stiffness,
+        matrix=_side_by_side(gap, stiffness),
+        load=inner.T @ weight / unit,
+        acting=acting,
+        twist_unit=twist_unit,
+        wrench_unit=unit * np.tile(lever, len(acting)),
+        unit=unit,
+    )
+
+
+def _scaled_gap(
+    shared: Shared, acting: Ints, twist_unit: Floats, lever: Floats
+) -> sparse.csr_array:
+    """Return the deformation (6s, 6b) of the acting springs, all components made lengths."""
+    rows = 6 * len(acting)
+    if len(acting) == 0 or acting[-1] + 1 == len(acting):  # none beyond them acts
+        indptr = shared.gap.indptr[: rows + 1]
+        indices, data = shared.gap.indices[: indptr[-1]], shared.gap.data[: indptr[-1]]
+    else:
+        part = shared.gap[(6 * acting[:, None] + np.arange(6)).ravel()]
+        indptr, indices, data = part.indptr, part.indices, part.data
+    data = data * np.repeat(np.tile(lever, len(acting)), np.diff(indptr))
+    data *= twist_unit[indices]
+    return sparse.csr_array((data, indices, indptr), shape=(rows, len(twist_unit)))
+
+
+def _leading(inner: sparse.csr_array, twist_unit: Floats) -> sparse.csr_array:
+    """Return the displacements (6b, 6b) of the first inner nodes for scaled twists, m."""
+    size = len(twist_unit)
+    column = inner.indices[: 6 * size]
+    data = inner.data[: 6 * size] * twist_unit[column]
+    return sparse.csr_array((data, column, inner.indptr[: size + 1]), shape=(size, size))
+
+
+def _side_by_side(gap: sparse.csr_array, stiffness: Floats) -> sparse.csc_array:
+    """Return the system without grips, column by column, from the scaled deformation (6s, 6b)."""
+    row = 1 / np.maximum(1.0, stiffness)  # keeps a stiff joint's equation of order one
+    joints, moves = gap.shape
+    first = gap.indptr[:-1] + np.arange(joints)  # of a joint's column, the joint itself
+    others = np.arange(gap.nnz) + np.repeat(np.arange(1, joints + 1), np.diff(gap.indptr))
+    carried = gap.tocsc()
+    data, indices = np.empty(2 * gap.nnz + joints), np.empty(2 * gap.nnz + joints, np.int32)
+    data[first], indices[first] = row, np.arange(joints)
+    data[others], indices[others] = -gap.data, gap.indices + joints
+    data[joints + gap.nnz :] = (row * stiffness)[carried.indices] * carried.data
+    indices[joints + gap.nnz :] = carried.indices
+    starts = [gap.indptr + np.arange(joints + 1), carried.indptr[1:] + gap.nnz + joints]
+    entries = data, indices, np.concatenate(starts).astype(np.int32)
+    return sparse.csc_array(entries, shape=(joints + moves, joints + moves))
+
+
+_ROUNDING = 1e-13  # a smaller eigenvalue of the assembled stiffness may be rounding alone
+_UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RigidStructure(FrozenValue):
+    """The parts of the stiffness of one partial structure."""
+
+    acting: Ints  # (s,); the springs that act
+    gap: Floats  # (s, 6, 6b); their deformations for unit twists of the bricks
+    stiffness: Floats  # (s, 6, 6); theirs, N/m and N m/rad
+    matrix: Floats  # (6b, 6b); stiffness of the structure without grips
+    motion: Floats  # (3n, 6b); displacements of the nodes for unit twists
+    inner_motion: Floats  # (6b, 6b); of these, the inner nodes in the order of ``network.inner``
+    statics: Statics  # of the network
+
+    def forbidden(self, grips: Ints) -> Floats:
+        """Return the motions that grips forbid.
+
+        ``grips`` (r,): indices into ``network.inner.ravel()``. Result (3r, 6b).
+        """
+        return np.asarray(self.inner_motion[(3 * grips[:, None] + np.arange(3)).ravel()])
+
+
+def rigid_structure(network: Network, bricks: int) -> RigidStructure:
+    """Return the parts of the stiffness of a partial structure."""
+    acting, gap, stiffness = spring_maps(network, bricks)
+    matrix = np.einsum("sik,sij,sjl->kl", gap, stiffness, gap, optimize=True)
+    motion = node_motion(network, bricks).toarray()
+    inner = network.inner[:bricks].ravel()
+    of_inner = motion[(3 * inner[:, None] + np.arange(3)).ravel()]
+    statics = build_statics(network)
+    return RigidStructure(acting, gap, stiffness, matrix, motion, of_inner, statics)
+
+
+def require_resistance(network: Network, bricks: int, columns: Ints) -> None:
+    """Check that one grip set leaves no motion that nothing resists.
+
+    The assembled stiffness settles most cases at once. It cannot tell a soft support from none;
+    `free_motion` can.
+
+    ``columns`` (r,): grips as indices into ``network.inner.ravel()``. Raises `MechanismError` if it
+    does.
+    """
+    parts = rigid_structure(network, bricks)
+    with one_thread():
+        values, vectors, motions = resisting_modes(parts.matrix, parts.forbidden(columns))
+    if lost_to_rounding(values) and free_motion(network, bricks, columns) is not None:
+        raise mechanism_error(network, motions @ vectors[:, 0])
+
+
+def free_motion(network: Network, bricks: int, columns: Ints) -> Floats | None:
+    """Return a motion that deforms no spring with any stiffness and moves no held node.
+
+    How stiff springs are does not count: a soft one ties as well as a stiff one, so that rounding
+    has nothing to hide behind.
+
+    ``columns`` (r,): grips as indices into ``network.inner.ravel()``. Result (b, 6): translation
+    over the length of the longest brick's inner edge, and rotation; the largest component is 1.
+    None if there is no such motion.
+    """
+    parts = ungripped_system(network, bricks)
+    node = 3 * network.inner.ravel()[columns][:, None] + np.arange(3)
+    held = parts.motion[node.ravel()].toarray() * parts.twist_unit
+    ties = np.vstack([parts.deformation[parts.stiffness > 0].toarray(), held])
+    with one_thread():
+        _, sizes, motions = np.linalg.svd(ties, full_matrices=len(ties) < ties.shape[1])
+    if len(sizes) == ties.shape[1] and sizes[-1] > _UNTIED * sizes[0]:
+        return None
+    motion = motions[-1]
+    return np.asarray((motion / motion[np.abs(motion).argmax()]).reshape(-1, 6))
+
+
+def lost_to_rounding(values: Floats) -> bool:
+    """Return whether the least of eigenvalues may be rounding alone.
+
+    ``values`` (m,): eigenvalues of a scaled stiffness, ascending.
+    """
+    return len(values) > 0 and not values[0] > _ROUNDING * values[-1]  # all may be zero
+
+
+def resisting_modes(matrix: Floats, forbidden: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return how a structure resists the motions that its grips leave.
+
+    ``matrix`` (6b, 6b): stiffness without grips; ``forbidden`` (c, 6b): motions that the grips
+    forbid. Results: ``values`` (m,): eigenvalues of the scaled stiffness, ascending; ``vectors``
+    (m, m): its modes; ``motions`` (6b, m): the motions that the modes combine.
+    """
+    free = linalg.null_space(forbidden) if len(forbidden) else np.eye(len(matrix))
+    diagonal = np.diag(free.T @ matrix @ free)
+    most = max(diagonal.max(initial=0.0), np.finfo(float).tiny / _ROUNDING)
+    motions = free / np.sqrt(np.maximum(diagonal, _ROUNDING * most))
+    values, vectors = np.linalg.eigh(motions.T @ matrix @ motions)
+    return values, vectors, motions
+
+
+def mechanism_error(
+    network: Network,
+    twist: Floats,
+    text: str = "nothing resists a motion of brick {brick}; add a grip, a joint or stiffness",
+) -> MechanismError:
+    """Return the error that shows an unresisted motion.
+
+    ``twist`` (6b,): the motion, of any size; ``text``: what to say of the brick that moves most,
+    ``{brick}``. Result: with the motion's largest component scaled to 1.
+    """
+    shape = (twist / np.abs(twist).max()).reshape(-1, 6)
+    worst = int(np.abs(shape).max(axis=1).argmax())
+    names = [brick.name for brick in network.scene.placed[: len(shape)]]
+    return MechanismError(
+        f"{len(shape)} bricks: {text.format(brick=names[worst])}",
+        tuple((name, tuple(row)) for name, row in zip(names, shape.tolist(), strict=True)),
+    )

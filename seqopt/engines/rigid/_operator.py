@@ -1,0 +1,261 @@
+"""The compliance operator: how one partial structure answers forces at its inner nodes.
+
+The operators of all brick counts come from what grows with the build.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from seqopt.arrays import Floats, FrozenValue, Ints, frozen
+from seqopt.engines.interface import FLAGS, SPACE, Basis
+from seqopt.engines.rigid._growth import Growth, SpanningTree
+from seqopt.engines.rigid._response_maps import (
+    AT_ONCE,
+    Loads,
+    ResponseMaps,
+    inner_edges,
+    inner_motions,
+    loads_of,
+    scene_maps,
+)
+from seqopt.network.network import Network
+
+_OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
+_FEW = 200  # loads whose responses take little, and are always made once for all
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ComplianceOperator(FrozenValue):
+    """What loads on a partial structure of b bricks move and stress; rows of arrays are loads.
+
+    Row ``dm + i`` is a unit force in direction ``i`` of d at the ``m``-th inner node
+    (`Network.inner`) of the h bricks that are loaded, l = 2dh loads in all: d = 3 in space, 2 in a
+    plane. One more row at the end of all but the first two arrays is the weight of the b bricks.
+
+    ``held`` (h,): the bricks that are loaded, ascending. ``flexibility`` (l, l): displacements of
+    their inner nodes, m/N. ``dead_displacement`` (l,): displacements of these under the weight with
+    no grip, m. ``twist`` (l + 1, kb): of the bricks, in k directions. ``wrench`` (l + 1, ks): of
+    the s springs that act on their second bodies. ``maps``: what these mean. ``at_second`` (b,):
+    along every brick's inner edge, the weight at its second node, N. ``axis`` (b, d): unit vectors
+    along the inner edges, in the directions of the loads. ``inner_edge`` (b,): the inner edge of
+    each brick. ``loss`` (l,): how many last digits of the flexibility of each load are rounding.
+    ``loose``: how many loose motions come after the loads, as further rows and unknowns; see
+    `seqopt.engines.rigid._refinement`. ``softness``: of the springs that they stand on, m/N.
+    """
+
+    held: Ints
+    flexibility: Floats
+    dead_displacement: Floats
+    twist: Floats
+    wrench: Floats
+    maps: ResponseMaps
+    at_second: Floats
+    axis: Floats
+    inner_edge: Ints
+    loss: Floats
+    loose: int = 0
+    softness: float = 0.0
+
+    @property
+    def bricks(self) -> int:
+        """How many stand, b."""
+        return len(self.axis)
+
+    @property
+    def directions(self) -> int:
+        """In how many directions a node is loaded and held, d."""
+        return int(self.axis.shape[1])
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the arrays that there are by now."""
+        made = vars(self).keys() & {"flexibility", "twist", "wrench", *FLAGS}
+        return self.maps.nbytes + sum(int(vars(self)[name].nbytes) for name in made)
+
+    @cached_property
+    def place(self) -> Ints:
+        """Which of the bricks that are loaded each is, (b,); -1 of one that is not."""
+        out = np.full(self.bricks, -1)
+        out[self.held] = np.arange(len(self.held))
+        return frozen(out)
+
+    @cached_property
+    def shares(self) -> Floats:
+        """Roots of flexibilities, what weight adds to their sum, what makes it forces; (3, l)."""
+        own = np.maximum(np.abs(self.flexibility.diagonal()), np.finfo(float).tiny)
+        root = np.sqrt(own * self.loss)
+        return frozen(
+            np.stack([root, np.abs(self.dead_displacement) * self.loss / root, root / own])
+        )
+
+    @cached_property
+    def worst_doubt(self) -> float:
+        """Most that a grip's force can be in doubt where pivots are one, over the loads at grips.
+
+        As `seqopt.engines.rigid._grip_equations.doubts`: forces undo the displacements, so these
+        are no more in doubt than what the forces add up to.
+        """
+        own = np.sqrt(
+            np.abs(self.flexibility.diagonal()).max(initial=0.0) * self.loss.max(initial=1.0)
+        )
+        return float(2 * own * self.shares[2].max(initial=0.0))
+
+    def covers(self, bricks: Ints) -> bool:
+        """Return whether loads act at the nodes of bricks."""
+        return len(self.held) == self.bricks or bool((self.place[bricks] >= 0).all())
+
+    def load_index(self, columns: Ints) -> Ints:
+        """Return which loads act at every grip, and after them all loose motions.
+
+        ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. Result (S, rd + m):
+        rows of the operator.
+        """
+        every = len(self.held) == self.bricks
+        nodes = columns if every else 2 * self.place[columns // 2] + columns % 2
+        rows = self.directions * nodes[:, :, None] + np.arange(self.directions)
+        rows = rows.reshape(len(columns), columns.shape[1] * self.directions)
+        if self.loose:
+            after = len(self.flexibility) - self.loose + np.arange(self.loose)
+            rows = np.hstack([rows, np.tile(after, (len(rows), 1))])
+        return np.asarray(rows)
+
+    def loads(self, index: Ints, force: Floats, weight: float = 1.0) -> Loads:
+        """Return forces at loads, and the weight.
+
+        ``index`` (S, k): loads that act; ``force`` (S, k): by how much, N; ``weight``: share of the
+        weight.
+        """
+        return loads_of(index, force, len(self.twist), weight)
+
+    def answer(self, name: str, index: Ints, force: Floats, loads: Loads | None = None) -> Floats:
+        """Return a field of sets of forces beside the weight.
+
+        Where there are fewer sets than loads of all bricks, their twists and wrenches are summed
+        and mapped; else those of the loads are mapped, once, and then summed. So are reactions,
+        which few of the wrenches tell.
+
+        ``name``: of a field; ``index`` (S, k): loads that act; ``force`` (S, k): by how much, N;
+        ``loads``: the same, if it was made before. Result (S, Q).
+        """
+        few = name == "support" or 2 * self.axis.size <= max(_FEW, len(index))
+        if few:  # whatever was asked before: answers do not depend on it
+            loads = self.loads(index, force) if loads is None else loads
+            return loads.sum(getattr(self, name))
+        states, out = self._states(name), np.empty((len(index), self.maps.count(name)))
+        step = max(16, AT_ONCE // states.shape[1])
+        for start in range(0, len(index), step):
+            part = slice(start, start + step)
+            self.maps.apply(name, self.loads(index[part], force[part]).sum(states), out[part])
+        if name == "edge_force":
+            out[:, self.inner_edge] += self.at_second
+            self._add_grips(index, force, out)
+        return out
+
+    def _add_grips(self, index: Ints, force: Floats, out: Floats) -> None:
+        """Add to edge forces (S, E) what forces (S, k) at second nodes send into inner edges."""
+        width = self.directions
+        nodes = (index.shape[1] - self.loose) // width
+        at = index[:, : nodes * width : width] // width
+        brick, own = self.held[at // 2], force[:, : nodes * width].reshape(len(index), nodes, width)
+        along = np.einsum("snd,snd->sn", own, self.axis[brick]) * (at % 2)
+        for i in range(nodes):  # two may share an edge
+            out[np.arange(len(index)), self.inner_edge[brick[:, i]]] += along[:, i]
+
+    def _states(self, name: str) -> Floats:
+        return self.twist if name in _OF_TWISTS else self.wrench
+
+    def _rows(self, name: str) -> Floats:
+        return self.maps.apply(name, self._states(name))
+
+    @cached_property
+    def edge_force(self) -> Floats:
+        """Axial forces of all edges under every load, (l + 1, E)."""
+        out, width = self._rows("edge_force"), self.directions
+        out[-1, self.inner_edge] += self.at_second
+        rows = 2 * width * np.arange(len(self.held))[:, None] + width + np.arange(width)
+        out[rows, self.inner_edge[self.held][:, None]] += self.axis[self.held]
+        return frozen(out)
+
+    @cached_property
+    def displacement(self) -> Floats:
+        """Displacements of all nodes, (l + 1, 3n)."""
+        return frozen(self._rows("displacement"))
+
+    @cached_property
+    def support(self) -> Floats:
+        """Force and moment at every ground end of the scene, (l + 1, 6G)."""
+        return frozen(self._rows("support"))
+
+    @cached_property
+    def joint_wrench(self) -> Floats:
+        """Wrenches of all springs of the network, (l + 1, 6S)."""
+        return frozen(self._rows("joint_wrench"))
+
+    @cached_property
+    def brick_twist(self) -> Floats:
+        """Twists of all bricks, (l + 1, 6b)."""
+        return frozen(self._rows("brick_twist"))
+
+
+class OperatorBuilder:
+    """Makes the operator of any brick count of a tree from what grows with it.
+
+    ``tree``: on which the bricks hang. ``basis``: the directions in which bricks are loaded and
+    move; all by default.
+    """
+
+    def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
+        self.network, self.basis = network, basis
+        self.growth = Growth(network, tree, basis)
+        self._maps = scene_maps(network, basis)
+        self._nodes = inner_motions(network, basis)
+
+    def operator(self, bricks: int, held: Ints | None = None) -> ComplianceOperator:
+        """Return the operator of a partial structure.
+
+        ``bricks``: how many bricks stand, at most as many as the tree has. ``held`` (h,): the
+        bricks at whose nodes loads act, ascending; all by default.
+        """
+        self.growth.reach(bricks)
+        held = np.arange(bricks) if held is None else held
+        which = slice(bricks) if len(held) == bricks else held
+        nodes = self._nodes[which]
+        twist, wrench = self._rows(bricks, which, nodes)
+        moved = _at_nodes(twist.reshape(len(twist), bricks, nodes.shape[2])[:, which], nodes)
+        inner_edge, axis, at_second = inner_edges(self.network, bricks)
+        return ComplianceOperator(
+            held=held,
+            flexibility=moved[:-1],
+            dead_displacement=moved[-1],
+            twist=twist,
+            wrench=wrench,
+            maps=ResponseMaps(self._maps, bricks),
+            at_second=at_second,
+            axis=axis @ self.basis.force.T,
+            inner_edge=inner_edge,
+            loss=np.repeat(self.growth.loss[held], nodes.shape[1]),
+        )
+
+    def _rows(self, bricks: int, which: Ints | slice, nodes: Floats) -> tuple[Floats, Floats]:
+        """Return the twists and wrenches under unit loads at nodes, and under the weight."""
+        k, loads = nodes.shape[2], nodes.shape[0] * nodes.shape[1]
+        springs = int(np.searchsorted(self.network.springs.since, bricks, side="right"))
+        out = []
+        for answers, width in ((self.growth.twist, k * bricks), (self.growth.wrench, k * springs)):
+            by_brick = answers[1 : 1 + k * bricks, :width].reshape(bricks, k, width)
+            rows = np.empty((loads + 1, width))
+            np.matmul(nodes, by_brick[which], out=rows[:-1].reshape(*nodes.shape[:2], width))
+            rows[-1] = answers[0, :width]
+            out.append(rows)
+        return out[0], out[1]
+
+
+def _at_nodes(twist: Floats, nodes: Floats) -> Floats:
+    """Return the displacements (L, 2dh) of nodes for rows of twists (L, h, k)."""
+    out = np.empty((len(twist), *nodes.shape[:2]))
+    np.matmul(twist.transpose(1, 0, 2), nodes.swapaxes(1, 2), out=out.transpose(1, 0, 2))
+    return out.reshape(len(twist), nodes.shape[0] * nodes.shape[1])

@@ -1,0 +1,380 @@
+r"""Answers of many grip sets corrected together, with one factorization per brick count.
+
+What is left of the equations of `seqopt.engines.rigid._mixed` when an answer is put in is
+answered by the system without grips, all sets as right-hand sides of one solution, and by the
+grips' equations of the operator. The first correction of an answer is its error, but for the share
+by which the operator itself is wrong; the next one is that share smaller.
+
+Parts that nothing, or only something soft, ties to the rest can move by themselves: a brick that
+robots alone hold, what turns about a hinge. The system of `seqopt.engines.rigid._mixed`
+without grips is then singular, or nearly. Held at one brick of each such part, :math:`W u =
+\alpha`, it is as good as that of a sound structure; how far the loose motions go, :math:`\alpha`,
+is an unknown of each grip set beside the forces of its grips.
+
+A loose motion stands on a spring of its own that every grip set takes away again: with the
+flexibility ``G`` of the structure on these springs of softness ``s`` and the displacements ``R``
+that the loose motions make, forces ``λ`` and motions ``β`` follow from ``G λ + R β = -d`` and
+``Rᵀ λ - K β = -p``, where ``p`` is how the weight pulls at the motions and ``K`` how soft springs
+resist them, mostly not at all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+from scipy.sparse.linalg import SuperLU, splu
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.engines.interface import SPACE, Basis, Fields, join_sets, merge_sets, no_sets
+from seqopt.engines.rigid._grip_equations import grip_forces, still_forces
+from seqopt.engines.rigid._mechanism import Shared, Ungripped, require_resistance, ungripped_system
+from seqopt.engines.rigid._mixed import (
+    LAST_CORRECTION,
+    Solution,
+    rescaled,
+    respond,
+    solve_mixed,
+    unchanged,
+    unscaled,
+)
+from seqopt.engines.rigid._operator import ComplianceOperator
+from seqopt.engines.rigid._response_maps import ResponseMaps, inner_edges, loads_of, scene_maps
+from seqopt.errors import SolverError
+from seqopt.network._mechanics import point_motion
+from seqopt.network.network import GROUND, Network
+
+_NEAR = 0.1  # of the largest: a pivot that large is taken if it fills less, and corrected after
+_PANEL = 4  # columns that are eliminated together: few, since each meets few others
+_SOFT = 1e-7  # stiffness over the typical one below which a direction ties nothing
+
+
+@dataclass(frozen=True)
+class _HeldSystem:
+    """The factored system of a partial structure whose loose motions are held."""
+
+    parts: Ungripped
+    loose: int  # how many loose motions there are, m
+    factors: SuperLU  # of the system of 6s wrenches, 6b twists and m forces that hold
+
+    def solve(self, loads: Floats, moved: Floats | None = None) -> tuple[Floats, Floats]:
+        """Return the answers to right-hand sides.
+
+        ``loads`` (S, 6s + 6b): scaled, of the springs' equations and of equilibrium. ``moved`` (S,
+        m): how far the loose motions are moved, m; nowhere by default. Results: ``states`` (S, 6s +
+        6b): scaled; ``force`` (S, m): with which the loose motions must be pulled, N.
+        """
+        whole = np.zeros((loads.shape[1] + self.loose, len(loads)), order="F")
+        whole[: loads.shape[1]] = loads.T
+        if moved is not None:
+            whole[loads.shape[1] :] = moved.T
+        answer = self.factors.solve(whole).T
+        states, force = np.split(answer, [loads.shape[1]], axis=1)
+        return states, force * self.parts.unit
+
+
+def hold_loose(parts: Ungripped, *, tied: bool = False) -> _HeldSystem:
+    """Return the factored system of a partial structure with its loose motions held.
+
+    ``tied``: whether springs are known to tie every brick to the ground, however softly. Raises
+    `SolverError` if it is exactly singular all the same.
+    """
+    matrix, rows = parts.matrix, _held_motions(parts, tied=tied)
+    if rows.shape[0]:
+        joints = len(parts.wrench_unit)
+        wide = sparse.csr_array(
+            (rows.data, rows.indices + joints, rows.indptr), shape=(rows.shape[0], matrix.shape[0])
+        )
+        matrix = sparse.block_array([[matrix, -wide.T], [wide, None]], format="csc")
+    try:
+        # springs first, then bricks as they are built: neighbors stand near each other
+        factors = splu(
+            sparse.csc_array(matrix),
+            permc_spec="NATURAL",
+            diag_pivot_thresh=_NEAR,
+            panel_size=_PANEL,
+        )
+    except RuntimeError as error:  # SuperLU met an exactly zero pivot
+        raise SolverError(
+            f"{parts.bricks} bricks: exactly singular in double precision; stiffen what is soft"
+        ) from error
+    return _HeldSystem(parts, rows.shape[0], factors)
+
+
+def _held_motions(parts: Ungripped, *, tied: bool) -> sparse.csr_array:
+    """Return the rows (m, 6b) whose products with scaled twists say how far loose motions go."""
+    stiff = parts.stiffness.reshape(-1, 6)
+    firm = stiff.min(axis=1) >= _SOFT
+    none = sparse.csr_array((0, 6 * parts.bricks))
+    if tied and firm.all():
+        return none
+    label, first = _clusters(parts, firm)
+    if not len(first):
+        return none
+    rigid = _cluster_motions(parts, label, first)
+    soft = np.repeat(~firm, 6)
+    strain = np.sqrt(parts.stiffness[soft])[:, None] * (parts.deformation[soft] @ rigid)
+    _, sizes, modes = np.linalg.svd(strain)  # SciPy 1.12 refuses an empty matrix
+    weak = np.ones(len(modes), dtype=bool)
+    weak[: len(sizes)] = sizes < np.sqrt(_SOFT)
+    held = (6 * first[:, None] + np.arange(6)).ravel()
+    rows = sparse.lil_array((int(weak.sum()), 6 * parts.bricks))
+    rows[:, held] = np.linalg.pinv((rigid @ modes[weak].T)[held])
+    return sparse.csr_array(rows)
+
+
+def _clusters(parts: Ungripped, firm: Bools) -> tuple[Ints, Ints]:
+    """Return which group of firmly tied bricks each belongs to, and their first bricks.
+
+    The group that is tied to the ground is -1 and has no first brick here.
+    """
+    bodies = parts.network.springs.bodies[parts.acting[firm]]
+    ends = np.where(bodies == GROUND, parts.bricks, bodies)
+    size = parts.bricks + 1
+    tied = sparse.coo_array((np.ones(len(ends)), tuple(ends.T)), shape=(size, size))
+    _, label = csgraph.connected_components(tied, directed=False)
+    loose = np.flatnonzero(label[:-1] != label[-1])
+    names, first, own = np.unique(label[loose], return_index=True, return_inverse=True)
+    out = np.full(parts.bricks, -1)
+    out[loose] = own
+    return out, loose[first][np.arange(len(names))]
+
+
+def _cluster_motions(parts: Ungripped, label: Ints, first: Ints) -> Floats:
+    """Return the scaled twists (6b, 6c) of all bricks when groups of them move as one."""
+    center = parts.network.centroid[: parts.bricks]
+    out = np.zeros((parts.bricks, 6, len(first), 6))
+    for group, lead in enumerate(first):
+        mine = np.flatnonzero(label == group)
+        out[mine, :3, group] = point_motion(center[mine] - center[lead])
+        out[mine, 3:, group, 3:] = np.eye(3)
+    return out.reshape(6 * parts.bricks, -1) / parts.twist_unit[:, None]
+
+
+_TIED = 0.1  # most that what resists loose motions may be of the springs that they stand on
+
+
+def held_operator(system: _HeldSystem) -> ComplianceOperator:
+    """Return the operator of a partial structure whose loose motions are unknowns of grip sets.
+
+    Result: of all directions of space, with a load for each loose motion after those of the nodes.
+    """
+    parts, loose = system.parts, system.loose
+    joints, loads = len(parts.wrench_unit), 6 * parts.bricks
+    inner = parts.inner
+    right = np.zeros((loads + loose, joints + loads))
+    right[:loads, joints:] = inner.toarray() / parts.unit
+    moved = np.zeros((loads + loose, loose))
+    moved[loads:] = np.eye(loose)
+    states, pull = system.solve(right, moved)
+    motion = (inner @ states[:, joints:].T).T
+    reach, resistance = motion[loads:], pull[loads:]
+    softness = _softness(motion[:loads], reach, resistance, parts.unit)
+    states[:loads] += softness * (reach.T @ states[loads:])
+    flexibility = np.zeros((loads + loose, loads + loose))
+    flexibility[:loads, :loads] = motion[:loads] + softness * (reach.T @ reach)
+    flexibility[loads:, :loads], flexibility[:loads, loads:] = reach, reach.T
+    corner = np.linalg.solve(np.eye(loose) - softness * resistance, resistance)
+    flexibility[loads:, loads:] = -0.5 * (corner + corner.T)
+    return _operator(parts, states, flexibility, softness)
+
+
+def _softness(flexibility: Floats, reach: Floats, resistance: Floats, unit: float) -> float:
+    """Return the softness of the springs that loose motions stand on, m/N.
+
+    About that of the structure where they reach, so that the grips' equations keep their digits. A
+    motion that reaches no node, as of bricks that turn about the line they lie on, counts as if it
+    took one node along: beside that, rounding stays small.
+    """
+    if not len(reach):
+        return 0.0
+    own = float(np.trace(flexibility)) / max(float((reach**2).sum()), float(len(reach)))
+    most = _TIED / max(float(np.abs(resistance).sum()), np.finfo(float).tiny)
+    return min(max(own, 1 / unit), most)
+
+
+def _operator(
+    parts: Ungripped, states: Floats, flexibility: Floats, softness: float
+) -> ComplianceOperator:
+    """Return the operator whose loads and loose motions lead to scaled states (l + m, n)."""
+    network, bricks = parts.network, parts.bricks
+    loads = 6 * bricks
+    weight = np.zeros(len(states))
+    weight[:loads] = network.inner_weight[: 2 * bricks].ravel()
+    wrench, twist = unscaled(parts, states)
+    inner_edge, axis, at_second = inner_edges(network, bricks)
+
+    def with_weight(rows: Floats) -> Floats:
+        return np.vstack([rows, weight @ rows])
+
+    return ComplianceOperator(
+        held=np.arange(bricks),
+        flexibility=flexibility,
+        dead_displacement=flexibility @ weight,
+        twist=with_weight(twist),
+        wrench=with_weight(wrench[:, parts.acting].reshape(len(states), -1)),
+        maps=ResponseMaps(scene_maps(network), bricks),
+        at_second=at_second,
+        axis=axis,
+        inner_edge=inner_edge,
+        loss=np.ones(len(states)),
+        loose=len(states) - loads,
+        softness=softness,
+    )
+
+
+_TOGETHER = 256  # grip sets per pass: their unknowns stay in the processor's cache
+_STEPS = 5  # corrections, after which a set is solved on its own
+_HARDLY_HELD = 1e-9  # a pivot of loose motions below which they are looked into one by one
+
+
+class Refinement:
+    """Answers grip sets of one partial structure to rounding, whatever is loose in it.
+
+    ``shared``: what the systems of all brick counts are cut from, if it is known; ``tied``: whether
+    springs are known to tie every brick to the ground.
+    """
+
+    def __init__(
+        self, network: Network, bricks: int, shared: Shared | None = None, *, tied: bool = False
+    ) -> None:
+        self.network, self.bricks = network, bricks
+        self.parts = ungripped_system(network, bricks, shared)
+        self.held: _HeldSystem = hold_loose(self.parts, tied=tied)
+        self.inner = self.parts.inner
+        weighed = sparse.csr_array(self.parts.load[None])
+        self.pulls = sparse.vstack([self.inner / self.parts.unit, weighed], format="csr")
+
+    @cached_property
+    def own(self) -> ComplianceOperator:
+        """Of all nodes and directions, from the factored system; for where something is loose."""
+        return held_operator(self.held)
+
+    def solve(
+        self,
+        columns: Ints,
+        operator: ComplianceOperator | None = None,
+        largest: float = LAST_CORRECTION,
+        basis: Basis = SPACE,
+    ) -> Fields:
+        """Return all fields of grip sets.
+
+        ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. ``operator``: with
+        wrenches and twists, if there is one for these grips; it serves if nothing is loose.
+        ``largest``: correction of a set after which it needs no other, over the largest of each
+        kind. ``basis``: the directions that the operator knows; in the others nothing may move.
+        """
+        empty = no_sets(self.network, self.bricks, columns.shape[1])
+        starts = range(0, len(columns), _TOGETHER)
+        if operator is None or self.held.loose:
+            operator, basis = self.own, SPACE
+        corrector = Corrector(self, operator, largest, basis)
+        parts = (corrector.together(columns[i : i + _TOGETHER]) for i in starts)
+        return join_sets([empty, *parts])
+
+
+class Corrector:
+    """Corrects what an operator answers.
+
+    ``largest``: correction of a set after which it needs no other; ``basis``: the directions that
+    the operator knows.
+    """
+
+    def __init__(
+        self,
+        system: Refinement,
+        operator: ComplianceOperator,
+        largest: float = LAST_CORRECTION,
+        basis: Basis = SPACE,
+    ) -> None:
+        self.network, self.bricks, self.parts = system.network, system.bricks, system.parts
+        self.held, self.inner, self.pulls = system.held, system.inner, system.pulls
+        self.operator, self.largest, self.basis = operator, largest, basis
+
+    def together(self, columns: Ints) -> Fields:
+        """Return the fields of a few sets.
+
+        ``columns`` (S, r): grips as indices into ``network.inner.ravel()``.
+        """
+        operator, parts, bricks = self.operator, self.parts, self.bricks
+        index = operator.load_index(columns)
+        found = grip_forces(operator, columns, index)
+        if operator.loose:
+            for row in columns[~(found.lowest >= _HARDLY_HELD)]:
+                require_resistance(self.network, bricks, row)
+        answers = _Answers(
+            self._states(index, found.force), self._in_space(found.force, columns.shape[1])
+        )
+        done = self._correct(columns, index, answers)
+        wrench, twist = unscaled(parts, answers.states[done])
+        held = answers.force[done].reshape(int(done.sum()), columns.shape[1], 3)
+        solution = Solution(twist, wrench, held)
+        motion = operator.maps.motion if self.basis is SPACE else parts.motion
+        fields = respond(self.network, parts.statics, motion, columns[done], solution)
+        if done.all():
+            return fields
+        return merge_sets(done, fields, solve_mixed(self.network, bricks, columns[~done]))
+
+    def _states(self, index: Ints, force: Floats, weight: float = 1.0) -> Floats:
+        """Return the scaled answers (S, n) to forces (S, k) at loads, and the weight or none."""
+        loads = self.operator.loads(index, force, weight)
+        every = self.basis.wrench
+        wrench, twist = (
+            loads.sum(rows).reshape(len(index), -1, len(every)) @ every
+            for rows in (self.operator.wrench, self.operator.twist)
+        )
+        return rescaled(self.parts, wrench, twist.reshape(len(index), -1))
+
+    def _in_space(self, force: Floats, grips: int) -> Floats:
+        """Return forces of grips (S, 3r) that are given in the operator's directions (S, k)."""
+        width = len(self.basis.force)
+        nodes = force[:, : grips * width].reshape(len(force), grips, width)
+        return np.asarray(nodes @ self.basis.force).reshape(len(force), 3 * grips)
+
+    def _correct(self, columns: Ints, index: Ints, answers: _Answers) -> Bools:
+        """Correct answers until they no longer change; return which have come so far, (S,)."""
+        done = np.zeros(len(columns), dtype=bool)
+        left = np.flatnonzero(np.isfinite(answers.states).all(axis=1))
+        for _ in range(_STEPS):
+            if not len(left):
+                break
+            state, force = answers.states[left], answers.force[left]
+            change, more = self._correction(columns[left], index[left], state, force)
+            answers.states[left] = state + change
+            answers.force[left] = force + more
+            done[left] = unchanged(self.parts, state, change, self.largest)
+            left = left[~done[left] & np.isfinite(change).all(axis=1)]
+        return done
+
+    def _correction(
+        self, columns: Ints, index: Ints, states: Floats, force: Floats
+    ) -> tuple[Floats, Floats]:
+        """Return what must be added to scaled answers (S, n) and grip forces (S, 3r)."""
+        operator, parts = self.operator, self.parts
+        joints, grips = len(parts.wrench_unit), columns.shape[1]
+        at = (3 * columns[:, :, None] + np.arange(3)).reshape(force.shape)
+        pulled = loads_of(at, force, 6 * self.bricks + 1).matrix @ self.pulls
+        missing = -(parts.matrix @ states.T).T
+        missing[:, joints:] += pulled
+        answer, pull = self.held.solve(missing)
+        moved = (self.inner @ (states + answer)[:, joints:].T).T
+        loose = -operator.softness * pull  # how far what is missing moves loose parts
+        if operator.loose:
+            moved += loose @ operator.flexibility[-operator.loose :, : -operator.loose]
+        at_grips = np.take_along_axis(moved, at, axis=1).reshape(-1, 3) @ self.basis.force.T
+        moved = np.hstack([at_grips.reshape(len(moved), -1), -pull])
+        change = still_forces(operator, columns, index, moved)
+        more = self._in_space(change, grips)
+        change[:, change.shape[1] - operator.loose :] += loose
+        return answer + self._states(index, change, 0.0), more
+
+
+@dataclass(frozen=True)
+class _Answers:
+    """Scaled wrenches and twists (S, n), and forces of the grips (S, 3r), corrected in place."""
+
+    states: Floats
+    force: Floats

@@ -1,0 +1,267 @@
+"""The states and moves of a schedule as an explorer visits them, and the steps that they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import SolverError
+from seqopt.graph._explore import Explorer, Moves
+from seqopt.graph.graph import Graph
+from seqopt.graph.states.states import States
+from seqopt.problem.problem import Measure
+from seqopt.sequence import _rule_space as free_space
+from seqopt.sequence._rule_space import FreeSpace, node_numbers
+from seqopt.sequence._schedule_space import ScheduleSpace
+from seqopt.sequence.rules import Ending
+from seqopt.sequence.steps import Step, StepKind, check_sequence
+
+
+def steps_of(space: FreeSpace | ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
+    """Return the checked steps that lead from one state to the next.
+
+    ``states``: as of a `seqopt.plan.calling._guard.StatePath`. Raises
+    `SolverError` if the states are none of this space; `StepError` if no single step leads from one
+    state to the next.
+    """
+    if isinstance(space, ScheduleSpace):
+        return _scheduled_steps(space, states)
+    numbers = [None, *node_numbers(space.network)]
+    grips: list[int | None] = [None] * len(space.network.scene.robots)
+    stays: dict[int, int] = {}  # where a robot was last, as a place from 1
+    before, out = 0, list[Step]()
+    for bricks, *entries in states:
+        if len(entries) < space.robots or not all(abs(n) < len(numbers) for n in entries):
+            raise SolverError(f"the state {[bricks, *entries]} is none of this free schedule")
+        took = False
+        for kind, (first, end) in zip(space.kinds, space.slots, strict=True):
+            took |= _follow(kind.robots, entries[first:end], grips, stays, numbers)
+        stays = stays if space.parks else {}
+        step = StepKind.PLACE if bricks > before else StepKind.REPOSITION
+        out.append(Step(len(out) + 1, step if took else StepKind.RELEASE, bricks, tuple(grips)))
+        before = bricks
+    return check_sequence(space.network.scene, out)
+
+
+def _scheduled_steps(space: ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
+    """Return the checked steps of states of a schedule, one for each of its steps."""
+    rows = np.array([row[1:] for row in states if len(row) == space.robots + 1], dtype=np.int64)
+    if len(rows) != space.levels or [row[0] for row in states] != [*range(1, space.levels + 1)]:
+        raise SolverError("the states are none of this schedule: it has one for every step")
+    if np.abs(rows).max() > 2 * len(space.network.inner):
+        raise SolverError("a state of a schedule holds a node that does not exist")
+    return space.steps(rows)
+
+
+def _follow(
+    robots: Sequence[int],
+    entries: Sequence[int],
+    grips: list[int | None],
+    stays: dict[int, int],
+    numbers: Sequence[int | None],
+) -> bool:
+    """Let robots of a kind hold what their entries say; return whether one took a grip."""
+    wanted = {numbers[n]: n for n in entries if n > 0}
+    left = [-n for n in entries if n <= 0]
+    for robot in robots:
+        if grips[robot] is not None and grips[robot] not in wanted:
+            grips[robot] = None
+    fresh = [node for node in wanted if node not in [grips[robot] for robot in robots]]
+    for node in fresh:
+        free = [robot for robot in robots if grips[robot] is None]
+        if not free:
+            raise SolverError(f"node {node} is held in a state, and no robot is free to hold it")
+        for robot in reversed(free):
+            if stays.get(robot, 0) in left and len(free) > 1:  # it is seen to stay free
+                left.remove(stays.get(robot, 0))
+                free = [r for r in free if r != robot]
+        robot = free[0]
+        grips[robot] = node
+        stays[robot] = wanted[node]
+    return bool(fresh)
+
+
+def steps_with(problem: States, regrips: Floats, held: Ints) -> Floats:
+    """Return how many steps plans have.
+
+    ``regrips`` (n,): infinite where there is no plan; ``held`` (n,): how many grips are held at the
+    end, or before the last step where that lets all go. Result (n,).
+    """
+    released = problem.free_rules.ending is not Ending.HELD
+    return np.asarray(2 * problem.space.levels + 2 * regrips - held + released)
+
+
+def with_held(problem: States, graph: Graph, held: Bools) -> Graph:
+    """Return a graph whose paths end in some states, or let all go in them last.
+
+    ``held`` (n,): which states hold as many grips as wanted.
+    """
+    if problem.free_rules.ending is Ending.HELD:
+        return replace(graph, ends=graph.ends & held)
+    return graph.only(~graph.ends[graph.target] | held[graph.source])
+
+
+@dataclass(frozen=True)
+class FreeStates:
+    """The states of a free schedule, a part for every brick count.
+
+    Moves take a column each: whether they are regrips, and how far robots go, m.
+
+    ``regrips``: whether robots may take grips on bricks that stand; ``standing``: whether it is
+    asked of every state that it stands, and by which margins.
+    """
+
+    problem: States
+    regrips: bool = True
+    standing: bool = False
+
+    @property
+    def levels(self) -> int:
+        """How many bricks there are, or steps of a schedule."""
+        return self.problem.space.levels
+
+    @property
+    def peaks(self) -> tuple[bool, ...]:
+        """By goal, whether its worst counts."""
+        return tuple(goal.measure is Measure.PEAK for goal in self.problem.goals)
+
+    def start(self) -> tuple[int, Ints]:
+        """Return the empty site."""
+        return 0, self.problem.space.start()
+
+    def codes(self, part: int, states: Ints) -> Ints:
+        """Return a number for every state."""
+        return self.problem.space.codes(states)
+
+    def within(self, part: int, states: Ints) -> Moves:
+        """Return the moves that place no brick."""
+        return _joined(self.problem.space.within(part, states), states, regrips=self.regrips)
+
+    def onward(self, part: int, states: Ints) -> Iterator[tuple[int, Moves]]:
+        """Yield the moves that place the next brick, or take the next step of a schedule."""
+        yield part + 1, self.placed(part, states)
+
+    def placed(self, level: int, states: Ints) -> Moves:
+        """Return the moves from a level to the next."""
+        return _joined(self.problem.space.onward(level, states), states)
+
+    @property
+    def floors(self) -> bool:
+        """Whether a state that one scenario rules out is not asked of the next."""
+        return bool(self.problem.each)
+
+    def values(
+        self, part: int, states: Ints, *, rough: bool, most: float = np.inf
+    ) -> tuple[Floats, Bools]:
+        """Return what goals take of states, and which are allowed."""
+        if self.standing:
+            return self.problem.standing_values(part, states, most=most)
+        return self.problem.values(part, states, rough=rough, most=most)
+
+    def amounts(self, values: Floats, taken: Floats) -> Floats:
+        """Return what goals take of moves."""
+        return move_amounts(self.problem, values, taken)
+
+    def ended(self, part: int, states: Ints) -> Bools:
+        """Return which states end the build."""
+        return self.problem.space.ended(states)
+
+
+class ScenarioSums(FreeStates):
+    """The same with a sum for every scenario in the place of the goal."""
+
+    @property
+    def peaks(self) -> tuple[bool, ...]:
+        """None."""
+        return (False,) * len(self.problem.each)
+
+    @property
+    def floors(self) -> bool:
+        """None."""
+        return False
+
+    def values(
+        self, part: int, states: Ints, *, rough: bool, most: float = np.inf
+    ) -> tuple[Floats, Bools]:
+        """Return what the goal takes of states in every scenario, and which are allowed in all."""
+        out = np.full((len(states), len(self.peaks)), np.inf)
+        rows = np.arange(len(states))
+        for k, problem in enumerate(self.problem.each):
+            asked = problem.standing_values if self.standing else problem.values
+            found, allowed = asked(part, states[rows])
+            out[rows, k] = found[:, 0]
+            rows = rows[allowed]
+        return out, np.isin(np.arange(len(states)), rows)
+
+    def amounts(self, values: Floats, taken: Floats) -> Floats:
+        """Return the values of the states that moves lead to."""
+        return values
+
+
+def move_amounts(problem: States, values: Floats, taken: Floats) -> Floats:
+    """Return what goals take of moves, (m, g).
+
+    ``values`` (m, g): what they take of the states that the moves lead to; ``taken`` (m, 2):
+    whether the moves are regrips, and how far robots go, m. Result (m, g).
+    """
+    out = values.copy()
+    for k, goal in enumerate(problem.goals):
+        if goal.measure is Measure.STEPS:
+            out[:, k] = 1.0
+        elif goal.measure is Measure.REGRIPS:
+            out[:, k] = taken[:, 0]
+        elif goal.measure is Measure.TRAVEL:
+            out[:, k] = taken[:, 1]
+    return out
+
+
+def floors_of_goals(problem: States) -> tuple[float, ...]:
+    """Return what every plan takes at least of each goal, known before anything is searched.
+
+    No worst step is better than the end that all builds have in common, no build shorter than its
+    bricks and robots allow. Minus infinity where nothing is known.
+    """
+    space, out = problem.space, [-np.inf] * len(problem.goals)
+    if space.ends_bare:
+        values, within = problem.values(space.levels, np.zeros_like(space.start()))
+        for k, goal in enumerate(problem.goals):
+            if within[0] and goal.measure is Measure.PEAK:
+                out[k] = float(values[0, k])
+    for k, goal in enumerate(problem.goals):
+        if goal.measure is Measure.STEPS:
+            out[k] = float(space.fewest_steps)
+    return tuple(out)
+
+
+def explore(
+    problem: States,
+    ceiling: float = np.inf,
+    width: int | None = None,
+    tell: Callable[[Explorer], object] = lambda _: None,
+) -> Explorer:
+    """Return the states of a free schedule below a ceiling that stand as is demanded.
+
+    ``ceiling``: the first goal must not take more of a state, where it is about a peak; ``width``:
+    from how many new states of a brick count the search goes on, and without regrips; ``tell``:
+    called after every level; may raise to end the search.
+    """
+    asked = bool(problem.demands) or any(goal.of_margins for goal in problem.goals)
+    space = FreeStates(problem, regrips=width is None, standing=asked)
+    found = Explorer(space, width, tell)
+    found.rise(ceiling)
+    return found
+
+
+def _joined(
+    found: Sequence[tuple[free_space.Moves, bool]], states: Ints, *, regrips: bool = True
+) -> Moves:
+    """Return moves together, those that are regrips only if these are wanted."""
+    parts = [Moves(np.zeros(0, dtype=np.int64), states[:0], np.zeros((0, 2)))]
+    for moves, regrip in found:
+        if regrips or not regrip:
+            taken = np.column_stack([np.full(len(moves.way), float(regrip)), moves.way])
+            parts.append(Moves(moves.source, moves.states, taken))
+    return Moves(*map(np.concatenate, zip(*parts, strict=True)))

@@ -1,0 +1,199 @@
+"""Choose among candidates of moves: by their costs, or by the models that a search needs alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from seqopt.errors import ProblemError
+from seqopt.graph.layers.costs import Budget
+from seqopt.graph.layers.interface import PlacementProblem
+from seqopt.graph.layers.layers import Layers, steps_over, travel
+from seqopt.graph.scenarios import ScenarioLayers
+from seqopt.plan.calling._guard import require_fit, require_proof, require_time, select
+from seqopt.plan.calling.formulation import (
+    End,
+    Formulation,
+    On,
+    Run,
+    Selection,
+    Watch,
+    find_formulation,
+    formulations,
+    timed,
+)
+from seqopt.plan.judge.certificate import (
+    Certificate,
+    certify_partial,
+    certify_scenarios,
+    judge,
+    require_anew,
+)
+from seqopt.plan.plan import Plan
+from seqopt.plan.search._pair_search import search_pairs
+from seqopt.plan.search._window_search import search_windows
+from seqopt.problem.criteria import Among
+from seqopt.problem.problem import Aim, AskedBudget
+
+CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, without budgets
+
+
+def with_budgets(problem: Layers, asked: Sequence[AskedBudget]) -> Layers:
+    """Return a problem with budgets; shares are those of its optimum without any.
+
+    ``problem``: posed with the responses that the budgets name.
+    """
+    budgets: list[Budget] = []
+    for each in asked:
+        bound = each.bound
+        if each.share:
+            free = best_choice(problem, Aim.SUM).choice
+            bound *= _budget(problem, each, np.inf).spent(free)
+        budgets.append(_budget(problem, each, bound))
+    return replace(problem, budgets=tuple(budgets))
+
+
+def _budget(problem: Layers, asked: AskedBudget, bound: float) -> Budget:
+    """Return the budget of how much there is, in its unit."""
+    if not asked.response:
+        return travel(problem, bound)
+    return steps_over(problem, asked.response, asked.level, bound)
+
+
+def best_choice(problem: PlacementProblem, aim: Aim) -> Selection:
+    """Return the best choice without budgets, judged; an interrupt ends more than this.
+
+    Raises `InfeasibleError` if no choice is allowed; `KeyboardInterrupt` if it was interrupted.
+    """
+    formulation = find_formulation(CHOOSES[aim])
+    found = select(formulation, problem)
+    if found.end is End.INTERRUPTED:
+        raise KeyboardInterrupt
+    judge(problem, found, formulation)
+    return found
+
+
+def solve_layers(graph: PlacementProblem, formulation: Formulation, run: Run) -> Plan:
+    """Return the plan of a formulation of candidates, of one scene or over scenarios.
+
+    Raises `InfeasibleError` if no choice is allowed; `ProblemError` if graph, formulation and
+    options do not fit together; `SolverError` if an answer is not what is claimed.
+    """
+    if not isinstance(getattr(graph, "budgets", None), tuple):
+        raise ProblemError(
+            f"a {type(graph).__name__} is not a problem; give one that seqopt.pose made"
+        )
+    require_fit(graph, formulation, run.options)
+    require_time(formulation, run.time_limit)
+    if isinstance(graph, Layers):
+        graph.require_possible()
+    if run.lazy:
+        require_proof(run.proof)
+        return _solve_lazily(graph, formulation, run)
+    return (
+        _solve_all(graph, formulation, run)
+        if run.proof
+        else _solve_windows(graph, formulation, run)
+    )
+
+
+def on_the_way(plan: Plan) -> Plan:
+    """Return a plan, for whoever has more to do than to solve; an interrupt ends that too.
+
+    Raises `KeyboardInterrupt` if its formulation was interrupted.
+    """
+    if plan.ended is End.INTERRUPTED:
+        raise KeyboardInterrupt
+    return plan
+
+
+def _solve_all(graph: PlacementProblem, formulation: Formulation, run: Run) -> Plan:
+    """Return the certified plan of a formulation that is given the costs of all choices."""
+    seconds: dict[str, float] = {}
+    stages = graph.seconds(formulation.aim or Aim.SUM)  # computes costs: solving is timed alone
+    with timed(seconds, "solve"):
+        selection = select(formulation, graph, Watch(run.time_limit, run.progress), **run.options)
+    seconds["compile"] = selection.compile_seconds
+    seconds["solve"] -= selection.compile_seconds
+    with timed(seconds, "verify"):
+        certificate = _judged(graph, selection, formulation)
+        steps = graph.steps(selection.choice)
+        for layers in _from_cache(graph):
+            require_anew(layers, selection.choice)
+    order = {stage: seconds[stage] for stage in ("compile", "solve", "verify")}
+    return Plan(graph, graph, formulation, selection, certificate, steps, {**stages, **order})
+
+
+def _solve_windows(graph: PlacementProblem, formulation: Formulation, run: Run) -> Plan:
+    """Return the plan of a search that solves only the models it meets."""
+    alone = formulation.window_options
+    if alone is None or run.options not in ({}, alone):
+        able = [
+            n for n, other in formulations(On.LAYERS).items() if other.window_options is not None
+        ]
+        asked = " ".join(
+            [formulation.name, *(f"{name}={value}" for name, value in run.options.items())]
+        )
+        raise ProblemError(
+            f"{asked} looks beyond the window of a move and needs all models: "
+            f"use {' or '.join(able)} without options, or ask for the proof"
+        )
+    if not isinstance(graph, Layers):
+        raise ProblemError("the costs of all choices are needed or given; ask for the proof")
+    if getattr(graph.criterion, "among", Among.ALL) is not Among.ALL:
+        raise ProblemError(
+            "ranks among possible candidates need all models: rank among all, or ask for the proof"
+        )
+    seconds: dict[str, float] = {}
+    with timed(seconds, "search"):
+        found = search_windows(graph, Watch(run.time_limit))
+    respond = sum(part.evaluation.seconds for part in (found.alone, *found.shared))
+    with timed(seconds, "verify"):
+        steps = graph.steps(found.choice)
+        require_anew(graph, found.choice, found.met)
+    stages = {"respond": respond, "rank": seconds["search"] - respond, "verify": seconds["verify"]}
+    return Plan(
+        graph, graph, formulation, Selection(found.choice, np.nan), None, steps, stages, found
+    )
+
+
+def _solve_lazily(graph: PlacementProblem, formulation: Formulation, run: Run) -> Plan:
+    """Return the certified plan of a search that solves only the models that the proof needs."""
+    if not isinstance(graph, Layers):
+        raise ProblemError("the costs of all choices are needed or given; leave out lazy")
+    if run.options:
+        raise ProblemError(f"option {min(run.options)}: a lazy search has no options; leave it out")
+    seconds: dict[str, float] = {}
+    with timed(seconds, "search"):
+        found = search_pairs(graph, formulation, Watch(run.time_limit, run.progress))
+    with timed(seconds, "verify"):
+        certificate = certify_partial(found.costs, found.selection, found.objective)
+        steps = graph.steps(found.selection.choice)
+        require_anew(graph, found.selection.choice, found.along.met)
+    return Plan(
+        graph,
+        graph,
+        formulation,
+        found.selection,
+        certificate,
+        steps,
+        seconds,
+        found.along,
+        found.models,
+    )
+
+
+def _judged(graph: PlacementProblem, selection: Selection, formulation: Formulation) -> Certificate:
+    if formulation.on is On.SCENARIOS:
+        assert isinstance(graph, ScenarioLayers)  # it was given these
+        return certify_scenarios(graph, selection)
+    return judge(graph, selection, formulation)
+
+
+def _from_cache(graph: PlacementProblem) -> Iterator[Layers]:
+    """Return the layers whose responses may come from files."""
+    if isinstance(graph, ScenarioLayers):
+        return graph.from_cache
+    return iter((graph,) if isinstance(graph, Layers) else ())

@@ -1,0 +1,204 @@
+"""Choose the states of a build, whatever the schedule."""
+
+from __future__ import annotations
+
+import math
+import operator
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
+from functools import partial
+from math import inf, isfinite
+from typing import Any
+
+import numpy as np
+
+from seqopt.errors import InfeasibleError, SolverError
+from seqopt.graph.orders import AllOrders, OrderSelection
+from seqopt.graph.states._visits import steps_of
+from seqopt.graph.states.states import States
+from seqopt.plan._status import FoundOrder
+from seqopt.plan.calling._guard import (
+    StatePath,
+    called,
+    readable,
+    require_proof,
+    text,
+    with_numbers,
+)
+from seqopt.plan.calling.formulation import Formulation, FormulationKind, Run, find_formulation
+from seqopt.plan.judge._infeasible import confirmed
+from seqopt.plan.judge._orders import finds_better_order
+from seqopt.plan.judge.certificate import TOLERANCE
+from seqopt.plan.judge.schedules import judge_schedule
+from seqopt.plan.plan import Plan
+from seqopt.responses.resources import HERE
+from seqopt.scene.scene import Order, in_order
+from seqopt.work._workers import keep
+
+COUNTED = ("each", "sets", "screened", "stability")  # of a problem: they know what was computed
+
+
+def solve_states(graph: States, formulation: Formulation, run: Run) -> Plan:
+    """Return the plan of a formulation of states, judged where a proof is asked for.
+
+    Raises `InfeasibleError`, naming the brick at which it stops, and the rule or limit whose
+    loosening opens a way; `ProblemError` if there is no such option; `SolverError` if the answer is
+    not what its formulation claims.
+    """
+    formulation.require_options(run.options)
+    if run.lazy:  # it is at any rate
+        require_proof(run.proof)
+    told = {} if run.progress is None else {"progress": run.progress}
+    limit = {} if math.isinf(run.time_limit) else {"seconds": run.time_limit}
+    with keep(graph.resources.executor, graph.resources.workers):
+        return _solved(graph, formulation, {**run.options, **told, **limit}, proof=run.proof)
+
+
+def _solved(
+    problem: States, formulation: Formulation, options: Mapping[str, Any], *, proof: bool
+) -> Plan:
+    """Return the plan of a formulation, judged."""
+    start, twin = time.perf_counter(), replace(problem)  # which no formulation can reach
+    selection = _selected(formulation, problem, twin, options)
+    solved = time.perf_counter()
+    if proof and "progress" in options:
+        options["progress"]("proving that no plan is better")
+    steps = steps_of(twin.space, selection.states)
+    hint = dict(enumerate(selection.visited))
+    exact = formulation.kind is FormulationKind.EXACT
+    certificate = judge_schedule(twin, selection, steps, hint, exact=exact) if proof else None
+    problem.certified.update(twin.certified)
+    seconds = {"solve": solved - start, "verify": time.perf_counter() - solved}
+    return Plan(problem, problem, formulation, selection, certificate, steps, seconds)
+
+
+def _judged(problem: States) -> States:
+    """Return what a formulation must not change; who works for it may."""
+    return replace(problem, resources=HERE)
+
+
+def _selected(
+    formulation: Formulation, problem: States, twin: States, options: Mapping[str, Any]
+) -> StatePath:
+    """Return what a formulation says, with numbers where numbers belong; or why there is none."""
+    start, name = time.perf_counter(), formulation.name
+    solve = partial(formulation.solve, problem, **options)
+    try:
+        selection = called(name, partial(_judged, problem), StatePath, solve)
+    except InfeasibleError:
+        left = float(options.get("seconds", math.inf)) - (time.perf_counter() - start)
+        raise confirmed(twin, name, left) from None
+    for kept in [*vars(problem)]:  # whatever it left behind, but counts of what was computed
+        if kept not in (*(f.name for f in fields(problem)), *COUNTED):
+            del vars(problem)[kept]
+    return with_numbers(name, selection, len(problem.goals))
+
+
+ENDED = ("time", "interrupt")  # searches that were told to end: nothing more is computed
+
+
+def solve_orders(problem: AllOrders, formulation: Formulation, run: Run) -> Plan:
+    """Return the best plan of the best order, or of a good one with a bound.
+
+    The plan is computed again for this one order and judged by its own certificate. Raises
+    `InfeasibleError`, `ProblemError` if no order has a plan, or there is no such option;
+    `SolverError` if the order is none that was asked for or not worth what is claimed, or another
+    is better.
+    """
+    formulation.require_options(run.options)
+    start, options = time.perf_counter(), dict(run.options)
+    if not np.isinf(run.time_limit):
+        options["seconds"] = run.time_limit
+    means = problem.states.resources
+    means = replace(means, progress=run.progress or means.progress)
+    twin = _judged_orders(problem)  # which no formulation can reach
+    ends = start + float(options.get("seconds", inf))
+    solve = partial(formulation.solve, problem, resources=means, **options)
+    selection = _selected_order(formulation, (problem, twin), ends, solve)
+    seconds = {"order": time.perf_counter() - start}
+    plan = _planned(formulation.name, twin, selection, proof=run.proof)
+    start = time.perf_counter()
+    proven = run.proof and _proven(formulation.name, twin, selection, ends)
+    seconds |= {**plan.seconds, "order_proof": time.perf_counter() - start}
+    found = FoundOrder(twin, selection, proven)
+    return replace(plan, problem=problem, formulation=formulation, seconds=seconds, order=found)
+
+
+def _planned(name: str, problem: AllOrders, selection: OrderSelection, *, proof: bool) -> Plan:
+    """Return the best plan of an order, which must be worth what is claimed."""
+    _require_allowed(name, problem, selection.order)
+    plan = solve_states(
+        problem.at(selection.order), find_formulation("schedule_search"), Run(proof=proof)
+    )
+    assert isinstance(plan.selection, StatePath)
+    _require_worth(name, plan.selection.objective[0], selection)
+    return plan
+
+
+def _selected_order(
+    found: Formulation,
+    problems: tuple[AllOrders, AllOrders],
+    end: float,
+    solve: Callable[[], object],
+) -> OrderSelection:
+    """Return what a formulation says, with numbers where numbers belong; or why there is none."""
+    asked, problem = problems
+    try:
+        said = called(found.name, lambda: (_judged_orders(asked), problem), OrderSelection, solve)
+    except InfeasibleError as error:
+        some = finds_better_order(problem, np.inf, end=end)
+        if some:
+            raise SolverError(
+                f"formulation {found.name} says that no order has a plan, and some have"
+            ) from None
+        if some is False:
+            raise
+        raise InfeasibleError(f"claimed by {found.name}, and not proven: {error}") from None
+    return _with_numbers(found.name, said)
+
+
+def _judged_orders(problem: AllOrders) -> AllOrders:
+    """Return what a formulation must not change; who works for it may."""
+    return replace(problem, states=replace(problem.states, resources=HERE))
+
+
+def _proven(name: str, problem: AllOrders, selection: OrderSelection, end: float) -> bool:
+    """Return whether a bound on all orders is proven; raise an error if one is below it."""
+    if selection.stopped in ENDED or not isfinite(selection.bound):
+        return False
+    bound = min(selection.bound, selection.objective)
+    better = finds_better_order(problem, bound, end=end)
+    if better:
+        raise SolverError(
+            f"{name}: {selection.bound:.9g} is promised as a bound on all orders; one has a plan "
+            "with less"
+        )
+    return better is False
+
+
+def _with_numbers(name: str, found: OrderSelection) -> OrderSelection:
+    """Return a selection with numbers where numbers belong."""
+    with readable(name):
+        order = tuple(operator.index(brick) for brick in found.order)
+        objective, bound = float(found.objective), float(found.bound)
+        evaluated = operator.index(found.evaluated)
+        return OrderSelection(order, objective, bound, evaluated, text(found.stopped))
+
+
+def _require_allowed(name: str, problem: AllOrders, order: Order) -> None:
+    """Raise an error if an order does not name every brick once, or is none of those asked for."""
+    in_order(problem.scene, order)
+    if not problem.allows(order):
+        raise SolverError(f"{name}: its order places a brick that nothing ties")
+
+
+def _require_worth(name: str, value: float, selection: OrderSelection) -> None:
+    """Raise an error if an order is not worth what is claimed, or less than its bound."""
+    claimed, bound = selection.objective, selection.bound
+    most = TOLERANCE * max(abs(value), abs(claimed))
+    if not (abs(value - claimed) <= most and bound <= value + most):  # NaN is no bound
+        raise SolverError(
+            f"{name}: the value of the order is {value:.9g}; claimed are {claimed:.9g} and "
+            f"a bound of {bound:.9g}"
+        )

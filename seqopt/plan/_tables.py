@@ -1,0 +1,149 @@
+"""Tables of a plan: what was chosen move by move, and what it was chosen from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+
+from seqopt.arrays import Floats
+from seqopt.graph.layers.layers import Layers
+from seqopt.graph.layers.ranking import move_costs, rank_of, split_gap, under_both
+from seqopt.plan.calling.formulation import Selection
+from seqopt.plan.search._window_search import WindowSearch
+from seqopt.problem.problem import Aim
+from seqopt.responses._choices import StepChoices
+
+Objectives = dict[str, dict[str, float | None] | None]
+
+
+def chosen_table(
+    problem: Layers,
+    selection: Selection,
+    aim: Aim,
+    search: WindowSearch | None,
+    grips: pd.DataFrame,
+) -> pd.DataFrame:
+    """Return what was chosen for every move and what it is worth.
+
+    ``search``: what was looked at, where not all models were solved; ``grips``: of the plan.
+    Result: as of `seqopt.plan.plan.Plan.table`.
+    """
+    worths = pd.DataFrame([*_worths(problem, selection.choice, aim, search)])
+    return moves_table(problem, selection.choice, grips).join(worths)
+
+
+def _worths(
+    problem: Layers, choice: tuple[int, ...], aim: Aim, search: WindowSearch | None
+) -> Iterator[dict[str, float]]:
+    """Yield the cells of the table that say what the choice of every move is worth."""
+    for k, (before, now) in enumerate(pairwise((0, *choice))):
+        if search is not None:
+            costs = search.costs(k)
+            margin = np.delete(costs, now).min(initial=np.inf) - costs[now]
+            yield {"cost": costs[now], "margin": margin}
+            continue
+        layered = aim.costs(problem)
+        yield {
+            "single_cost": layered.single[k][now],
+            "shared_cost": layered.shared[k][before, now],
+            "rank_in_window": rank_of(move_costs(problem, k, before), now),
+        }
+
+
+def split_objectives(problem: Layers, choice: tuple[int, ...], *, heuristic: bool) -> Objectives:
+    """Return the sum of ranks under both objectives, and the two parts of a heuristic's gap.
+
+    Result: ``objectives`` as of `seqopt.graph.layers.ranking.under_both`; ``gap_parts`` as of
+    `split_gap`; None where there are no ranks.
+    """
+    values = under_both(problem, choice)
+    if None in values.values():
+        return {"objectives": None, "gap_parts": None}
+    parts = split_gap(problem, choice) if heuristic else None
+    if parts is None:
+        return {"objectives": values, "gap_parts": None}
+    split: dict[str, float | None] = {"short_sight": parts.short_sight}
+    return {"objectives": values, "gap_parts": split | {"objective": parts.objective}}
+
+
+def moves_table(problem: Layers, choice: Sequence[int], grips: pd.DataFrame) -> pd.DataFrame:
+    """Return what was chosen for every move, for how long, and with which force.
+
+    ``choice``: the candidate that is taken for every move; ``grips``: of the plan, as of
+    `seqopt.responses.table.grips_table`. Result: a row per move. Columns: ``move``, ``step``,
+    ``to_step`` (the last in which the node is held), ``bricks``, ``robot``, ``brick``, ``node``,
+    ``largest_force_N`` and ``candidates`` (how many there were).
+    """
+    schedule = problem.schedule
+    held = {(row["robot"], row["from_step"]): row for row in grips.to_dict("records")}
+    rows = []
+    for k, (move, now) in enumerate(zip(schedule.moves, choice, strict=True), start=1):
+        own, node = held[move.robot, move.step], move.candidates[now]
+        rows.append(
+            {
+                "move": k,
+                "step": move.step,
+                "to_step": own["to_step"],
+                "bricks": move.bricks,
+                "robot": move.robot,
+                "brick": schedule.scene.brick_of_node[node].name,
+                "node": node,
+                "largest_force_N": own["largest_force_N"],
+                "candidates": len(move.candidates),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def choice_table(problem: Layers, choices: StepChoices) -> pd.DataFrame:
+    """Return raw responses and cost of every choice in a step.
+
+    ``choices``: one of ``problem.evaluation.steps``. Result: a row per choice, labeled by its
+    nodes; SI units.
+    """
+    axes = next(iter(choices.responses.values())).ndim
+    moves = [problem.schedule.moves[m] for m in choices.moves[-axes:]]
+    names = [f"{move.robot}_node" for move in moves]
+    index = pd.MultiIndex.from_product([move.candidates for move in moves], names=names)
+    columns: Mapping[str, Floats] = {**choices.responses, "cost": problem.step_costs(choices)}
+    return pd.DataFrame({name: values.ravel() for name, values in columns.items()}, index=index)
+
+
+def alternatives(
+    problem: Layers, choice: tuple[int, ...], search: WindowSearch | None
+) -> pd.DataFrame:
+    """Return raw responses and cost of every choice that was looked at.
+
+    ``choice``: the candidate that a plan takes for every move; ``search``: what was looked at along
+    the choice, where not all models were solved. Result: as of
+    `seqopt.plan.plan.Plan.alternatives`.
+    """
+    parts = []
+    for posed, choices, before in _looked_at(problem, choice, search):
+        table = choice_table(posed, choices)
+        columns = ["node", "second_node"][: table.index.nlevels]
+        nodes = pd.DataFrame(table.index.to_frame(index=False).to_numpy(), columns=columns)
+        if before is not None:
+            nodes = nodes.rename(columns={"node": "second_node"})
+            nodes.insert(0, "node", before)
+        nodes.insert(0, "step", choices.step.number)
+        parts.append(pd.concat([nodes, table.reset_index(drop=True)], axis=1))
+    return pd.concat(parts).sort_values("step", kind="stable", ignore_index=True)
+
+
+def _looked_at(
+    problem: Layers, choice: tuple[int, ...], search: WindowSearch | None
+) -> Iterator[tuple[Layers, StepChoices, int | None]]:
+    """Yield steps and, where only one choice before is kept, the node of that choice."""
+    if search is not None or not problem.evaluation.streams:
+        for posed in (problem,) if search is None else search.explored:
+            for choices in posed.evaluation.steps:
+                yield posed, choices, None
+        return
+    nodes, before = problem.nodes(choice), (0, *choice)
+    for k in range(len(problem.schedule.moves)):
+        for choices in problem.window_choices(k, before[k]):
+            yield problem, choices, nodes[k - 1] if len(choices.moves) == 2 else None

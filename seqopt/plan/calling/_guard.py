@@ -1,0 +1,327 @@
+"""How formulations are called: what judges them stays as it was, and nonsense is a failure.
+
+One rule for all formulations: what the judge uses has a checksum, before a formulation is called
+and after. Arrays that it unlocks and attributes that it sets are seen by it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import operator
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, field, fields, is_dataclass
+from enum import Enum
+from functools import cached_property
+from numbers import Real
+from typing import Any, TypeVar
+
+import numpy as np
+
+from seqopt._interrupts import answered
+from seqopt.arrays import FrozenValue, Ints
+from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, SolverError, said
+from seqopt.graph.layers.costs import LayeredCosts
+from seqopt.graph.layers.interface import PlacementProblem
+from seqopt.graph.scenarios import ScenarioLayers, largest_of
+from seqopt.plan.calling.formulation import (
+    WATCH,
+    End,
+    Finding,
+    Formulation,
+    Selection,
+    Watch,
+    as_formulation,
+    formulations,
+)
+from seqopt.plan.judge._infeasible import refusal
+from seqopt.plan.judge.certificate import least_sum
+from seqopt.problem.problem import Aim
+from seqopt.scene._checks import short
+
+Result = TypeVar("Result")
+
+
+def called(
+    name: str, judged: Callable[[], object], kind: type[Result], solve: Callable[[], object]
+) -> Result:
+    """Return what a formulation returns, if that is what it should be.
+
+    ``name``: of the formulation; ``judged``: returns what its answer is judged by; ``kind``: what
+    it has to return; ``solve``: calls it. Result: of that kind. Raises `SolverError` if it raises
+    anything but an error of seqopt or an interrupt, returns something else, or changes what it is
+    judged by.
+    """
+    with unchanged(name, judged):
+        try:
+            found = solve()
+        except (SeqoptError, MemoryError, KeyboardInterrupt):
+            raise
+        except BaseException as error:  # whatever a formulation of others may raise, exits too
+            raise SolverError(f"formulation {name} failed: {said(error)}") from error
+    if not isinstance(found, kind):
+        raise SolverError(
+            f"formulation {name} returned a {type(found).__name__}, not a {kind.__name__}"
+        )
+    return found
+
+
+@contextmanager
+def unchanged(name: str, judged: Callable[[], object]) -> Iterator[None]:
+    """Require that values stay what they are while a formulation works.
+
+    ``name``: of the formulation; ``judged``: returns them. Raises `SolverError` if one does not,
+    also where the formulation fails.
+    """
+    before = checksum(judged())
+    try:
+        yield
+    finally:
+        if checksum(judged()) != before:
+            raise SolverError(
+                f"formulation {name} changed the problem that it is judged by; make it use copies"
+            )
+
+
+@contextmanager
+def readable(name: str) -> Iterator[None]:
+    """Say that a formulation failed where what it returned cannot be read.
+
+    ``name``: of the formulation.
+    """
+    try:
+        yield
+    except (TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise SolverError(f"formulation {name} returned nonsense: {said(error)}") from error
+
+
+def text(given: object) -> str:
+    """Return a text if it is one; a `TypeError` says that it is none."""
+    if not isinstance(given, str):
+        raise TypeError(f"{type(given).__name__} where a text belongs")
+    return given
+
+
+def checksum(value: object) -> bytes:
+    """Return a checksum of a value: of its arrays, numbers, texts and fields, and of its methods.
+
+    Engines count as themselves, with the scene that they are for: what they keep may grow.
+    """
+    digest = hashlib.blake2b(digest_size=16)
+    _add(digest, value)
+    return digest.digest()
+
+
+def _add(digest: Any, value: object) -> None:
+    digest.update(type(value).__qualname__.encode())
+    if isinstance(value, np.ndarray):
+        some = value if any(value.strides) or not value.size else value.flat[:1]
+        digest.update(repr((value.dtype.str, value.shape)).encode())
+        digest.update(np.ascontiguousarray(some).view(np.uint8))
+    elif isinstance(value, str | bytes | int | float | complex | Enum | None):
+        digest.update(repr(value).encode())
+    elif isinstance(value, Mapping):
+        _add(digest, [*value.items()])
+    elif isinstance(value, tuple | list | set | frozenset):
+        for part in value if isinstance(value, tuple | list) else sorted(value, key=repr):
+            _add(digest, part)
+        digest.update(b"end")
+    elif hasattr(value, "network") and not is_dataclass(value):
+        digest.update(str(id(value)).encode())
+        _add(digest, [_shadowing(value), value.network.scene])
+    elif callable(value) and not is_dataclass(value):
+        digest.update(str(id(value)).encode())
+    else:
+        _add(digest, _parts(value))
+
+
+def _parts(value: object) -> list[object]:
+    """Return the fields of a value, and what its class and itself call under which names."""
+    methods = [(name, id(thing)) for k in type(value).__mro__ for name, thing in vars(k).items()]
+    held = getattr(value, "__dict__", {})
+    if is_dataclass(value):
+        own = {f.name for f in fields(value)}
+    else:
+        own = {n for n in held if not isinstance(getattr(type(value), n, None), cached_property)}
+    return [
+        [pair for pair in methods if not pair[0].startswith("__")],
+        [name for name in _shadowing(value) if name not in own],
+        *(getattr(value, name) for name in sorted(own)),
+    ]
+
+
+def _shadowing(value: object) -> list[str]:
+    """Return the methods of a value's class that it has under the same names itself."""
+    return [n for n in getattr(value, "__dict__", {}) if callable(getattr(type(value), n, None))]
+
+
+CLOSE = 1e-6  # over a value: how far a bound may be above it by rounding
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StatePath(FrozenValue):
+    """A free schedule, and what its formulation claims of it.
+
+    ``states``: after every step: how many bricks stand, then the node that each robot holds, as a
+    place in build order from 1; robots of one kind stand together, 0 for one that is free;
+    ``objective``: claimed value of every goal; ``bound``: claimed lower bound of every goal, those
+    before it being at their values; ``visited`` (tuple of (n, c) int): states that a better plan
+    could pass, by brick count, if the formulation knows them: the proof looks at these together,
+    and depends on them in nothing but its time; ``prices``: by goal, what a unit of every budget
+    and of every sum before it is worth: they prove the bounds where there are budgets; ``stopped``:
+    why the search ended before all was proven: ``time``, ``memory`` or ``interrupt``; empty if it
+    did not.
+    """
+
+    states: tuple[tuple[int, ...], ...]
+    objective: tuple[float, ...]
+    bound: tuple[float, ...]
+    visited: tuple[Ints, ...] = field(default=(), repr=False)
+    prices: tuple[tuple[float, ...], ...] = ()
+    stopped: str = ""
+
+
+def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
+    """Return a selection with numbers where numbers belong.
+
+    ``name``: of the formulation that made it; ``goals``: how many goals there are. Raises
+    `SolverError` if a number is none, or there are too few.
+    """
+    with readable(name):
+        states = tuple(tuple(operator.index(n) for n in state) for state in found.states)
+        objective, bound = (tuple(map(float, part)) for part in (found.objective, found.bound))
+        if not len(objective) == len(bound) == goals or not states:
+            raise ValueError(
+                f"{len(states)} states, {len(objective)} values and {len(bound)} bounds for "
+                f"{goals} goals"
+            )
+        if not all(b <= v + CLOSE * abs(v) for v, b in zip(objective, bound, strict=True)):
+            raise ValueError("a value or bound is NaN, or a bound is above its value")
+        visited = tuple(np.asarray(rows) for rows in found.visited)
+        prices = tuple(tuple(map(float, each)) for each in found.prices)
+        return StatePath(states, objective, bound, visited, prices, text(found.stopped))
+
+
+def require_fit(
+    problem: PlacementProblem, formulation: Formulation | str, options: Mapping[str, object]
+) -> None:
+    """Raise an error unless a formulation can solve a problem and has the given options.
+
+    Raises `ProblemError` if the problem has budgets that the formulation does not take, or an
+    option is not its own.
+    """
+    formulation = as_formulation(formulation)
+    if problem.budgets and not formulation.takes_budgets:
+        able = [name for name, other in formulations(formulation.on).items() if other.takes_budgets]
+        raise ProblemError(
+            f"{formulation.name}: the budget {problem.budgets[0].name!r} couples all moves; "
+            f"use {' or '.join(able)}"
+        )
+    for name in options:
+        if name not in formulation.options:
+            known = ", ".join(formulation.options) or "no options"
+            raise ProblemError(f"option {name}: {formulation.name} has {known}")
+
+
+def require_time(formulation: Formulation, time_limit: float) -> None:
+    """Raise an error unless a time limit is one, and the formulation can keep it.
+
+    ``time_limit``: s. Raises `ProblemError` if it is no time, or the formulation takes none.
+    """
+    if not isinstance(time_limit, Real) or not time_limit >= 0:
+        raise ProblemError(f"time_limit is {short(time_limit)}; give seconds from 0")
+    if np.isfinite(time_limit) and not formulation.watched:
+        raise ProblemError(f"{formulation.name} takes no time limit; leave it out")
+
+
+def require_proof(proof: object) -> None:
+    """Raise an error where a lazy search is to leave out the proof, which is all it is for.
+
+    Raises `ProblemError`.
+    """
+    if not proof:
+        raise ProblemError("a lazy search proves what it finds; leave out lazy, or ask for a proof")
+
+
+def select(
+    formulation: Formulation, problem: PlacementProblem, watch: Watch | None = None, **options: Any
+) -> Selection:
+    """Return the selection of a formulation, with numbers where numbers belong.
+
+    ``watch``: handed to the formulation if it takes one; the trace is read from it. An interrupt is
+    then told to it, so that the formulation ends with the best choice so far. ``**options``: of the
+    formulation. Result: claimed, not proven. Raises `ProblemError`, `SolverError` as the
+    formulation does; a `SolverError` also if it raises anything else, or returns something that is
+    no selection; `KeyboardInterrupt` if it was interrupted and no choice was at hand.
+    """
+    watch = watch or Watch()
+    ends = answered(watch.interrupt) if formulation.watched else nullcontext()
+    with ends, _infeasible_confirmed(problem, formulation):
+        return _with_numbers(formulation, _called(formulation, problem, watch, options), watch)
+
+
+def _called(
+    formulation: Formulation, problem: PlacementProblem, watch: Watch, options: dict[str, Any]
+) -> Selection:
+    """Return what a formulation returns, if that is a selection."""
+    told = {WATCH: watch} if formulation.watched else {}
+    try:
+        return called(
+            formulation.name,
+            lambda: (_costs(formulation, problem), problem.budgets),
+            Selection,
+            lambda: formulation.solve(problem, **told, **options),
+        )
+    except SolverError as error:
+        if watch.interrupted:
+            raise KeyboardInterrupt(str(error)) from error
+        raise
+
+
+def _costs(formulation: Formulation, problem: PlacementProblem) -> tuple[LayeredCosts, ...]:
+    """Return the costs that a formulation is given, of every scenario if totals over them count."""
+    if formulation.aim is not None:
+        return (formulation.aim.costs(problem),)
+    assert isinstance(problem, ScenarioLayers)  # what is for states has no such costs
+    return problem.layered(Aim.SUM)
+
+
+def _with_numbers(formulation: Formulation, found: Selection, watch: Watch) -> Selection:
+    """Return a selection with numbers where numbers belong, or raise a `SolverError`."""
+    with readable(formulation.name):
+        seconds = float(found.compile_seconds)
+        if not 0 <= seconds < np.inf:
+            raise ValueError(f"compile_seconds is {seconds}")
+        trace = _traced(watch, float(found.objective), float(found.bound))
+        return Selection(
+            choice=tuple(operator.index(index) for index in found.choice),
+            objective=float(found.objective),
+            bound=float(found.bound),
+            prices={str(name): float(price) for name, price in found.prices.items()},
+            compile_seconds=seconds,
+            end=End.INTERRUPTED if watch.interrupted else End(found.end),
+            trace=trace,
+        )
+
+
+def _traced(watch: Watch, objective: float, bound: float) -> tuple[Finding, ...]:
+    """Return what was told, ending with what is claimed."""
+    watch.tell(objective, bound)
+    return watch.trace
+
+
+@contextmanager
+def _infeasible_confirmed(problem: PlacementProblem, formulation: Formulation) -> Iterator[None]:
+    """Say why there is no choice where a formulation says that there is none, if that is so."""
+    try:
+        yield
+    except InfeasibleError as error:
+        every = _costs(formulation, problem)
+        costs = every[0] if formulation.aim is not None else largest_of(every)
+        if not np.isfinite(least_sum(costs)):
+            costs.continuable()  # names the move
+        if problem.budgets:
+            raise refusal(problem, formulation.name) from None
+        raise SolverError(
+            f"formulation {formulation.name} says that no choice is allowed, and some are: {error}"
+        ) from None

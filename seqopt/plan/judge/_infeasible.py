@@ -1,0 +1,262 @@
+"""Why a free schedule is impossible: the brick at which it stops, and what would help."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import combinations
+
+import numpy as np
+
+from seqopt.errors import InfeasibleError, SeqoptError, SolverError
+from seqopt.graph._explore import Explorer
+from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.interface import CostProblem, PlacementProblem
+from seqopt.graph.paths import distances, least_peak
+from seqopt.graph.states._visits import explore
+from seqopt.graph.states.states import States
+from seqopt.plan.judge._budget_proof import least_within
+from seqopt.plan.judge._proof import Proof
+from seqopt.plan.judge.certificate import least_sum
+from seqopt.plan.search._sturdiest import WORST, bisected, with_margin
+from seqopt.problem.problem import STATE_RESPONSES, Goal, Measure
+from seqopt.problem.standing import Standing
+from seqopt.sequence.rules import FreeRules, Payload
+from seqopt.sequence.schedule import Schedule
+
+PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none
+
+
+def smallest_conflict(problem: PlacementProblem) -> tuple[Budget, ...]:
+    """Return as few budgets as possible that no choice keeps together.
+
+    ``problem``: its sums say which choices are allowed. Result: empty if no set of budgets is
+    proven to conflict.
+    """
+    for count in range(1, len(problem.budgets) + 1):
+        for some in combinations(problem.budgets, count):
+            if _conflict(problem.sums, some):
+                return some
+    return ()
+
+
+def _conflict(costs: LayeredCosts, budgets: tuple[Budget, ...]) -> bool:
+    """Return whether it is proven that no allowed choice keeps all budgets."""
+    allowed = LayeredCosts(
+        *(
+            tuple(np.where(np.isfinite(part), 0.0, np.inf) for part in parts)
+            for parts in (costs.single, costs.shared)
+        )
+    )
+    return least_within(CostProblem(allowed, budgets), 1.0, {}, 1.0) >= PROVEN
+
+
+def _least_spent(costs: LayeredCosts, budget: Budget) -> float:
+    """Return the least that an allowed choice takes of a budget.
+
+    ``costs``: say which choices are allowed. Result: in its unit.
+    """
+    pairs = ((budget.single, costs.single), (budget.shared, costs.shared))
+    single, shared = (
+        tuple(np.where(np.isfinite(c), a, np.inf) for a, c in zip(amounts, parts, strict=True))
+        for amounts, parts in pairs
+    )
+    return least_sum(LayeredCosts(single, shared))
+
+
+def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
+    """Return the error that says which budgets no choice keeps, or that this is claimed alone.
+
+    ``problem``: some choice is allowed, and it is claimed that none is within all budgets;
+    ``name``: of the formulation that claims it.
+    """
+    found = smallest_conflict(problem)
+    if not found:
+        return InfeasibleError(
+            f"claimed by {name}, and not proven: no choice is within all budgets; raise a bound"
+        )
+    if len(found) == 1:
+        least = _least_spent(problem.sums, found[0])
+        return InfeasibleError(
+            f"no choice is within all budgets: every choice uses at least {least:.6g} of "
+            f"{found[0].name!r}, more than {found[0].bound:.6g}; raise that bound"
+        )
+    return InfeasibleError(
+        f"no choice is within all budgets: {_listed(found)} cannot be kept together, though "
+        f"{'each can alone' if len(found) == 2 else 'any fewer of them can'}; raise one of them"
+    )
+
+
+def _listed(budgets: Sequence[Budget]) -> str:
+    named = [f"{budget.bound:.6g} of {budget.name!r}" for budget in budgets]
+    return f"{', '.join(named[:-1])} and {named[-1]}"
+
+
+STEPS = (Goal(Measure.STEPS),)
+STANDING = "no requirement to stand"
+Look = Callable[[States], Explorer]
+
+
+class _LateError(Exception):
+    """Time is over."""
+
+
+def confirmed(problem: States, name: str, seconds: float = np.inf) -> SeqoptError:
+    """Return the error that says why no plan is allowed, once it is proven that none is.
+
+    ``name``: of the formulation that says so; ``seconds``: after which what is not proven is called
+    claimed, and no more help is sought. Result: the latter where a plan is allowed.
+    """
+    end, capped = time.perf_counter() + seconds, problem.goals[len(problem.aims) :]
+    steps = replace(_with_any_margin(problem), goals=(*STEPS, *capped))
+    try:
+        found = explore(steps, tell=partial(_in_time, end))
+        if found.whole and capped:
+            return _over_budget(steps, found, name)
+        if found.whole:
+            return SolverError(f"formulation {name} says that no plan is allowed, and some are")
+        hint = {level: rows for level, _, rows in found.graph().states}
+        proven = Proof(steps, hint).is_impossible()
+    except _LateError:
+        proven = False
+    bare = replace(problem, goals=problem.aims, budgets=())
+    why = _why_impossible(bare, end - time.perf_counter())
+    return InfeasibleError(why if proven else f"claimed by {name}, and not proven: {why}")
+
+
+def _over_budget(problem: States, found: Explorer, name: str) -> SeqoptError:
+    """Return the error that names what each budget needs at least, where plans exist without."""
+    graph, states = found.graph()
+    first = len(problem.goals) - len(problem.budgets)
+    words = []
+    for k, cap in enumerate(problem.budgets, start=first):
+        least = distances(graph, graph.amounts[:, k])[graph.ends].min()
+        words.append(f"{problem.goals[k]} is at least {least:.6g}, and {cap:g} is allowed")
+    proven = Proof(problem, {level: rows for level, _, rows in states}).is_impossible()
+    claim = "" if proven else f"claimed by {name}, and not proven: "
+    return InfeasibleError(
+        f"{claim}{problem.title}: no plan is within all budgets; {', '.join(words)}"
+    )
+
+
+def _with_any_margin(problem: States) -> States:
+    """Return a problem in which states must have the margins that are asked for, however little."""
+    for goal in problem.goals:
+        if goal.of_margins:
+            problem = with_margin(problem, goal.response, WORST[goal.response])
+    return problem
+
+
+def _in_time(end: float, _: Explorer) -> None:
+    if time.perf_counter() > end:
+        raise _LateError
+
+
+def _why_impossible(problem: States, seconds: float = np.inf) -> str:
+    """Return why no plan is allowed, in a line.
+
+    ``problem``: which has no plan; ``seconds``: after which it says what it found by then. Result:
+    naming the brick at which it stops and what opens a way: a rule to loosen, or how far a limit
+    has to be raised. An engine that has a ``rigid`` one leaves this to it: what is tried here may
+    be far beyond what joints carry, where discrete elements take seconds a state.
+    """
+    problem = replace(problem, engine=getattr(problem.engine, "rigid", problem.engine))
+    problem = _with_any_margin(problem)
+    look = partial(explore, tell=partial(_in_time, time.perf_counter() + seconds))
+    where = "no plan is allowed"
+    try:
+        where = _where(problem, look)
+        return f"{problem.title}: {where}{_what_helps(problem, look)}"
+    except _LateError:
+        return f"{problem.title}: {where}; time was over before it was known what helps, give more"
+
+
+def _where(problem: States, look: Look) -> str:
+    """Return where it stops."""
+    placed = problem.network.scene.placed
+    stops = look(replace(problem, goals=STEPS)).reached
+    if isinstance(problem.rules, Schedule):
+        return f"step {stops + 1} of {problem.space.levels} has no state that is allowed"
+    if stops < len(placed):
+        return f"brick {placed[stops].name} ({stops + 1} of {len(placed)}) is never placed"
+    return f"after brick {placed[-1].name} the build cannot end"
+
+
+def _what_helps(problem: States, look: Look) -> str:
+    """Return what opens a way, as the end of a line."""
+    ways = list(_opening(problem, look))
+    if not ways:
+        ways = [both] if (both := _pair(problem, look)) else []
+    if not ways:
+        return ", whatever two rules or limits are loosened; extend a reach or add a robot"
+    ways = [_enough(problem, way, look) for way in ways]
+    return f"; it becomes possible with {' or '.join(ways)}"
+
+
+def _opening(problem: States, look: Look) -> Iterator[str]:
+    """Yield rules, each loosened as little as is enough alone, and limits that alone are enough."""
+    problem = replace(problem, goals=STEPS)
+    done: set[str] = set()
+    for text, rules in _loosened(problem):
+        rule = text.partition("=")[0]
+        if rule not in done and look(replace(problem, rules=rules)).whole:
+            done.add(rule)
+            yield text
+    if problem.demands and look(replace(problem, standing=None, settled=())).whole:
+        yield STANDING
+    for limit in problem.limits:
+        rest = tuple(other for other in problem.limits if other is not limit)
+        if look(replace(problem, limits=rest)).whole:
+            yield limit.response
+
+
+def _loosened(problem: States) -> Iterator[tuple[str, FreeRules]]:
+    """Yield the rules that can be loosened: what stands is asked of robots with payloads."""
+    for text, rules in problem.rules.loosened() if isinstance(problem.rules, FreeRules) else ():
+        if not problem.demands or rules.payload is Payload.KEPT:
+            yield text, rules
+
+
+def _pair(problem: States, look: Look) -> str:
+    """Return the first two that open a way together: rules, or a rule and a limit; or nothing."""
+    for text, rules in _loosened(problem):
+        other = next(_opening(replace(problem, rules=rules), look), "")
+        if other:
+            return f"{text} together with {other}"
+    return ""
+
+
+def _enough(problem: States, way: str, look: Look) -> str:
+    """Return how far a limit has to be raised, where it is a limit that is loosened."""
+    if way == STANDING and not any(demand.tilt for demand in problem.demands):
+        own, bare = problem.standing or Standing(), replace(problem, settled=(), goals=STEPS)
+
+        def exists(bond: float) -> bool:
+            return look(replace(bare, standing=own.demanding("bond", bond))).whole
+
+        try:
+            enough = bisected("bond", exists)[1]
+        except InfeasibleError:
+            return way
+        digit = 10.0 ** (math.floor(math.log10(enough)) - 2) if enough else 1.0
+        return f"a bond of {math.ceil(enough / digit) * digit:.10g} Pa"
+    found = [limit for limit in problem.limits if limit.response == way]
+    if not found or way not in STATE_RESPONSES:
+        return f"no limit on {way}" if found else way
+    rest = tuple(limit for limit in problem.limits if limit.response != way)
+    least = worst_least(replace(problem, limits=rest), way, look)
+    return f"{way}={least:.6g} instead of {found[0].bound:g}"
+
+
+def worst_least(problem: States, response: str, look: Look = explore) -> float:
+    """Return the least worst value of a response that a plan within the other limits reaches.
+
+    ``response``: one of `seqopt.problem.problem.STATE_RESPONSES`, or ``bond``; ``look``:
+    returns the states that a problem's plans may pass. Result: SI units; infinite if there is no
+    plan.
+    """
+    found = look(replace(problem, goals=(Goal(Measure.PEAK, response),)))
+    return least_peak(found.graph().graph, 0) if found.whole else np.inf

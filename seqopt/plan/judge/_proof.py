@@ -1,0 +1,414 @@
+"""The proof that no free schedule is better: a graph of its own, and what no path stays below.
+
+The graph is built anew by a second version of the rules, with responses that the engine computes
+again. Which states a search visited may be told, so that many are looked at together; states that
+this leaves out are found all the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import InfeasibleError
+from seqopt.graph._budgets import budget_bounds, is_beyond
+from seqopt.graph.duality import lexicographic_bounds
+from seqopt.graph.graph import Graph
+from seqopt.graph.paths import lexicographic, reached, tied
+from seqopt.graph.states._visits import move_amounts
+from seqopt.graph.states.states import States
+from seqopt.plan.judge._rule_moves import Follows, RuleTables, ScheduleTables
+from seqopt.plan.judge._standing_proof import StandingProof
+from seqopt.problem.problem import LARGEST, Goal, Measure
+from seqopt.problem.requirements import LIMIT_TOLERANCE, state_costs
+from seqopt.responses._blocks import Block
+from seqopt.responses._grip_sets import KnownRows, solve_sets
+from seqopt.sequence._rule_check import RuleBook
+from seqopt.sequence.rules import Payload
+from seqopt.sequence.schedule import Schedule
+
+
+class Answers(NamedTuple):
+    """What is known of grip sets.
+
+    ``worth`` (S, g): what every goal takes of them; zero of one that is about moves or margins;
+    ``forces`` (S, r): of their grips, N; ``fit`` (S,): which hang together and are within all
+    limits.
+    """
+
+    worth: Floats
+    forces: Floats
+    fit: Bools
+
+
+def ask(problem: States, bricks: int, grips: Ints, most: float = np.inf) -> Answers:
+    """Return what is known about grip sets, computed again by the engine.
+
+    ``grips`` (S, r): nodes held; ``most``: over scenarios, what the first goal takes more of in one
+    is not asked of the next.
+    """
+    if problem.each:
+        return _worst(problem, bricks, grips, most)
+    return _asked(problem, bricks, grips)
+
+
+def _worst(problem: States, bricks: int, grips: Ints, most: float) -> Answers:
+    """Return the largest of all scenarios, of what is passed by those before."""
+    out = np.zeros((len(grips), len(problem.goals)))
+    forces, fit = np.zeros(grips.shape), np.ones(len(grips), dtype=bool)
+    for number, each in enumerate(problem.each):
+        rows = np.flatnonzero(fit & (out[:, 0] <= most))
+        found = ask(each, bricks, grips[rows])
+        out[rows] = problem.joined(out[rows], found.worth, number)
+        forces[rows], fit[rows] = np.maximum(forces[rows], found.forces), found.fit
+    return Answers(out, forces, fit)
+
+
+def _asked(problem: States, bricks: int, grips: Ints) -> Answers:
+    """Return the same of one scenario; nothing that is kept anywhere is believed."""
+    names = tuple(name for name in problem.named if name != LARGEST)
+    block = Block(bricks, grips, names, screen=False)
+    rows = solve_sets(problem.engine, block, problem.resources)
+    found, forces = dict(zip(names, rows.T, strict=False)), rows[:, len(names) :]
+    found[LARGEST] = forces.max(axis=1, initial=0.0)
+    fit = np.asarray(np.isfinite(rows).all(axis=1))
+    for limit in problem.limits:
+        fit &= ~limit.exceeded(found.get(limit.response, np.zeros(len(grips))))
+    worth = np.column_stack([_costs(problem, goal, found, bricks, fit) for goal in problem.goals])
+    return Answers(worth, forces, fit & np.isfinite(worth).all(axis=1))
+
+
+def _costs(
+    problem: States, goal: Goal, found: dict[str, Floats], bricks: int, fit: Bools
+) -> Floats:
+    if goal.response and not goal.of_margins:
+        return found[goal.response]
+    if goal.of_states and not goal.of_margins:
+        return state_costs(problem.criterion, found, bricks, fit)
+    return np.zeros(len(fit))
+
+
+Tables: TypeAlias = RuleTables | ScheduleTables
+"""What rules or a schedule allow, level by level."""
+
+
+class Asked(NamedTuple):
+    """What states must keep to.
+
+    ``values``: of goals; the first that is about no margin bounds states, if it is about a worst
+    step; ``margins``: with which states must stand, as is demanded and by the first goals; None
+    does not ask.
+    """
+
+    values: Sequence[float] = ()
+    margins: Sequence[float] | None = None
+
+
+class Closed(NamedTuple):
+    """States of one level that may be passed.
+
+    ``codes`` (n,); ``states`` (n, c); ``values`` (n, g): what goals take of them; ``follows``: what
+    the rules allow after them, by rows of these states.
+    """
+
+    codes: Ints
+    states: Ints
+    values: Floats
+    follows: list[Follows]
+
+
+class Passable:
+    """Which states may be passed, with responses that the engine computes again.
+
+    ``fallen`` (dict of int to (n,) int): codes of states that are proven to fall, by brick count;
+    ``margins``: how many goals are about margins; they come first.
+    """
+
+    def __init__(self, problem: States) -> None:
+        self.problem = problem
+        most, own = _loads(problem, stand=False), _loads(problem, stand=True)
+        self.tables = _tables(problem, most)
+        self.fallen: dict[int, Ints] = {}
+        self.stands = StandingProof(problem, own)
+        self._most = np.array([most[r] for r in self.tables.team])
+        self._payload = np.array([own[r] for r in self.tables.team])
+        self._known = KnownRows()
+        self.margins = sum(goal.of_margins for goal in problem.goals)
+
+    def least(self) -> tuple[float, ...]:
+        """Return what goals take at least of any plan, for its end and the count of its steps.
+
+        Every move to the one end that builds have is a cut. Minus infinity where nothing is known.
+        """
+        goals, tables = self.problem.goals, self.tables
+        end, counted = tables.only_end(), float(tables.least_steps())
+        last = np.full((1, len(goals)), -np.inf)
+        if end is not None:
+            last = self._answers(tables.bricks_at(tables.last), end, np.inf)[0]
+        known = {Measure.PEAK: last[0], Measure.STEPS: np.full(len(goals), counted)}
+        none = np.full(len(goals), -np.inf)
+        return tuple(float(known.get(goal.measure, none)[k]) for k, goal in enumerate(goals))
+
+    def closed(self, level: int, entries: Ints, asked: Asked) -> Closed:
+        """Return the states that are reached from some without placing a brick.
+
+        ``entries`` (n, c): some of them perhaps more than once; ``asked``: as of `valued`, which
+        says which ones may be passed.
+        """
+        seen, count, fresh = np.zeros(0, dtype=np.int64), 0, entries
+        parts = [Closed(seen, entries[:0], np.zeros((0, len(self.problem.goals))), [])]
+        while len(fresh):
+            own, at = np.unique(self.tables.codes(fresh), return_index=True)
+            new = ~np.isin(own, seen, assume_unique=True)
+            seen, rows = np.concatenate([seen, own[new]]), fresh[at[new]]
+            values, ok = self.valued(level, rows, asked)
+            follows = [
+                move._replace(source=move.source + count)
+                for move in self.tables.follow(level, rows[ok])
+            ]
+            parts.append(Closed(own[new][ok], rows[ok], values[ok], follows))
+            count += int(ok.sum())
+            inner = [move.states for move in follows if move.level == level]
+            fresh = np.concatenate([entries[:0], *inner])
+        return Closed(
+            np.concatenate([part.codes for part in parts]),
+            np.concatenate([part.states for part in parts]),
+            np.concatenate([part.values for part in parts]),
+            [move for part in parts for move in part.follows],
+        )
+
+    def valued(self, level: int, states: Ints, asked: Asked) -> tuple[Floats, Bools]:
+        """Return what goals take of states, and which ones a better plan could pass.
+
+        ``states`` (n, c). Results: ``values`` (n, g); ``ok`` (n,).
+        """
+        goals = self.problem.goals
+        if not level:
+            return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
+        held, payload = self._held(states, self._most)
+        most, margins = asked
+        k = self.margins
+        below = np.inf
+        if len(most) > k and goals[k].measure is Measure.PEAK:
+            below = tied(most[k])
+        values, forces, ok = self._answers(self.tables.bricks_at(level), held, below)
+        ok &= (forces <= payload).all(axis=1) & (values[:, k : k + 1] <= below).all(axis=1)
+        if level in self.fallen:
+            ok &= ~np.isin(self.tables.codes(states), self.fallen[level])
+        if margins is not None:
+            ok[ok] = self.may_stand(level, states[ok], margins)
+        return values, ok
+
+    def _held(self, states: Ints, most: Floats) -> tuple[Ints, Floats]:
+        """Return nodes held, ascending, and the most that those may carry who hold them, (n, r)."""
+        grips = states[:, : self.tables.robots].clip(min=0)
+        order = np.argsort(grips, axis=1, kind="stable")
+        return np.take_along_axis(grips, order, axis=1), most[order]
+
+    def may_stand(self, level: int, states: Ints, margins: Sequence[float]) -> Bools:
+        """Return which states (n, c) are not proven to fall, or to lack margins of first goals."""
+        held = self._held(states, self._payload)
+        return self.stands.allows_rows(self.tables.bricks_at(level), *held, margins)
+
+    def _answers(self, bricks: int, held: Ints, below: float) -> tuple[Floats, Floats, Bools]:
+        """Return values, forces of grips and what is within limits, of rows of nodes held.
+
+        Over scenarios they are those of the first that exceeds a value of the first goal.
+        """
+        below = np.inf if self.margins else below
+        goals, robots = len(self.problem.goals), held.shape[1]
+        out = np.zeros((len(held), goals + robots + 1))
+        count = np.count_nonzero(held, axis=1)
+        for taken in np.unique(count).tolist():
+            rows = np.flatnonzero(count == taken)
+            nodes = held[rows, robots - taken :]
+            codes = nodes @ len(self.tables.nodes) ** np.arange(taken)
+
+            def compute(new: Ints, nodes: Ints = nodes) -> Floats:
+                found = ask(self.problem, bricks, self.tables.nodes[nodes[new]], below)
+                return np.column_stack([found.worth, found.forces, found.fit])
+
+            found = self._known.of((bricks, taken, below), codes, compute)
+            out[rows, :goals] = found[:, :goals]
+            out[rows, goals + robots - taken :] = found[:, goals:]
+        return out[:, :goals], out[:, goals:-1], out[:, -1] > 0
+
+    def moved(self, values: Floats, found: Follows) -> Floats:
+        """Return what goals take of moves to states with such values, (m, g)."""
+        taken = np.column_stack([np.full(len(found.way), float(found.regrip)), found.way])
+        return move_amounts(self.problem, values, taken)
+
+
+def _alike(book: RuleBook, most: Mapping[int, float]) -> list[tuple[int, ...]]:
+    """Return the robots that could change places, group by group."""
+    scene, last = book.network.scene, len(book.network.inner)
+    groups: dict[object, list[int]] = {}
+    for r in book.team:
+        may = not book.rules.placers or scene.robots[r].name in book.rules.placers
+        nodes = [book.newest_nodes[r, b] for b in range(1, last + 1)]
+        key = (book.reached[r, last], tuple(nodes), may, most[r])
+        groups.setdefault(key, []).append(r)
+    return [tuple(group) for group in groups.values() if len(group) > 1]
+
+
+def _tables(problem: States, most: Mapping[int, float]) -> Tables:
+    """Return what rules or a schedule allow."""
+    parks = any(goal.measure is Measure.TRAVEL for goal in problem.goals)
+    if isinstance(problem.rules, Schedule):
+        return ScheduleTables(problem.rules, problem.network, parks=parks)
+    book = RuleBook(problem.network, problem.rules)
+    return RuleTables(book, _alike(book, most), parks=parks)
+
+
+def _loads(problem: States, *, stand: bool) -> dict[int, float]:
+    """Return the most that every robot of the scene may carry, or has to hold with, N."""
+    out, rules = {}, problem.rules
+    kept = stand if isinstance(rules, Schedule) else rules.payload is Payload.KEPT
+    for r, robot in enumerate(problem.network.scene.robots):
+        cap = min(robot.payload if kept else np.inf, problem.caps.get(robot.name, np.inf))
+        out[r] = cap * (1 + LIMIT_TOLERANCE)
+    return out
+
+
+BELOW = 1e-9  # by how much a plan must be better, over the size of the value
+Hint = Mapping[int, Ints]  # states that a search visited, by brick count
+
+
+class Proof:
+    """What no free schedule stays below, by independent rules and new responses.
+
+    ``hint`` (mapping of int to (n, c) int): states that are likely to be passed, by brick count, as
+    of `seqopt.sequence._rule_space.FreeSpace`; only time depends on them; ``states``: how many
+    states a better plan could pass.
+    """
+
+    def __init__(self, problem: States, hint: Hint | None = None) -> None:
+        self._passable = Passable(problem)
+        self._told = {} if hint is None else _rows(problem, self._passable, hint)
+        self.states = 0
+
+    def bounds(self, values: Sequence[float]) -> tuple[float, ...]:
+        """Return what no plan stays below in every goal, those before it being at their values.
+
+        ``values``: of every goal; what is said of margins of stability means nothing. Result:
+        infinite where there is no plan.
+        """
+        least = self._passable.least()
+        if self._is_better(values, least) is None:
+            self.states = 1  # a cut before the end alone
+            return least
+        while True:
+            levels = _Levels(self._passable, self._told, Asked(values))
+            self.states = sum(map(len, levels.states))
+            graph = levels.graph()
+            out = lexicographic_bounds(graph, values)
+            if self._is_better(values, out) is None or not self._fall(levels, graph, values):
+                return out
+
+    def budget_bounds(
+        self, values: Sequence[float], claimed: Sequence[float], prices: Sequence[Sequence[float]]
+    ) -> tuple[float, ...]:
+        """Return the same for plans within budgets, by prices that a formulation gives."""
+        caps = self._passable.problem.budgets
+        levels = _Levels(self._passable, self._told, Asked(values))
+        self.states = sum(map(len, levels.states))
+        return budget_bounds(levels.graph(), values, claimed, (caps, prices))
+
+    def is_impossible(self, margins: Sequence[float] = ()) -> bool:
+        """Return whether no plan is allowed, or none in which all states have such margins.
+
+        States must stand if that is demanded.
+
+        ``margins``: of the first goals.
+        """
+        graph = _Levels(self._passable, self._told, Asked((), margins)).graph()
+        self.states = max(self.states, graph.states)
+        caps = self._passable.problem.budgets
+        return is_beyond(graph, caps) if caps else not graph.ends[reached(graph)].any()
+
+    def _is_better(self, values: Sequence[float], bounds: Sequence[float]) -> int | None:
+        """Return the first goal whose bound leaves room for a better plan; None if none does."""
+        for k in range(self._passable.margins, len(values)):
+            if not bounds[k] >= values[k] - BELOW * abs(values[k]):
+                return k
+        return None
+
+    def _fall(self, levels: _Levels, graph: Graph, values: Sequence[float]) -> bool:
+        """Return whether a state on a path that would be better is proven to fall."""
+        passable = self._passable
+        margins = values[: passable.margins]
+        if not passable.stands.asked(margins):
+            return False
+        try:
+            path = np.array(lexicographic(graph).path)
+        except InfeasibleError:
+            return False
+        first, found = 0, False
+        for level, rows in enumerate(levels.states):
+            own = rows[path[(path >= first) & (path < first + len(rows))] - first]
+            fall = own[~passable.may_stand(level, own, margins)] if level else own[:0]
+            before = passable.fallen.get(level, np.zeros(0, dtype=np.int64))
+            passable.fallen[level] = np.concatenate([before, passable.tables.codes(fall)])
+            first, found = first + len(rows), found or len(fall) > 0
+        return found
+
+
+class _Levels:
+    """The states that a better plan could pass, level by level, and the moves between them."""
+
+    def __init__(self, passable: Passable, told: Mapping[int, Ints], asked: Asked) -> None:
+        self._passable, self._asked = passable, asked
+        self.states: list[Ints] = []
+        self._moves: list[tuple[Ints, Ints, Floats]] = []
+        self._ends: list[Bools] = []
+        self._count = 0
+        coming: list[tuple[Ints, Follows]] = []
+        fresh = start = passable.tables.start()
+        for level in range(passable.tables.last + 1):
+            entries = np.concatenate([fresh, told.get(level, start[:0])])
+            coming = self._close(level, entries, coming)
+            fresh = np.concatenate([start[:0], *(move.states for _, move in coming)])
+
+    def _close(
+        self, level: int, entries: Ints, coming: list[tuple[Ints, Follows]]
+    ) -> list[tuple[Ints, Follows]]:
+        """Add the states of a level; return the moves that place the next one."""
+        part, tables = self._passable.closed(level, entries, self._asked), self._passable.tables
+        moves = [(follows.source + self._count, follows) for follows in part.follows]
+        order = np.argsort(part.codes, kind="stable")
+        for source, move in [*coming, *(pair for pair in moves if pair[1].level == level)]:
+            wanted = tables.codes(move.states)
+            at = np.searchsorted(part.codes, wanted, sorter=order)
+            kept = at < len(part.codes)
+            kept[kept] = part.codes[order[at[kept]]] == wanted[kept]
+            target = order[at[kept]]
+            taken = move._replace(way=move.way[kept])
+            amounts = self._passable.moved(part.values[target], taken)
+            self._moves.append((source[kept], self._count + target, amounts))
+        self._count += len(part.states)
+        self.states.append(part.states)
+        self._ends.append(tables.ends(level, part.states))
+        return [pair for pair in moves if pair[1].level > level]
+
+    def graph(self) -> Graph:
+        """Return them as a graph; the moves are then used up."""
+        source, target, amounts = map(np.concatenate, zip(*self._moves, strict=True))
+        self._moves.clear()
+        peaks = tuple(goal.measure is Measure.PEAK for goal in self._passable.problem.goals)
+        rows = source.astype(np.int32), target.astype(np.int32)
+        return Graph(*rows, amounts, peaks, np.concatenate(self._ends))
+
+
+def _rows(problem: States, passable: Passable, hint: Hint) -> dict[int, Ints]:
+    """Return states of a search as rows of the tables, by brick count."""
+    tables, columns = passable.tables, [r for kind in problem.space.kinds for r in kind.robots]
+    order = [columns.index(r) for r in tables.team]
+    return {
+        bricks: tables.in_order(
+            rows[:, [*order, *range(len(order), rows.shape[1])]].astype(tables.start().dtype)
+        )
+        for bricks, rows in hint.items()
+    }

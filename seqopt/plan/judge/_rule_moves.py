@@ -1,0 +1,347 @@
+"""What may follow from many states of a free schedule at once, looked up in a book of rules.
+
+The book says in plain words which nodes a robot may hold and what a state must keep to; here its
+words are tables. A state is a row: the place in build order of the node that each robot of the team
+holds, from 1, zero for a robot that is free, or where travel counts the place that it held last
+with a minus; then how many grips were taken since the last brick where that counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import StepError
+from seqopt.network.network import Network
+from seqopt.sequence._rule_check import RuleBook
+from seqopt.sequence.rules import Ending, Newest
+from seqopt.sequence.schedule import Hold, OpenGrip, Schedule, holds, islands
+from seqopt.sequence.steps import Step, StepKind
+
+PAIRS = 1_000_000  # of states and places that are looked at together
+
+
+class Follows(NamedTuple):
+    """What follows from states by steps of one kind.
+
+    ``level``: how many bricks stand then, or steps of a schedule were taken; ``source`` (m,): the
+    row of the state before; ``states`` (m, c): some of them more than once; ``regrip``: whether a
+    grip is taken on a brick that stands; ``way`` (m,): how far the robot goes that takes a grip, m.
+    """
+
+    level: int
+    source: Ints
+    states: Ints
+    regrip: bool
+    way: Floats
+
+
+class _Places(NamedTuple):
+    """Places that count with so many bricks: lists by robot, and rows over places."""
+
+    reach: list[list[int]]  # that robots may take hold of
+    newest: list[list[int]]  # at which they hold the newest brick
+    holds: Bools  # the same as rows
+    parts: list[Bools]  # of bricks that nothing ties to the ground
+
+
+class RuleTables:
+    """A book of rules for many states at once.
+
+    ``groups``: robots that could change places, by their indices: of these the entries are sorted;
+    ``parks``: whether it counts where a free robot was last.
+    """
+
+    def __init__(
+        self, book: RuleBook, groups: Sequence[tuple[int, ...]], *, parks: bool = False
+    ) -> None:
+        self._rules, placed = book.rules, book.network.scene.placed
+        self.last, self._parks = len(placed), parks
+        at = [brick.node_position(node) for brick in placed for node in brick.nodes]
+        self._at = np.array([[np.nan] * 3, *at])
+        self.nodes = np.array([-1, *(node for brick in placed for node in brick.nodes)])
+        place = {node: i for i, node in enumerate(self.nodes.tolist())}
+        self._groups = [[book.team.index(r) for r in group] for group in groups]
+        names = [book.network.scene.robots[r].name for r in book.team]
+        self._able = [not self._rules.placers or name in self._rules.placers for name in names]
+        self._book, self._place = book, place
+        self._known: dict[int, _Places] = {}
+
+    def _of(self, bricks: int) -> _Places:
+        """Return the places that count with so many bricks, looked up once."""
+        if bricks not in self._known:
+            book, robots = self._book, range(self.robots)
+            reach = [[self._place[n] for n in book.takes[r, bricks]] for r in book.team]
+            newest = [
+                [self._place[n] for n in (book.newest_nodes[r, bricks] if bricks else ())]
+                for r in book.team
+            ]
+            holds = np.zeros((self.robots, len(self.nodes)), dtype=bool)
+            for robot in robots:
+                holds[robot, newest[robot]] = True
+            owner, parts = book.network.scene.brick_of_node, []
+            for part in islands(book.network, bricks) if bricks else ():
+                own = [n >= 0 and owner[n].name in part for n in self.nodes.tolist()]
+                parts.append(np.array(own))
+            self._known[bricks] = _Places(reach, newest, holds, parts)
+        return self._known[bricks]
+
+    @property
+    def team(self) -> tuple[int, ...]:
+        """Indices of the robots of the columns."""
+        return self._book.team
+
+    @property
+    def robots(self) -> int:
+        """How many robots take part."""
+        return len(self._able)
+
+    def start(self) -> Ints:
+        """Return the state before the first brick.
+
+        Result (1, c).
+        """
+        columns = self.robots + (self._rules.regrips is not None)
+        return np.zeros((1, columns), dtype=np.int32)
+
+    def bricks_at(self, level: int) -> int:
+        """Return how many bricks stand on a level."""
+        return level
+
+    def follow(self, bricks: int, states: Ints) -> Iterator[Follows]:
+        """Yield what follows from states (n, c) by one step each, of those that the rules allow."""
+        rows = np.arange(len(states))
+        keeps = rows[self.keep(bricks, states)] if bricks else rows
+        able = keeps
+        if bricks and self._rules.regrips is not None:
+            able = able[states[able, -1] < self._rules.regrips]
+        for robot in self._takers() if bricks else ():
+            source, after, way = self._taken(states, able, robot, self._of(bricks).reach[robot])
+            after[:, self.robots :] += 1
+            yield Follows(bricks, source, self.in_order(after), regrip=True, way=way)
+        for source, after in self._released(bricks, states):
+            none = np.zeros(len(source))
+            yield Follows(bricks, source, self.in_order(after), regrip=False, way=none)
+        if bricks == self.last:
+            return
+        for robot in self._takers():
+            if self._able[robot]:
+                newest = self._of(bricks + 1).newest[robot]
+                source, after, way = self._taken(states, keeps, robot, newest)
+                after[:, self.robots :] = 0
+                ok = self.keep(bricks + 1, after)
+                placed = self.in_order(after[ok])
+                yield Follows(bricks + 1, source[ok], placed, regrip=False, way=way[ok])
+
+    def _taken(
+        self, states: Ints, rows: Ints, robot: int, places: Sequence[int]
+    ) -> tuple[Ints, Ints, Floats]:
+        """Return what follows where a free robot took one of the places that nobody holds."""
+        free = rows[states[rows, robot] <= 0]
+        wanted, step = np.array(places, dtype=np.int64), max(1, PAIRS // max(1, len(places)))
+        parts = [(free[:0], states[:0], np.zeros(0))]
+        for start in range(0, len(free) if len(wanted) else 0, step):
+            block = free[start : start + step]
+            held = states[block, : self.robots, None] == wanted
+            row, at = np.nonzero(~held.any(axis=1))
+            source, after = block[row], states[block[row]]
+            way = np.zeros(len(row))
+            if self._parks:  # who held nothing yet comes from nowhere: that is no way
+                between = self._at[-after[:, robot]] - self._at[wanted[at]]
+                way = np.nan_to_num(np.linalg.norm(between, axis=1))
+            after[:, robot] = wanted[at]
+            parts.append((source, after, way))
+        source, after, way = map(np.concatenate, zip(*parts, strict=True))
+        return source, after, way
+
+    def _takers(self) -> Iterator[int]:
+        """Yield the robots of which one could take a grip: of a group the last, if it is free."""
+        first = {robot for group in self._groups for robot in group[:-1] if not self._parks}
+        yield from (robot for robot in range(self.robots) if robot not in first)
+
+    def _released(self, bricks: int, states: Ints) -> Iterator[tuple[Ints, Ints]]:
+        """Yield the states after one robot let go, or at the end all, and those before."""
+        ending = self._rules.ending
+        for robot in range(self.robots):
+            source = np.flatnonzero(states[:, robot] > 0)
+            after = states[source]
+            after[:, robot] = -after[:, robot] if self._parks else 0
+            if not (bricks == self.last and ending is Ending.ONE_BY_ONE):
+                ok = self.keep(bricks, after)
+                source, after = source[ok], after[ok]
+            yield source, after
+        if bricks == self.last and ending is Ending.RELEASED:
+            source = np.flatnonzero((states[:, : self.robots] > 0).any(axis=1))
+            after = states[source]
+            after[:, : self.robots] = 0
+            yield source, after
+
+    def only_end(self) -> Ints | None:
+        """Return the places held (1, robots) in the one state that ends builds, if it is one."""
+        held = self._rules.ending is Ending.HELD
+        return None if held else np.zeros((1, self.robots), dtype=np.int64)
+
+    def least_steps(self) -> int:
+        """Return how many steps a build has at least.
+
+        Each brick is placed by a robot that is free, so that others let go before, one in a step,
+        of all that it is not holding at the end: there they let go together, one by one or never.
+        """
+        together = self._rules.ending is not Ending.ONE_BY_ONE
+        kept = min(self.robots, self.last) if together else 0
+        return 2 * self.last - kept + (self._rules.ending is Ending.RELEASED)
+
+    def keep(self, bricks: int, states: Ints) -> Bools:
+        """Return which states (n, c) keep the rules as long as the build goes on, from 1 brick."""
+        grips = states[:, : self.robots].clip(min=0)
+        ok = np.ones(len(states), dtype=bool)
+        if bricks > 1:
+            ok &= np.count_nonzero(grips, axis=1) >= self._rules.least_grips
+        if self._rules.newest is not Newest.FREE:
+            ok &= self._of(bricks).holds[np.arange(self.robots), grips].any(axis=1)
+        for part in self._of(bricks).parts:
+            ok &= part[grips].any(axis=1)
+        return ok
+
+    def ends(self, bricks: int, states: Ints) -> Bools:
+        """Return which states (n, c) end the build."""
+        if bricks < self.last:
+            return np.zeros(len(states), dtype=bool)
+        if self._rules.ending is Ending.HELD:
+            return self.keep(bricks, states)
+        return np.asarray(~(states[:, : self.robots] > 0).any(axis=1))
+
+    def codes(self, states: Ints) -> Ints:
+        """Return a number for every state (n, c) that no other one of its brick count has."""
+        shift = len(self.nodes) if self._parks else 0
+        bases = [len(self.nodes) + shift] * self.robots + [2 + (self._rules.regrips or 0)]
+        weights = np.cumprod([1, *bases[: states.shape[1] - 1]], dtype=np.int64)
+        return np.asarray(states @ weights + shift * weights[: self.robots].sum())
+
+    def in_order(self, states: Ints) -> Ints:
+        """Sort the entries of robots that could change places in states (n, c); return these."""
+        for group in self._groups:
+            states[:, group] = np.sort(states[:, group], axis=1)[:, ::-1]
+        return states
+
+
+class ScheduleTables:
+    """The holds of a schedule for many states at once.
+
+    ``parks``: whether it counts where a free robot was last.
+    """
+
+    def __init__(self, schedule: Schedule, network: Network, *, parks: bool = False) -> None:
+        scene = network.scene
+        self._schedule, self._parks = schedule, parks
+        self.last, self.robots = len(schedule.steps), len(scene.robots)
+        self.team = tuple(range(self.robots))
+        self.nodes = np.array([-1, *(node for brick in scene.placed for node in brick.nodes)])
+        at = [scene.node_position(node) for node in self.nodes[1:].tolist()]
+        self._at = np.array([[np.nan] * 3, *at])
+        self._place = {node: i for i, node in enumerate(self.nodes.tolist())}
+        self._holds = {
+            (hold.robot, number): hold
+            for hold in holds(scene, schedule.steps)
+            for number in range(hold.first, hold.last + 1)
+        }
+
+    def start(self) -> Ints:
+        """Return the state before the first step, (1, robots) int."""
+        return np.zeros((1, self.robots), dtype=np.int32)
+
+    def bricks_at(self, level: int) -> int:
+        """Return how many bricks stand after so many steps."""
+        return max((step.bricks for step in self._schedule.steps[:level]), default=0)
+
+    def follow(self, level: int, states: Ints) -> Iterator[Follows]:
+        """Yield what follows from states (n, robots) by the next step, if there is one."""
+        if level == self.last:
+            return
+        source, after, way = np.arange(len(states)), states, np.zeros(len(states))
+        for robot in range(self.robots):
+            source, after, way = self._moved(robot, level + 1, (source, after, way))
+        regrip = self._schedule.steps[level].kind is StepKind.REPOSITION
+        yield Follows(level + 1, source, after, regrip=regrip, way=way)
+
+    def _moved(
+        self, robot: int, number: int, rows: tuple[Ints, Ints, Floats]
+    ) -> tuple[Ints, Ints, Floats]:
+        """Return rows in which a robot does what it does in a step, after those before it."""
+        source, states, way = rows
+        hold = self._holds.get((robot, number))
+        if hold is not None and hold.first < number:
+            return rows
+        out = states.copy()
+        if hold is None:
+            out[:, robot] = -np.abs(states[:, robot]) if self._parks else 0
+            return source, out, way
+        wanted = self._wanted(hold)
+        others = self._held_by_others(states, robot, number)
+        row, at = np.nonzero(~(others[:, :, None] == wanted).any(axis=1))
+        source, out, way = source[row], states[row], way[row]
+        if self._parks:
+            between = self._at[np.abs(out[:, robot])] - self._at[wanted[at]]
+            way = way + np.nan_to_num(np.linalg.norm(between, axis=1))
+        out[:, robot] = wanted[at]
+        return source, out, way
+
+    def _held_by_others(self, states: Ints, robot: int, number: int) -> Ints:
+        """Return what others hold in a step already: those before it, and who goes on holding."""
+        out = np.delete(states, robot, axis=1)
+        for column, other in enumerate(r for r in range(self.robots) if r != robot):
+            hold = self._holds.get((other, number))
+            if hold is None or (other > robot and hold.first == number):
+                out[:, column] = 0
+        return out
+
+    def _wanted(self, hold: Hold) -> Ints:
+        """Return the places that a hold may take."""
+        nodes = (hold.node,) if hold.move is None else self._schedule.moves[hold.move].candidates
+        return np.array([self._place[node] for node in nodes if node is not None], dtype=np.int64)
+
+    def only_end(self) -> Ints | None:
+        """Return the places held (1, robots) in the last step, if all builds end alike."""
+        fixed = all(grip is None for grip in self._schedule.steps[-1].grips)
+        return np.zeros((1, self.robots), dtype=np.int64) if fixed else None
+
+    def least_steps(self) -> int:
+        """Return how many steps a build has."""
+        return self.last
+
+    def ends(self, level: int, states: Ints) -> Bools:
+        """Return which states (n, robots) end the build: all after the last step."""
+        return np.full(len(states), level == self.last)
+
+    def codes(self, states: Ints) -> Ints:
+        """Return a number for every state that no other one of its step has, (n,)."""
+        base = 2 * len(self.nodes)
+        return np.asarray((states + len(self.nodes)) @ base ** np.arange(self.robots))
+
+    def in_order(self, states: Ints) -> Ints:
+        """Return states as they are: no two robots could change places."""
+        return states
+
+
+def check_scheduled(schedule: Schedule, steps: Sequence[Step]) -> None:
+    """Raise a `StepError` unless a sequence is the schedule, each open grip at one candidate."""
+    if len(steps) != len(schedule.steps):
+        raise StepError(f"{len(steps)} steps; schedule {schedule.method} has {len(schedule.steps)}")
+    chosen: dict[int, object] = {}
+    for step, planned in zip(steps, schedule.steps, strict=True):
+        same = (step.number, step.kind, step.bricks) == (
+            planned.number,
+            planned.kind,
+            planned.bricks,
+        )
+        for node, grip in zip(step.grips, planned.grips, strict=True):
+            if isinstance(grip, OpenGrip):
+                found = chosen.setdefault(grip.move, node)
+                same &= found == node and node in schedule.moves[grip.move].candidates
+            else:
+                same &= node == grip
+        if not same:
+            raise StepError(f"step {step.number} is none of schedule {schedule.method}")

@@ -1,0 +1,247 @@
+"""What a notebook shows of a value: a small table and, with matplotlib, small pictures.
+
+The table has the notebook's own colors, so that it can be read on a dark background too; pictures
+have a white background. Nothing slow is computed for the display.
+"""
+
+from __future__ import annotations
+
+import io
+from base64 import b64encode
+from collections.abc import Callable, Mapping
+from functools import singledispatch
+from html import escape
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from seqopt._showing import display
+from seqopt.errors import ExtraError, ProblemError
+from seqopt.graph.states.states import States
+from seqopt.network.network import Network
+from seqopt.plan.build import ShownBuild
+from seqopt.plan.plan import Plan
+from seqopt.problem.problem import Problem
+from seqopt.problem.requirements import Limit
+from seqopt.report._pages import WORDS
+from seqopt.report.comparison import largest
+from seqopt.report.text import typed
+from seqopt.responses.quantities import number_text
+from seqopt.responses.table import OUTSIDE, REMEDY
+from seqopt.scene.boxes import boxes
+from seqopt.scene.scene import Scene
+from seqopt.sequence.schedule import Schedule
+from seqopt.stability.assessment import Stability, Verdict
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Rows = Mapping[str, object]
+SMALL = 60  # bricks up to which responses of a plan are computed and several steps drawn
+DPI = 90
+COLORS = 128  # of a picture: a quarter of the bytes; an octree keeps colors of small areas
+WIDTH = 4.5  # of a structure, inches
+STEPS = 34  # of a build whose grips are drawn
+
+
+class _Card(NamedTuple):
+    """What there is to show of a value: a title, rows of a table by name, and what draws it."""
+
+    title: str
+    rows: Rows
+    draw: Callable[[], list[Figure]] = list
+
+
+def card(value: object) -> str:
+    """Return a table of a value and small pictures of it, as HTML.
+
+    Without pictures where matplotlib is not installed.
+    """
+    shown = facts(value)
+    title = escape(shown.title)
+    cells = "".join(
+        f'<tr><th style="text-align:left;vertical-align:top">{escape(name)}</th>'
+        f'<td style="text-align:left">{escape(str(content))}</td></tr>'
+        for name, content in shown.rows.items()
+    )
+    try:
+        pictures = [b64encode(_small(figure)).decode() for figure in shown.draw()]
+    except ExtraError:
+        pictures = []
+    images = "".join(
+        f'<img alt="{title}" src="data:image/png;base64,{png}" '
+        'style="display:block;max-width:100%;height:auto;background:#fff;border-radius:6px;'
+        'margin-bottom:0.5em">'
+        for png in pictures
+    )
+    return (
+        '<div style="display:flex;flex-wrap:wrap;gap:1em;align-items:flex-start">'
+        f'<table><thead><tr><th colspan="2" style="text-align:left">{title}</th></tr>'
+        f"</thead><tbody>{cells}</tbody></table>"
+        f'<div style="flex:1 1 20em;min-width:0">{images}</div></div>'
+    )
+
+
+def _small(figure: Figure) -> bytes:
+    """Return a figure as a small PNG of few colors."""
+    from PIL import Image  # noqa: PLC0415  # comes with matplotlib, an extra
+
+    large, small = io.BytesIO(), io.BytesIO()
+    figure.savefig(large, format="png", dpi=DPI)
+    picture = Image.open(large).convert("RGB")
+    picture.quantize(COLORS, Image.Quantize.FASTOCTREE).save(small, format="png", optimize=True)
+    return small.getvalue()
+
+
+@singledispatch
+def facts(value: object) -> _Card:
+    """Return what there is to show of a value."""
+    return _Card(type(value).__name__, {"": repr(value)})
+
+
+@facts.register
+def _scene(value: Scene) -> _Card:
+    by_payload: dict[float, list[str]] = {}
+    for robot in value.robots:
+        by_payload.setdefault(robot.payload, []).append(robot.name)
+    teams = (f"{', '.join(names)}: payload {load:.4g} N" for load, names in by_payload.items())
+    size = np.ptp(boxes(value.bricks).corners().reshape(-1, 3), axis=0)
+    rows = {
+        "bricks": len(value.bricks),
+        "joints": len(value.joints),
+        "supports": len(value.grounds),
+        "size, m": " × ".join(f"{length:.3g}" for length in size),
+        "mass, kg": f"{sum(brick.mass for brick in value.bricks):.4g}",
+        "robots": "; ".join(teams),
+        "nodes that may be held": 2 * len(value.bricks) - len(value.blocked_nodes),
+    }
+    return _Card(f"Scene {value.name}", rows, lambda: _of_scene(value))
+
+
+def _of_scene(scene: Scene) -> list[Figure]:
+    return [display("scene_picture")(scene, width=WIDTH)]
+
+
+@facts.register
+def _network(value: Network) -> _Card:
+    supports = len(value.springs.support)
+    rows = {
+        "bricks": len(value.inner),
+        "nodes": len(value.node_kind),
+        "of these to hold": 2 * len(value.inner) - len(value.scene.blocked_nodes),
+        "edges": len(value.edge_kind),
+        "springs of joints": len(value.springs.since) - supports,
+        "springs of supports": supports,
+    }
+    name = f"Network of {value.scene.name}"
+    return _Card(name, rows, lambda: [display("network_picture")(value, width=WIDTH)])
+
+
+@facts.register
+def _schedule(value: Schedule) -> _Card:
+    counts = [len(move.candidates) for move in value.moves]
+    rows: dict[str, object] = {
+        "scene": value.scene.name,
+        "steps": len(value.steps),
+        "grips to choose": len(counts),
+    }
+    if counts:
+        rows["nodes to choose from"] = f"{min(counts)} to {max(counts)} for a grip"
+        rows["choices of all grips"] = f"10^{np.log10(counts).sum():.0f}"
+    if value.left_out:
+        rows["left out"] = value.left_out
+    steps = (1, min(len(value.steps), STEPS))
+    draw = lambda: [display("gantt_picture")(value.scene, value.steps, None, steps)]  # noqa: E731
+    return _Card(f"Schedule {value.method}", rows, draw)
+
+
+@facts.register
+def _problem(value: Problem) -> _Card:
+    scene = value.scene
+    if isinstance(value.moves, Schedule):
+        title, rows, draw = _schedule(value.moves)
+        name = f"Problem: which nodes to hold ({title[0].lower()}{title[1:]})"
+    else:
+        team = value.moves.robots or tuple(robot.name for robot in scene.robots)
+        rows = {"scene": scene.name, "bricks": len(scene.bricks), "robots": ", ".join(team)}
+        name, draw = "Problem: who does what next, and where", lambda: _of_scene(scene)
+    more = {
+        "to be least, in this order": ", ".join(map(str, value.goals)),
+        "criterion": value.criterion.name,
+        "limits": _limits(value.limits),
+        "budgets": ", ".join(value.budgets),
+        "every step must stand": "yes" if value.stands is not None else "",
+        "scenarios": f"{len(value.scenarios)}, {value.over}" if value.scenarios else "",
+        "orders": "" if value.orders is None else value.orders.value,
+        "engine": repr(value.engine),
+    }
+    return _Card(name, {**rows, **{name: said for name, said in more.items() if said}}, draw)
+
+
+def _limits(limits: tuple[Limit, ...]) -> str:
+    return ", ".join(f"{limit.response} up to {limit.bound:.4g}" for limit in limits) or "none"
+
+
+@facts.register
+def _build(value: ShownBuild) -> _Card:
+    try:
+        scene = value.engine.network.scene
+    except ProblemError:  # costs alone were given
+        return _Card("Plan", {"": repr(value)})
+    small = len(scene.bricks) <= SMALL
+    rows: dict[str, object] = {}
+    if not small:
+        rows["linear range"] = "see departures: not computed here"
+    elif left := "; ".join(map(str, value.departures)):
+        rows[OUTSIDE] = f"{left}. {REMEDY}"
+    rows["found by"] = typed(value.title)
+    if isinstance(value, Plan):
+        posed = value.states if isinstance(value.graph, States) else value.layers
+        rows |= {"criterion": posed.criterion.name} if posed.criterion.name else {}
+    rows |= {"result": value.worth, "steps": len(value.steps), **(_worst(value) if small else {})}
+    if value.seconds:
+        rows["time to find it, s"] = f"{sum(value.seconds.values()):.3g}"
+    return _Card(f"Plan for {scene.name}", rows, lambda: _of_build(value, small=small))
+
+
+def _worst(value: ShownBuild) -> Rows:
+    """Return the largest responses of any step."""
+    found = largest(value.engine.network.scene, value.responses())
+    rows = {f"largest {WORDS[name]}": number_text(found[name]) for name in WORDS}
+    grips = value.grips()
+    row = grips.iloc[int(grips["largest_force_N"].argmax())]
+    rows["at the largest grip force"] = (
+        f"{row['robot']} at node {row['node']} of brick {row['brick']}, step {row['at_step']}"
+    )
+    return rows
+
+
+def _of_build(value: ShownBuild, *, small: bool) -> list[Figure]:
+    """Return pictures of some steps and, of a small build, of its first grips."""
+    draw, count = display("steps_picture"), len(value.steps)
+    from seqopt.report._pictures import spread_steps  # noqa: PLC0415  # matplotlib is an extra
+
+    shown = spread_steps(value.steps, 3) if small else count // 2 + 1
+    pictures = [draw(value.engine, value.steps, shown)]
+    return [*pictures, value.gantt(1, min(count, STEPS))] if small else pictures
+
+
+@facts.register
+def _stability(value: Stability) -> _Card:
+    rows: dict[str, object] = {
+        "verdict": value.verdict.value,
+        "bond needed, Pa": f"{value.bond:.4g}",
+        "friction needed": f"{value.friction:.4g}",
+        "largest grip force, N": f"{value.grip:.4g}",
+    }
+    if value.jammed:
+        rows["jammed"] = "stands only because it is wedged in place: do not trust it"
+    if np.isfinite(value.tilt):
+        rows["tilt survived, degrees"] = f"{np.degrees(value.tilt):.3g}"
+    if value.first_block:
+        joint = f", joint {value.first_contact}" if value.first_contact else ""
+        rows["fails first"] = f"block {value.first_block}{joint}"
+    title = f"Stability: {value.verdict.value}"
+    if value.verdict is not Verdict.STANDS:
+        return _Card(title, rows)
+    return _Card(title, rows, lambda: [display("tilt_picture")(value)])

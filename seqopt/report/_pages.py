@@ -1,0 +1,245 @@
+"""The pages with the step viewer that commands write beside their tables, and plans show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import chain, count
+from pathlib import Path
+
+import pandas as pd
+
+from seqopt._files import csv_text
+from seqopt._showing import Page
+from seqopt.engines.interface import Engine
+from seqopt.errors import FileError, ProblemError
+from seqopt.plan.build import ShownBuild
+from seqopt.problem.requirements import overloads
+from seqopt.report.comparison import CLOSED, LARGEST, Comparison, fixed_methods, largest
+from seqopt.report.page import Build, Scatter, report_page
+from seqopt.responses.quantities import length_text, number_text
+from seqopt.responses.table import OUTSIDE, REMEDY, Departure, LinearRange, analyze, builds_in_words
+from seqopt.scene.scene import Scene
+from seqopt.sequence.rules import FREE
+from seqopt.sequence.schedule_file import parse_plan, read_plan
+
+WORDS = {
+    "F_rob": "grip force, N",
+    "M_sup": "support moment, N m",
+    "T_max": "tension, N",
+    "D_max": "displacement, 1e-3 mm",
+}  # as of seqopt.report.comparison.LARGEST
+OVER = "over payload"
+LEGEND = {OVER: "a robot would hold more than it can", OUTSIDE: "its numbers are not reliable"}
+PAGE = "report.html"
+FORCES = {"F_largest": "F_rob"}  # another name for the same
+FIRST = (CLOSED, FREE)  # of a comparison: its other rows may be more than are seen at once
+PLANS = ("plan.csv", "pick.csv", "steps_*.csv")  # of optimize, pareto and compare
+SMALL = 60  # bricks up to which a plan is shown beside the fixed methods
+Tables = Mapping[str, pd.DataFrame]
+
+
+def _builds(
+    scene: Scene, tables: Tables, departures: Mapping[str, Sequence[Departure]]
+) -> list[Build]:
+    """Return builds by their tables, and a payload that all robots have, where forces exceed it."""
+    payloads = {robot.payload for robot in scene.robots}
+    out = []
+    for name, table in tables.items():
+        over = len(payloads) == 1 and overloads(scene, table)
+        bounds = {"F_largest": max(payloads)} if over else {}
+        steps = parse_plan(scene, csv_text(table), name)
+        out.append(Build(name, steps, table, (), bounds, departures.get(name, ())))
+    return out
+
+
+def _outside(builds: Sequence[Build]) -> str:
+    """Return which builds leave the linear range and what to do; of a single one by what."""
+    said = builds_in_words({build.name: build.departures for build in builds})
+    if said and len(builds) == 1:
+        said = (*map(str, builds[0].departures),)
+    return f"{OUTSIDE.capitalize()}: {'; '.join(said)}. {REMEDY} " if said else ""
+
+
+def _overloads(scene: Scene, build: Build) -> str:
+    """Return in how many steps payloads are exceeded, and by how much."""
+    over = build.overloads(scene)
+    if not over:
+        return ""
+    steps = {number for excess in over for number in excess.steps}
+    worst = max(over, key=lambda excess: excess.largest / excess.limit.bound)
+    return (
+        f"in {len(steps):,} of {len(build.steps):,} a robot would hold more than its payload, up "
+        f"to {worst.largest:,.0f} N where {worst.robot} can hold {worst.limit.bound:.4g} N"
+    )
+
+
+def _worst(scene: Scene, table: pd.DataFrame) -> str:
+    """Return the largest responses of any step, each with its unit."""
+    values = largest(scene, table)
+    said = {name: f"{number_text(values[name])} {LARGEST[name]}" for name in WORDS}
+    said["D_max"] = length_text(1e-6 * values["D_max"])
+    return ", ".join(f"{word.split(',')[0]} {said[name]}" for name, word in WORDS.items())
+
+
+def _with_legend(caption: str, table: pd.DataFrame) -> str:
+    """Return the caption of a table of builds, with a legend where it marks what is wrong."""
+    said = "".join(f". {name.capitalize()}: {why}" for name, why in LEGEND.items() if name in table)
+    return f"{caption}{said}. Such steps are marked in red" if said else caption
+
+
+def _worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFrame]:
+    """Return the largest responses of builds, a row each, under their caption."""
+    rows = {build.name: largest(scene, build.table) for build in builds}
+    found = pd.DataFrame.from_dict(rows, orient="index")
+    found.insert(0, "steps", [len(build.steps) for build in builds])
+    over = [{n for each in build.overloads(scene) for n in each.steps} for build in builds]
+    if any(over):
+        found[OVER] = [f"{len(steps):,} steps" if steps else "" for steps in over]
+    if any(build.departures for build in builds):
+        found[OUTSIDE] = ["yes" if build.departures else "" for build in builds]
+    caption = _with_legend("Largest responses", found)
+    return caption, found.rename(columns=WORDS).rename_axis("build").reset_index()
+
+
+def _page(
+    engine: Engine,
+    builds: Sequence[Build],
+    sentence: str,
+    tables: Sequence[tuple[str, pd.DataFrame]],
+    scatter: Scatter | None = None,
+) -> str:
+    """Return a page of several builds, whose sentence also says what is wrong with some."""
+    scene = engine.network.scene
+    count = sum(bool(build.overloads(scene)) for build in builds)
+    over = f"; in {count} of them a robot would hold more than its payload" if count else ""
+    return report_page(engine, builds, f"{_outside(builds)}{sentence}{over}.", tables, scatter)
+
+
+def plan_page(  # a plan, what there is to say about it, and what is beside it
+    engine: Engine,
+    name: str,
+    table: pd.DataFrame,
+    said: str,
+    stands: Sequence[str] = (),
+    *,
+    others: Tables | None = None,
+) -> str:
+    """Return the page of a plan, beside others and, where the scene is small, fixed methods.
+
+    ``name`` is what found it, ``said`` what it is worth, and ``stands`` whether each step stands.
+    """
+    scene = engine.network.scene
+    tables = {name: table, **(others or {})}
+    if len(scene.bricks) <= SMALL:
+        tables |= {key: each for key, each in fixed_methods(engine).items() if key not in tables}
+    first, *rest = _builds(scene, tables, LinearRange(engine).of_builds(tables))
+    first = replace(first, stands=stands)
+    robots = int(sum(table[f"{robot.name}_node"].notna().any() for robot in scene.robots))
+    over = _overloads(scene, first)
+    who = "1 robot" if robots == 1 else f"{robots} robots"
+    does = "cannot build" if over else "builds" if robots == 1 else "build"
+    sentence = (
+        f"{_outside([first])}{who} {does} {scene.name} in {len(table):,} steps"
+        f"{' like this: ' if over else ''}{over} ({name}: {said}). "
+        f"The largest of any step: {_worst(scene, table)}."
+    )
+    builds = [first, *rest]
+    return report_page(engine, builds, sentence, [_worst_table(scene, builds)])
+
+
+def comparison_page(engine: Engine, result: Comparison) -> str:
+    """Return the page of a comparison."""
+    scene = engine.network.scene
+    builds = _builds(scene, result.tables, result.departures)
+    marks = {"overloaded": OVER, "outside": OUTSIDE}
+    marks = {name: said for name, said in marks.items() if result.table[name].any()}
+    columns = ["problem", "objective", "gap", *WORDS, *marks, "models", "seconds"]
+    shown = result.table[columns].replace({True: "yes", False: ""}).rename(columns=WORDS | marks)
+    shown = shown.sort_values("problem", key=lambda each: ~each.isin(FIRST), kind="stable")
+    shown = shown.rename_axis("method or formulation").reset_index()
+    tables = [(_with_legend("Methods and formulations; a click shows the build", shown), shown)]
+    if result.printed is not None:
+        printed = result.printed.add_suffix(", printed").rename_axis("largest").reset_index()
+        tables.append(("What the paper prints", printed))
+    sentence = f"{len(builds)} ways to build {scene.name}, step by step and side by side"
+    return _page(engine, builds, sentence, tables, _speed_and_accuracy(result))
+
+
+def folder_page(engine: Engine, folder: Path) -> str:
+    """Return the page of the plans in a folder that a command has written."""
+    scene, builds = engine.network.scene, folder_builds(engine, folder)
+    ways = f"{len(builds)} way{'s' * (len(builds) > 1)}"
+    sentence = f"{scene.name}, built in {ways}, step by step"
+    return _page(engine, builds, sentence, [_worst_table(scene, builds)])
+
+
+def folder_builds(engine: Engine, folder: Path) -> list[Build]:
+    """Return the plans in a folder that a command has written, analyzed."""
+    scene = engine.network.scene
+    paths = [path for name in PLANS for path in sorted(folder.glob(name))]
+    if not paths:
+        raise FileError(
+            f"folder {folder}: there is no plan in it; give one that optimize, pareto --pick or "
+            "compare has written"
+        )
+    plans = {path.stem.removeprefix("steps_"): read_plan(scene, path) for path in paths}
+    tables = {name: analyze(engine, steps) for name, steps in plans.items()}
+    return _builds(scene, tables, LinearRange(engine).of_builds(tables))
+
+
+def front_page(
+    engine: Engine,
+    table: pd.DataFrame,
+    plans: Sequence[pd.DataFrame],
+    departures: Sequence[Sequence[Departure]],
+) -> str:
+    """Return the page of a Pareto set: its points, and responses and departures of each plan."""
+    scene = engine.network.scene
+    names = [f"point {number}" for number in range(1, len(plans) + 1)]
+    left = dict(zip(names, departures, strict=True))
+    builds = _builds(scene, dict(zip(names, plans, strict=True)), left)
+    points = _in_words(table).set_axis(names)
+    shown = points.rename_axis("plan").reset_index()
+    if any(departures):
+        shown[OUTSIDE] = ["yes" if each else "" for each in departures]
+    sentence = (
+        f"{len(plans)} plans for {scene.name}, none of which is better than another in everything"
+    )
+    scatter = Scatter("The Pareto set: every point is a plan; a click shows it", points)
+    shows = [(_with_legend("The Pareto set; a click shows a plan", shown), shown)]
+    return _page(engine, builds, sentence, shows, scatter)
+
+
+def _speed_and_accuracy(result: Comparison) -> Scatter | None:
+    """Return how long each formulation took and how far from the best its choice is."""
+    found = result.table.loc[result.table["gap"].notna(), ["seconds", "gap"]]
+    if found.empty:
+        return None
+    axes = ("seconds to choose, responses being known", "above the best, %")
+    points = found.assign(gap=100 * found["gap"]).set_axis(axes, axis=1)
+    return Scatter("Speed against accuracy: a click shows the plan", points, axes[:1])
+
+
+def _in_words(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the points of a Pareto set with columns in words, displacements in 1e-3 mm."""
+    words = {name: WORDS.get(FORCES.get(name, name), name) for name in map(str, table)}
+    lengths = [name for name in words.values() if name.endswith("1e-3 mm")]
+    shown = table.rename(columns=words)
+    return shown.assign(**{name: 1e6 * shown[name] for name in lengths})
+
+
+def build_page(plan: ShownBuild, *others: ShownBuild) -> Page:
+    """Return a page that shows a plan step by step, beside others for the same scene."""
+    engine = plan.engine
+    scene, tables = engine.network.scene, {plan.title: plan.responses()}
+    for other in others:
+        if other.engine.network.scene != scene:
+            raise ProblemError(
+                f"plan {other.title} is for {other.engine.network.scene.name}, not for the same "
+                f"scene {scene.name}; show it on its own"
+            )
+        names = chain([other.title], (f"{other.title} ({number})" for number in count(2)))
+        tables[next(name for name in names if name not in tables)] = other.responses()
+    table = tables.pop(plan.title)
+    return Page(plan_page(engine, plan.title, table, plan.worth, others=tables))

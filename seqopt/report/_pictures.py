@@ -1,0 +1,403 @@
+"""Pictures and films of scenes, networks, the steps of builds and their grips (extra ``plot``)."""
+
+from __future__ import annotations
+
+import tempfile
+from base64 import b64encode
+from collections.abc import Sequence
+from dataclasses import dataclass
+from numbers import Integral
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib import colormaps
+from matplotlib.animation import PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+
+from seqopt.arrays import Floats
+from seqopt.engines.interface import Engine, Fields, Want
+from seqopt.errors import FileError, StepError
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
+from seqopt.report._style import BLUE, SMALL, WIDTH, new_picture, styled
+from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, force_key, grip_mark
+from seqopt.responses.table import force_column
+from seqopt.scene._checks import short
+from seqopt.scene.boxes import boxes
+from seqopt.scene.scene import Scene
+from seqopt.sequence.schedule import Hold, holds
+from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
+from seqopt.stability.assessment import Stability
+
+VIEW = View(azimuth=25, elevation=18)
+NUMBERED = 30  # bricks up to which the nodes of a network are numbered
+FRAMES, MOST = 6, 24  # pictures of a build where no steps are named, and at most
+FILM_DPI, FILM_WIDTH = 80, 6.0  # inches
+SHADES = "YlGnBu"
+PALE = "#f2efe9"  # of a grip whose force is not known
+DARK = "#222222"
+LANE = 0.74  # height of a bar, of a lane's
+PER_STEP, NARROWEST, WIDEST = 0.13, 6.0, 30.0  # inches
+LETTER = 0.06  # width of one, inches
+
+
+def _panels(
+    scene: Scene, count: int, width: float = WIDTH, room: float = 0.35
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure with panels of the shape of the whole structure, in rows of three.
+
+    Over every row there is room for a title; width and room are inches.
+    """
+    columns = min(count, 3)
+    rows = -(-count // columns)
+    low, high = _seen_box(scene)
+    across, up = high - low
+    ratio = min(max(up / across, 0.25), 1.6)
+    figure = new_picture(width, rows * (width / columns * ratio + room))
+    panels = [figure.add_subplot(rows, columns, i + 1) for i in range(count)]
+    for axes in panels:
+        axes.set_axis_off()
+    return figure, panels
+
+
+def _seen_box(scene: Scene) -> tuple[Floats, Floats]:
+    """Return the corners (2,) of what is seen of a structure, with some room around it, m."""
+    seen = boxes(scene.placed).corners().reshape(-1, 3) @ VIEW.axes()[:2].T
+    room = 0.06 * np.ptp(seen, axis=0).max()
+    return np.asarray(seen.min(axis=0) - room), np.asarray(seen.max(axis=0) + room)
+
+
+@styled
+def scene_picture(scene: Scene, bricks: int | None = None, width: float = WIDTH) -> Figure:
+    """Return a picture of a scene, or of its first bricks in build order, the others pale."""
+    network = build_network(scene)
+    count = _bricks(scene, bricks)
+    figure, (axes,) = _panels(scene, 1, width)
+    if count < len(scene.bricks):
+        draw_bricks(axes, network, len(scene.bricks), VIEW, alpha=0.15)
+    draw_bricks(axes, network, count, VIEW)
+    axes.set_title(f"{scene.name}: {count} of {len(scene.bricks)} bricks")
+    return figure
+
+
+@styled
+def network_picture(network: Network, bricks: int | None = None, width: float = WIDTH) -> Figure:
+    """Return a picture of a network, or of its part of the first bricks in build order.
+
+    Nodes that robots may hold carry their numbers where there are few.
+    """
+    count = _bricks(network.scene, bricks)
+    figure, (axes,) = _panels(network.scene, 1, width, 0.5)
+    draw_network(axes, network, count, VIEW, numbers=count <= NUMBERED and width >= WIDTH)
+    axes.set_title(
+        f"network of {network.scene.name}, {count} bricks\n"
+        "filled circles can be held, open ones are joints, squares are supports"
+    )
+    return figure
+
+
+def _bricks(scene: Scene, bricks: int | None) -> int:
+    """Return how many bricks are drawn, if there are as many."""
+    most = len(scene.bricks)
+    if bricks is None:
+        return most
+    if not isinstance(bricks, Integral) or not 1 <= bricks <= most:
+        raise StepError(f"{short(bricks)} bricks: scene {scene.name} has 1 to {most}")
+    return bricks
+
+
+@styled
+def steps_picture(
+    engine: Engine,
+    steps: Sequence[Step],
+    chosen: int | Sequence[int] | None = None,
+    *,
+    forces: bool = False,
+    magnify: float = 0.0,
+) -> Figure:
+    """Return a picture of steps of a build, by their numbers from 1.
+
+    By default `FRAMES` of them, spread over the build. With ``forces`` the network is drawn,
+    colored by axial force, instead of the bricks.
+    """
+    picked, scene = _picked(steps, chosen), engine.network.scene
+    figure, panels = _panels(scene, len(picked))
+    largest = _largest_force(engine, picked) if forces else None
+    for axes, step in zip(panels, picked, strict=True):
+        _draw_step(axes, engine, step, forces=forces, magnify=magnify, largest_force=largest)
+        if len(picked) == 1:
+            draw_grips(axes, engine.network, step.grips, VIEW)
+        else:
+            _mark_grips(axes, scene, step.grips)
+        _frame(axes, scene, step, len(steps))
+    holding = range(len(scene.robots) if len(picked) > 1 else 0)
+    key = [
+        Line2D([], [], **_mark(i), label=f"{scene.robots[i].name} holds")
+        for i in holding
+        if any(step.grips[i] is not None for step in picked)
+    ]
+    key += [] if largest is None else force_key(largest)
+    if key:
+        figure.legend(handles=key, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _draw_step(
+    axes: Axes,
+    engine: Engine,
+    step: Step,
+    *,
+    forces: bool,
+    magnify: float,
+    largest_force: float | None = None,
+) -> None:
+    """Draw one step: bricks or axial forces, of which the largest one (N) is drawn widest."""
+    network, bricks = engine.network, step.bricks
+    fields = _fields(engine, step) if forces or magnify else None
+    how: dict[str, Any] = {"magnify": magnify or 1.0}
+    if fields is not None and forces:
+        how |= {"displacement": fields.displacement[0]} if magnify else {}
+        how |= {"edge_force": fields.edge_force[0], "largest_force": largest_force}
+        draw_network(axes, network, bricks, VIEW, **how)
+        return
+    if fields is not None:
+        draw_bricks(axes, network, bricks, VIEW, alpha=0.15)
+        how["twist"] = fields.brick_twist[0]
+    draw_bricks(axes, network, bricks, VIEW, **how)
+
+
+def _mark_grips(axes: Axes, scene: Scene, grips: Grips) -> None:
+    """Mark the nodes that robots hold, a color and a shape for each robot."""
+    for i, node in enumerate(grips):
+        if node is not None:
+            x, y = VIEW.axes()[:2] @ np.array(scene.node_position(node))
+            axes.plot([x], [y], **_mark(i), gid=f"{scene.robots[i].name} at {node}")
+
+
+def _mark(robot: int) -> dict[str, Any]:
+    """Return how the grip of a robot is drawn."""
+    return {**grip_mark(robot), "ms": 9, "mec": "white", "ls": "none", "zorder": 5}
+
+
+def _frame(axes: Axes, scene: Scene, step: Step, count: int) -> None:
+    """Say above a picture which of how many steps it shows, and give it the size of all."""
+    newest = scene.placed[step.bricks - 1].name
+    what = {
+        StepKind.PLACE: f"brick {newest} is placed",
+        StepKind.RELEASE: "a robot lets go",
+        StepKind.REPOSITION: "a robot takes a grip",
+    }[step.kind]
+    axes.set_title(f"step {step.number} of {count}: {what}", loc="center")
+    low, high = _seen_box(scene)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+
+
+def spread_steps(steps: Sequence[Step], most: int) -> tuple[int, ...]:
+    """Return numbers of steps spread over a build, ascending: some that place, and the last one."""
+    placing = [i + 1 for i, step in enumerate(steps) if step.kind is StepKind.PLACE]
+    parts = range(1, most if placing else 1)
+    picked = {placing[round(k * (len(placing) - 1) / most)] for k in parts}
+    return tuple(sorted({*picked, len(steps)}))
+
+
+def _fields(engine: Engine, step: Step) -> Fields:
+    held = np.array([step.held], dtype=np.int64).reshape(1, -1)
+    return engine.solve(step.bricks, held, Want.EDGES | Want.DISPLACEMENTS | Want.BRICKS)
+
+
+def _largest_force(engine: Engine, steps: Sequence[Step]) -> float:
+    """Return the largest axial force of any edge in some steps, N."""
+    return max(float(np.abs(_fields(engine, step).edge_force).max(initial=0.0)) for step in steps)
+
+
+def _picked(steps: Sequence[Step], chosen: int | Sequence[int] | None) -> list[Step]:
+    """Return the steps of some numbers, from 1."""
+    count = len(steps)
+    if chosen is None:
+        chosen = spread_steps(steps, FRAMES)
+    numbers: list[Any] = [*chosen] if isinstance(chosen, tuple | list | range) else [chosen]
+    if not 1 <= len(numbers) <= MOST:
+        raise StepError(f"{len(numbers)} steps to draw: give 1 to {MOST}")
+    for number in numbers:
+        if not isinstance(number, Integral) or not 1 <= int(number) <= count:
+            raise StepError(f"step {short(number)}: the build has steps 1 to {count}")
+    return [steps[int(number) - 1] for number in numbers]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Film:
+    """A build as a film: a notebook plays it, `save` writes it.
+
+    Each step is shown for some seconds; with ``forces`` the network, colored by axial force.
+    """
+
+    engine: Engine
+    steps: Sequence[Step]
+    forces: bool = False
+    magnify: float = 0.0
+    seconds: float = 0.4
+
+    def __repr__(self) -> str:
+        name, count = self.engine.network.scene.name, len(self.steps)
+        return f"<Film of {name}: {count} steps; save('build.gif') writes it>"
+
+    def _repr_html_(self) -> str:
+        """Return the film as an animated GIF: it plays without scripts, and without a network."""
+        with tempfile.TemporaryDirectory() as folder:
+            film = self.save(Path(folder) / "film.gif").read_bytes()
+        source = f"data:image/gif;base64,{b64encode(film).decode()}"
+        return f'<img alt="{len(self.steps)} steps of a build" src="{source}">'
+
+    def save(self, path: str | Path) -> Path:
+        """Write the film to a file that ends in ``.gif``."""
+        path = Path(path)
+        if path.suffix != ".gif":
+            raise FileError(f"film {path}: give a name that ends in .gif")
+        try:
+            self._write(path)
+        except OSError as error:
+            raise FileError(f"cannot write {path}: {error.strerror}; name another") from error
+        return path
+
+    @styled
+    def _write(self, path: Path) -> None:
+        """Draw every step and hand it to the writer."""
+        scene = self.engine.network.scene
+        low, high = _seen_box(scene)
+        width, height = high - low
+        high_enough = max(FILM_WIDTH * height / width, 2.0) + 0.5
+        figure = new_picture(FILM_WIDTH, high_enough, constrained=False)
+        axes = figure.add_axes((0.02, 0.02, 0.96, 0.88))
+        rate: Any = 1.0 / self.seconds  # the writer takes fractions
+        writer = PillowWriter(fps=rate)
+        with writer.saving(figure, path, FILM_DPI):
+            for step in self.steps:
+                axes.clear()
+                _draw_step(axes, self.engine, step, forces=self.forces, magnify=self.magnify)
+                draw_grips(axes, self.engine.network, step.grips, VIEW)
+                _frame(axes, scene, step, len(self.steps))
+                writer.grab_frame()
+
+
+@styled
+def tilt_picture(value: Stability) -> Figure:
+    """Return the tilt that a step which stands survives in every direction."""
+    figure = new_picture(3.0, 3.0)
+    axes = figure.add_subplot(projection="polar")
+    angles = 2 * np.pi * np.arange(len(value.pull) + 1) / len(value.pull)
+    tilts = np.degrees(np.arctan(value.pull))
+    axes.plot(angles, [*tilts, tilts[0]], "o-", color=BLUE, ms=4)
+    axes.fill(angles, [*tilts, tilts[0]], color=BLUE, alpha=0.15)
+    axes.set_title("tilt survived, degrees", loc="center")
+    axes.set_yticks([float(f"{np.nanmax(tilts) / 2:.2g}"), float(f"{np.nanmax(tilts):.2g}")])
+    return figure
+
+
+@styled
+def gantt_picture(
+    scene: Scene,
+    steps: Sequence[AnyStep],
+    responses: pd.DataFrame | None = None,
+    shown: tuple[int, int | None] = (1, None),
+) -> Figure:
+    """Return the grips of a build over its steps, a lane per robot and a bar per grip."""
+    first, last = shown[0], len(steps) if shown[1] is None else shown[1]
+    if not 1 <= first <= last <= len(steps):
+        raise StepError(f"steps {first} to {last}: the build has steps 1 to {len(steps)}")
+    width = float(np.clip(PER_STEP * (last - first + 1) + 1.6, NARROWEST, WIDEST))
+    figure = new_picture(width, 0.62 * len(scene.robots) + 1.2)
+    axes = figure.add_subplot()
+    inch = (width - 1.6) / (last - first + 1)
+    shade = None if responses is None else _shade(scene, responses)
+    for hold in holds(scene, steps):
+        if hold.last >= first and hold.first <= last:
+            force = None if responses is None else _forces(scene, responses, hold)
+            _bar(axes, hold, (force, shade))
+            _label(axes, _words(scene, hold), hold, inch)
+    _lanes(axes, scene, (first, last), len(steps))
+    _key(figure, axes, shade, is_open=any(getattr(step, "moves", ()) for step in steps))
+    return figure
+
+
+def _shade(scene: Scene, responses: pd.DataFrame) -> ScalarMappable:
+    """Return the shades of forces, from none to the largest of the build, N."""
+    columns = [force_column(robot) for robot in scene.robots]
+    largest = np.nanmax(responses[columns].to_numpy(float), initial=0.0)
+    return ScalarMappable(Normalize(0.0, largest or 1.0), colormaps[SHADES])
+
+
+def _forces(scene: Scene, responses: pd.DataFrame, hold: Hold) -> Floats:
+    """Return the force of a grip in each of its steps, N."""
+    column = responses[force_column(scene.robots[hold.robot])].to_numpy(float)
+    return np.asarray(column[hold.first - 1 : hold.last])
+
+
+def _bar(axes: Axes, hold: Hold, shaded: tuple[Floats | None, ScalarMappable | None]) -> None:
+    """Draw a grip: shaded step by step, framed as a whole, marked where it places a brick."""
+    forces, shade = shaded
+    low = hold.robot - LANE / 2
+    if forces is not None and shade is not None:
+        for i, force in enumerate(forces):
+            color = shade.to_rgba(force)
+            axes.add_patch(Rectangle((hold.first + i - 0.5, low), 1, LANE, fc=color, lw=0))
+    look: Any = {"fc": PALE if forces is None else "none", "ec": DARK, "lw": 0.9}
+    look |= {"hatch": "//"} if hold.node is None else {}
+    name = f"hold {hold.robot} {hold.first} {hold.last}"
+    length = hold.last - hold.first + 1
+    axes.add_patch(Rectangle((hold.first - 0.5, low), length, LANE, gid=name, **look))
+    if hold.places is not None:
+        axes.plot([hold.first - 0.5] * 2, [low, low + LANE], color=DARK, lw=3.2)
+
+
+def _words(scene: Scene, hold: Hold) -> str:
+    """Return what a bar says: brick and node, or the number of the open grip."""
+    if hold.node is None:
+        return f"?{(hold.move or 0) + 1}"
+    return f"{scene.brick_of_node[hold.node].name} · {hold.node}"
+
+
+def _label(axes: Axes, words: str, hold: Hold, inch: float) -> None:
+    """Write words into a bar, upright where it is narrow; nothing where they do not fit."""
+    room = inch * (hold.last - hold.first + 1)
+    if room < 0.12:
+        return
+    flat = room >= LETTER * len(words) + 0.06
+    look: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": DARK, "clip_on": True}
+    look["bbox"] = {"boxstyle": "square,pad=0.1", "fc": (1, 1, 1, 0.72), "lw": 0}
+    at = ((hold.first + hold.last) / 2, hold.robot)
+    axes.annotate(words, at, rotation=0 if flat else 90, **look)
+
+
+def _lanes(axes: Axes, scene: Scene, shown: tuple[int, int], steps: int) -> None:
+    """Set lanes, limits and names."""
+    count = len(scene.robots)
+    axes.set_xlim(shown[0] - 0.7, shown[1] + 0.7)
+    axes.set_ylim(count - 0.5, -0.5)
+    axes.set_yticks(range(count), [robot.name for robot in scene.robots])
+    whole = shown == (1, steps)
+    axes.set_xlabel("step" if whole else f"step, {shown[0]} to {shown[1]} of {steps}")
+    axes.tick_params(left=False)
+    axes.grid(visible=True, axis="x", lw=0.3)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right", "left"]].set_visible(False)
+
+
+def _key(figure: Figure, axes: Axes, shade: ScalarMappable | None, *, is_open: bool) -> None:
+    """Explain the marks, the words and the shades."""
+    handles: list[Line2D | Patch] = [
+        Line2D([], [], color=DARK, marker="|", ms=11, mew=3.2, lw=0, label="places the brick"),
+        Patch(fc="white", ec=DARK, label="holds it (brick · node)"),
+    ]
+    if is_open:
+        handles.append(Patch(fc=PALE, ec=DARK, hatch="//", label="still to be chosen"))
+    place: Any = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
+    axes.legend(handles=handles, ncols=3, frameon=False, **place)
+    if shade is not None:
+        figure.colorbar(shade, ax=axes, label="grip force, N", pad=0.01)

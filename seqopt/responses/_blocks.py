@@ -1,0 +1,543 @@
+"""Blocks of states, and what an engine answers for one: the unit that is computed, sent, stored.
+
+A state is a brick count and the nodes held. How many states make a block depends on nothing but
+the schedule, so that answers are the same to the last bit wherever and by whomever a block is
+answered.
+
+For other processes the scene is sent, and the engine made where it is needed.
+
+In a folder of answers every block is a file of its own, written whole: a checksum of all that
+follows, the numbers, then what the engine counted. No more is read than an answer to the block can
+be, and a file is believed only if it is whole and its block's own: whatever is damaged is computed
+again. Against somebody who writes false numbers with their checksum there is
+`seqopt.plan.judge.certificate`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import pickle
+import threading
+import time
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property, partial, reduce
+from itertools import groupby
+from operator import or_
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from seqopt._files import HIDDEN, make_folder, require_folder, write_bytes
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.engines._auto import Level, LevelChoice
+from seqopt.engines.interface import Engine, Want, one_thread
+from seqopt.engines.registry import Recipe, make_engine, recipe_of
+from seqopt.errors import FileError, MemoryShortError, SceneError
+from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite, robot_response
+from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
+from seqopt.work._workers import free_memory
+
+_Tally = tuple[tuple[object, int], ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Block(FrozenValue):
+    """States with one brick count, and what is to be known of them."""
+
+    bricks: int  # how many bricks stand
+    grips: Ints  # (S, r); nodes held
+    names: tuple[str, ...]  # responses of `seqopt.responses.quantities.CHOSEN_BY`
+    screen: bool = True  # whether six digits are enough
+
+    @cached_property
+    def key(self) -> str:
+        """Its content, condensed."""
+        exact = () if self.screen else ("exact",)
+        mark = hashlib.sha256(repr((self.bricks, self.names, self.grips.shape, *exact)).encode())
+        mark.update(self.grips.astype("<i8").tobytes())
+        return mark.hexdigest()
+
+    @property
+    def work(self) -> float:
+        """About how long it takes, in no unit: what an engine does grows with the bricks."""
+        return work(len(self.grips), self.bricks)
+
+
+def work(states: int, bricks: int) -> float:
+    """Return about how long states take, in no unit."""
+    return float(states * (bricks + _APART))
+
+
+_APART = 20  # bricks whose share of the work is what every state costs, however small it is
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Answers(FrozenValue):
+    """What an engine answers for a block.
+
+    ``values`` (S,): the responses asked for, SI units; ``forces`` (S, r): sizes of the forces of
+    the grips, N; ``tally`` (object, int): what the engine counted meanwhile, if it counts:
+    `seqopt.engines._auto.AutoEngine`.
+    """
+
+    values: Mapping[str, Floats]
+    forces: Floats
+    tally: _Tally = ()
+
+
+def answer(engine: Engine, block: Block) -> Answers:
+    """Return the responses of a block of states.
+
+    Raises `MechanismError`, `SolverError` as the engine does.
+    """
+    asked = [CHOSEN_BY[name] for name in block.names]
+    digits = Want.SCREEN if block.screen else Want(0)
+    want = reduce(or_, (response.needs for response in asked), digits)
+    before = Counter(tally_of(engine))
+    with one_thread():  # as many threads everywhere: sums in other orders differ in the last bit
+        fields = engine.solve(block.bricks, block.grips, want)
+    forces = require_finite("grip force", lengths(fields.grip_force), block.bricks)
+    values = {
+        response.name: require_finite(
+            response.name, response.of(engine.network, fields), block.bricks
+        )
+        for response in asked
+    }
+    return Answers(values, forces, tuple((Counter(tally_of(engine)) - before).items()))
+
+
+def tally_of(engine: Engine) -> dict[object, int]:
+    """Return what an engine counts, empty if it does not. Result: its own: adding to it counts."""
+    found = getattr(engine, "tally", None)
+    return found if isinstance(found, dict) else {}
+
+
+_HELD = 2  # engines that a process keeps between tasks: of the run before, and of this one
+Blocks = Sequence[Block]
+
+
+@dataclass(frozen=True)
+class Shipment:
+    """An engine as it is sent: how to make it, or itself where nobody knows."""
+
+    key: str  # its content, condensed
+    content: bytes
+
+    def unpack(self) -> Engine:
+        """Return the engine, newly made."""
+        found: Recipe | Engine = pickle.loads(self.content)  # our own, from `pack`
+        if isinstance(found, Recipe):
+            return make_engine(found.engine, found.scene, **found.options)  # type: ignore[arg-type]
+        return found
+
+
+def pack(engine: Engine) -> Shipment:
+    """Return an engine as it is sent.
+
+    Raises `SceneError` if it is an engine of one's own that cannot be sent.
+    """
+    recipe = _known_recipe(engine)
+    try:
+        content = pickle.dumps(engine if recipe is None else recipe)
+    except Exception as error:  # whatever objects of others may raise
+        raise SceneError(
+            f"engine {type(engine).__name__}: it cannot be sent to other processes ({error}); take "
+            "one of seqopt.make_engine, or let this process work alone"
+        ) from error
+    return Shipment(hashlib.sha256(content).hexdigest(), content)
+
+
+def _known_recipe(engine: Engine) -> Recipe | None:
+    """Return how an engine can be made again with the same answers.
+
+    Result: None for an engine that is not made by name, or of a network that its scene does not
+    have.
+    """
+    recipe = recipe_of(engine)
+    return recipe if recipe is not None and recipe.network == engine.network else None
+
+
+def worker_for(engine: Engine, *, elsewhere: bool) -> Callable[[Blocks], list[Answers]]:
+    """Return the function that answers blocks of states.
+
+    ``elsewhere``: whether it is to be sent to other processes. Result: takes blocks, returns their
+    answers.
+    """
+    return partial(_answer_sent, pack(engine)) if elsewhere else partial(_answer_here, engine)
+
+
+def _answer_here(engine: Engine, blocks: Blocks) -> list[Answers]:
+    return [answer(engine, block) for block in blocks]
+
+
+def _answer_sent(shipment: Shipment, blocks: Blocks) -> list[Answers]:
+    return _answer_here(engine_of(shipment), blocks)
+
+
+def engine_of(shipment: Shipment) -> Engine:
+    """Return an engine that was sent; a worker keeps the last few that it made."""
+    return _shelf.engine(shipment)
+
+
+class _Shelf(threading.local):
+    """The engines that a worker made, the last few by content.
+
+    An executor of others offers no place for what its workers keep between tasks; without one
+    each task would make its engine, and grow it, anew. Every thread has its own.
+    """
+
+    def __init__(self) -> None:
+        self.engines: OrderedDict[str, Engine] = OrderedDict()
+
+    def engine(self, shipment: Shipment) -> Engine:
+        if shipment.key not in self.engines:
+            while len(self.engines) >= _HELD:
+                self.engines.popitem(last=False)
+            self.engines[shipment.key] = shipment.unpack()
+        self.engines.move_to_end(shipment.key)
+        return self.engines[shipment.key]
+
+
+_shelf = _Shelf()
+
+
+_LEFT = 3600.0  # s after which a file that is not complete is one that was given up
+_DIGEST = 32  # bytes of a checksum
+_WORDS = 2**16  # bytes that what an engine counted takes at most
+
+
+class Store:
+    """The answers of one engine in a folder.
+
+    ``folder``: made if it is not there; ``engine``: made by name. Raises `FileError` if the folder
+    cannot be written; `SceneError` if nobody can say what the engine's answers depend on.
+    """
+
+    def __init__(self, folder: Path, engine: Engine) -> None:
+        require_folder(folder)
+        recipe = _known_recipe(engine)
+        if recipe is None:
+            raise SceneError(
+                f"cache {folder}: a {type(engine).__name__} does not say what its answers depend "
+                "on; take one of seqopt.make_engine, or no cache"
+            )
+        self._recipe: Recipe = recipe
+        self._folder = folder / recipe.key[:32]
+        make_folder(self._folder)
+        _tidy(self._folder)
+
+    def path(self, block: Block) -> Path:
+        """Return the file of a block."""
+        return self._folder / f"{block.bricks}-{block.key[:48]}.answers"
+
+    def find(self, block: Block) -> Answers | None:
+        """Return the answers to a block, if they are there and whole."""
+        sets, columns = len(block.grips), len(block.names) + block.grips.shape[1]
+        words = _DIGEST + 8 * sets * columns
+        try:
+            with self.path(block).open("rb") as file:
+                content = file.read(words + _WORDS + 1)
+        except OSError:
+            return None
+        whole = words <= len(content) <= words + _WORDS
+        if not whole or content[:_DIGEST] != self._checksum(block, content[_DIGEST:]):
+            return None
+        numbers = np.frombuffer(content[_DIGEST:words], "<f8").reshape(columns, sets).astype(float)
+        if not np.isfinite(numbers).all():
+            return None
+        try:
+            rows = json.loads(content[words:])
+            tally = tuple((LevelChoice(Level(level), why), int(n)) for level, why, n in rows)
+        except (ArithmeticError, RecursionError, TypeError, ValueError):  # checked, and yet false
+            return None
+        values = dict(zip(block.names, numbers, strict=False))
+        return Answers(values, numbers[len(values) :].T.copy(), tally)
+
+    def keep(self, block: Block, answers: Answers) -> None:
+        """Write the answers to a block. Raises `FileError` if the file cannot be written."""
+        numbers = np.array([*(answers.values[name] for name in block.names), *answers.forces.T])
+        words = json.dumps([_words(what, count) for what, count in answers.tally])
+        content = numbers.astype("<f8").tobytes() + words.encode()
+        write_bytes(self.path(block), self._checksum(block, content) + content)
+
+    def _checksum(self, block: Block, content: bytes) -> bytes:
+        """Return the checksum of what is to be known of a block."""
+        return hashlib.sha256(f"{self._recipe.key} {block.key} ".encode() + content).digest()
+
+
+def open_store(folder: Path | str | None, engine: Engine) -> Store | None:
+    """Return the store of an engine's answers in a folder. ``folder``: None for none."""
+    return None if folder is None else Store(Path(folder), engine)
+
+
+def _words(what: object, count: int) -> list[str | int]:
+    if not isinstance(what, LevelChoice):
+        raise SceneError(f"cache: an engine that counts {what!r} cannot be kept; take no cache")
+    return [what.level.value, what.reason, count]
+
+
+def _tidy(folder: Path) -> None:
+    """Take away what runs that were killed left half-written."""
+    for path in folder.glob(f"{HIDDEN}*"):
+        try:
+            if time.time() - path.stat().st_mtime > _LEFT:
+                path.unlink()
+        except FileNotFoundError:  # another run was faster
+            continue
+        except OSError as error:
+            raise FileError(
+                f"cannot tidy {folder}: {error.strerror}; name another cache"
+            ) from error
+
+
+BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in the cache
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StepChoices(FrozenValue):
+    """One open step of a schedule and what every choice in it leads to.
+
+    Attributes
+    ----------
+    step : OpenStep
+        Which step of the schedule it is.
+    moves : tuple of int
+        Index of every open move: one, or two neighboring ones.
+    responses : mapping of str to (C,) or (C, D) float
+        Over the candidates of the moves; SI units, sizes without sign; NaN where two robots would
+        hold one node, all NaN for a robot that does not grip.
+    """
+
+    step: OpenStep
+    moves: tuple[int, ...]
+    responses: Mapping[str, Floats]
+
+
+class Wanted(Protocol):
+    """Which responses a move needs."""
+
+    def __call__(self, bricks: int) -> Set[str]:
+        """Return the names of the responses that a move needs.
+
+        Parameters
+        ----------
+        bricks : int
+            Bricks placed when the move is made.
+
+        Returns
+        -------
+        set of str
+        """
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Batch(FrozenValue):
+    """Open steps with as many bricks and as many grips."""
+
+    schedule: Schedule
+    steps: tuple[OpenStep, ...]
+    names: tuple[frozenset[str], ...]  # responses that each step needs
+    rows: Ints  # (P, r); nodes held, for all possible choices of one step after the other
+    possible: tuple[Bools, ...]  # (C,); which choices of each step leave no node held twice
+    states: Ints  # (S, r); the different sets of nodes in them, ascending
+    state: Ints  # (P,); which of these each choice leads to
+
+    def blocks(self) -> Iterator[Block]:
+        """Yield the states in blocks, one at least."""
+        names = tuple(sorted(frozenset().union(*self.names) & CHOSEN_BY.keys()))
+        for start in range(0, max(len(self.states), 1), BLOCK):
+            yield Block(self.steps[0].bricks, self.states[start : start + BLOCK].copy(), names)
+
+    @property
+    def count(self) -> int:
+        """How many blocks there are."""
+        return max(-(-len(self.states) // BLOCK), 1)
+
+    def choices(self, answers: Sequence[Answers]) -> list[StepChoices]:
+        """Return the responses of every step's choices. ``answers``: to the blocks."""
+        values = {k: np.concatenate([a.values[k] for a in answers]) for k in answers[0].values}
+        forces = np.concatenate([a.forces for a in answers])
+        ends = np.cumsum([ok.sum() for ok in self.possible])
+        out = []
+        for step, mine, ok, end in zip(self.steps, self.names, self.possible, ends, strict=True):
+            part = slice(end - ok.sum(), end)
+            index = self.state[part]
+            by_robot = np.argsort(np.argsort(self.rows[part], axis=1), axis=1)
+            found = {name: answer[index] for name, answer in values.items() if name in mine}
+            held = np.take_along_axis(forces[index], by_robot, axis=1)
+            found |= _robot_forces(self.schedule, step, held)
+            spread = {name: _spread(found.get(name), ok) for name in sorted(mine)}
+            shape = tuple(len(self.schedule.moves[m].candidates) for m in step.moves)
+            shaped = {name: each.reshape(shape) for name, each in spread.items()}
+            out.append(StepChoices(step, step.moves, shaped))
+        return out
+
+
+def steps_of_batches(schedule: Schedule) -> list[list[list[OpenStep]]]:
+    """Return the open steps of a schedule by brick count and, within it, by how many grips.
+
+    Result: ascending.
+    """
+    keyed = sorted(
+        (
+            (step.bricks, len(_robots_holding(step)), step.number, step)
+            for step in schedule.steps
+            if step.moves
+        ),
+        key=lambda item: item[:3],
+    )
+    return [
+        [[item[3] for item in same] for _, same in groupby(level, key=lambda item: item[1])]
+        for _, level in groupby(keyed, key=lambda item: item[0])
+    ]
+
+
+def choices_of(schedule: Schedule, step: OpenStep) -> int:
+    """Return how many choices a step has, impossible ones among them."""
+    return math.prod(len(schedule.moves[m].candidates) for m in step.moves)
+
+
+def batch_of(schedule: Schedule, steps: Sequence[OpenStep], wanted: Wanted) -> Batch:
+    """Return what open steps with as many bricks and as many grips have in common.
+
+    ``wanted``: which responses every move needs.
+    """
+    names = tuple(frozenset(wanted(schedule.moves[step.moves[-1]].bricks)) for step in steps)
+    choices = [combinations(schedule, step) for step in steps]
+    possible = tuple(no_node_twice(rows) for rows in choices)
+    rows = np.concatenate([rows[ok] for rows, ok in zip(choices, possible, strict=True)])
+    states, state = distinct(np.sort(rows, axis=1))
+    return Batch(schedule, tuple(steps), names, rows, possible, states, state)
+
+
+def _spread(values: Floats | None, possible: Bools) -> Floats:
+    """Return values over all choices, NaN for impossible ones and for a robot that holds none."""
+    out = np.full(possible.shape, np.nan)
+    if values is not None:
+        out[possible] = values
+    return out
+
+
+def distinct(rows: Ints) -> tuple[Ints, Ints]:
+    """Return the distinct rows, ascending, and which of them each row is.
+
+    Four times as fast as ``numpy.unique``, which sorts rows as if they were text.
+
+    ``rows`` (P, r). Results: ``rows`` (S, r); ``which`` (P,).
+    """
+    order = np.lexsort(rows.T[::-1])
+    ranked = rows[order]
+    first = np.ones(len(rows), dtype=bool)
+    first[1:] = (ranked[1:] != ranked[:-1]).any(axis=1)
+    back = np.empty(len(rows), dtype=np.int64)
+    back[order] = np.cumsum(first) - 1
+    return ranked[first], back
+
+
+def _robots_holding(step: OpenStep) -> list[int]:
+    """Return which of the scene's robots grip."""
+    return [i for i, grip in enumerate(step.grips) if grip is not None]
+
+
+def combinations(schedule: Schedule, step: OpenStep) -> Ints:
+    """Return the nodes held for all combinations of the open moves of a step.
+
+    Result (choices, grips).
+    """
+    candidates = [np.array(schedule.moves[m].candidates, dtype=np.int64) for m in step.moves]
+    grid = np.meshgrid(*candidates, indexing="ij")
+    columns = []
+    for robot in _robots_holding(step):
+        grip = step.grips[robot]
+        if isinstance(grip, OpenGrip):
+            columns.append(grid[step.moves.index(grip.move)].ravel())
+        else:
+            columns.append(np.full(grid[0].size, grip))
+    return np.stack(columns, axis=1).astype(np.int64)
+
+
+def no_node_twice(rows: Ints) -> Bools:
+    """Return which rows name no node twice. ``rows`` (P, r). Result (P,)."""
+    return np.asarray((np.diff(np.sort(rows, axis=1), axis=1) > 0).all(axis=1))
+
+
+def _robot_forces(schedule: Schedule, step: OpenStep, forces: Floats) -> dict[str, Floats]:
+    """Return the forces by robot, of the robot whose move decides the step, and the largest."""
+    robots = [schedule.scene.robots[i].name for i in _robots_holding(step)]
+    out = {robot_response(name): forces[:, i] for i, name in enumerate(robots)}
+    out["F_move"] = out[robot_response(schedule.moves[step.moves[-1]].robot)]
+    out["F_largest"] = forces.max(axis=1)
+    return out
+
+
+_NUMBER = 8  # bytes
+_BESIDE = 6  # numbers per choice beside its responses: nodes, order, costs
+_COSTS = 4  # numbers per choice where costs alone are kept: as found, posed, handed over, solved
+_AT_ONCE = 24  # numbers per choice of the brick count that is being evaluated
+_SHARE = 0.8  # of the free memory that responses and costs may take
+
+
+class Keeping(Enum):
+    """What is kept of the choices of a schedule."""
+
+    RESPONSES = "responses"
+    COSTS = "costs"  # responses come step by step, and go
+
+
+def bytes_of_choices(schedule: Schedule, wanted: Callable[[int], Set[str]]) -> int:
+    """Return what the responses of all choices of a schedule take, about.
+
+    ``wanted``: which responses every move needs. Result: bytes.
+    """
+    total = 0
+    for step in schedule.steps:
+        moves = [schedule.moves[m] for m in step.moves]
+        if moves:
+            kept = len(wanted(moves[-1].bricks)) + _BESIDE
+            total += _NUMBER * kept * math.prod(len(move.candidates) for move in moves)
+    return total
+
+
+def bytes_of_costs(schedule: Schedule) -> int:
+    """Return what the costs of all choices take, about, while responses come step by step.
+
+    Result: bytes.
+    """
+    of_moves: dict[tuple[int, ...], int] = {}
+    of_bricks: dict[int, int] = {}
+    for step in schedule.steps:
+        if step.moves:
+            choices = choices_of(schedule, step)
+            of_moves[step.moves] = choices
+            of_bricks[step.bricks] = of_bricks.get(step.bricks, 0) + choices
+    return _NUMBER * (
+        _COSTS * sum(of_moves.values()) + _AT_ONCE * max(of_bricks.values(), default=0)
+    )
+
+
+def require_memory(
+    schedule: Schedule, wanted: Callable[[int], Set[str]], most: float | None = None
+) -> Keeping:
+    """Return what can be kept of all choices; raise an error if not even their costs can be.
+
+    ``wanted``: which responses every move needs. ``most``: bytes that may be used; by default
+    `_SHARE` of what is free.
+    """
+    most = _SHARE * free_memory() if most is None else most
+    if bytes_of_choices(schedule, wanted) <= most:
+        return Keeping.RESPONSES
+    needed = bytes_of_costs(schedule)
+    if needed <= most:
+        return Keeping.COSTS
+    largest = max(len(move.candidates) for move in schedule.moves)
+    raise MemoryShortError(
+        f"the costs of all choices take about {needed / 1e9:.3g} GB, and {most / 1e9:.3g} GB may "
+        f"be used; let robots reach less (a move has up to {largest} candidates), block nodes, "
+        "take near candidates only, or search without proof"
+    )

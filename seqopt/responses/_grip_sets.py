@@ -1,0 +1,221 @@
+"""Responses of grip sets, computed when they are first needed, and kept.
+
+For whoever searches among more sets than need to be solved: all sets that are asked for at once are
+solved in batches, each of them once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from seqopt.arrays import Floats, Ints
+from seqopt.engines.interface import Engine
+from seqopt.errors import MechanismError
+from seqopt.responses._blocks import (
+    BLOCK,
+    Answers,
+    Block,
+    Shipment,
+    Store,
+    answer,
+    engine_of,
+    open_store,
+    pack,
+)
+from seqopt.responses.resources import HERE, Resources
+from seqopt.work._workers import hire, map_ordered
+
+
+class KnownRows:
+    """Rows of values by a key and a code, each computed once.
+
+    ``count``: how many rows were computed.
+
+    Examples
+    --------
+    >>> rows = KnownRows()
+    >>> codes = np.array([3, 1, 3])
+    >>> rows.of("squares", codes, lambda places: codes[places, None] ** 2.0).ravel()
+    array([9., 1., 9.])
+    >>> rows.count
+    2
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[object, tuple[Ints, Floats]] = {}
+        self.count = 0
+
+    @property
+    def nbytes(self) -> int:
+        """How much memory the rows take."""
+        return sum(
+            codes.nbytes + (0 if values is None else values.nbytes)
+            for codes, values in self._known.values()
+        )
+
+    def of(self, key: object, codes: Ints, compute: Callable[[Ints], Floats]) -> Floats:
+        """Return the rows of codes, those that are new computed now, all together.
+
+        ``key``: codes of other keys are others; ``codes`` (n,); ``compute``: returns the rows (m,
+        k) of distinct codes, given the places (m,) where they first stand among those asked for.
+        Result (n, k).
+        """
+        distinct, first = np.unique(codes, return_index=True)
+        known, values = self._known.get(key, (distinct[:0], None))
+        fresh = first[~np.isin(distinct, known, assume_unique=True)]
+        if values is None or len(fresh):
+            computed = compute(fresh)
+            known = np.concatenate([known, codes[fresh]])
+            values = computed if values is None else np.concatenate([values, computed])
+            order = np.argsort(known, kind="stable")
+            known, values = known[order], values[order]
+            self._known[key] = known, values
+            self.count += len(fresh)
+        return np.asarray(values[np.searchsorted(known, codes)])
+
+
+class GripSets:
+    """The responses of grip sets of one scene.
+
+    ``engine``: what solves them; ``names``: responses of `seqopt.responses.quantities.CHOSEN_BY`
+    that are wanted; ``resources``: who solves them, and where answers are kept; ``screen``: whether
+    six digits are enough, to choose by.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import seqopt
+    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
+    >>> sets = GripSets(seqopt.make_engine("compliance", network), ["T_max"])
+    >>> responses, forces = sets.answers(2, np.array([[0, 3], [2, 3]]))  # zero: no grip
+    >>> responses.shape, forces.shape, sets.solved
+    ((2, 1), (2, 2), 2)
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        names: Sequence[str],
+        resources: Resources = HERE,
+        *,
+        screen: bool = False,
+    ) -> None:
+        self._engine, self._resources = engine, resources
+        self._names, self._screen = tuple(names), screen
+        self._store: Store | None = None
+        self._known = KnownRows()
+        scene = engine.network.scene
+        self._number = np.array([0, *(node for brick in scene.placed for node in brick.nodes)])
+
+    def __repr__(self) -> str:
+        return f"<GripSets of {self._engine}: {self.solved} solved>"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The responses that are wanted."""
+        return self._names
+
+    @property
+    def solved(self) -> int:
+        """How many different grip sets were solved."""
+        return self._known.count
+
+    @property
+    def nbytes(self) -> int:
+        """How much memory their responses take."""
+        return self._known.nbytes
+
+    def answers(self, bricks: int, held: Ints) -> tuple[Floats, Floats]:
+        """Return the responses of grip sets and the forces of their grips.
+
+        ``held`` (S, r): nodes held, ascending in every row, as places in build order counted from
+        1; zeros for robots that hold none. Results: ``responses`` (S, R): in the order of the
+        names, SI units; infinite where something would be loose. ``forces`` (S, r): N; zero for a
+        robot that holds none.
+        """
+        held = np.asarray(held)
+        out = np.zeros((len(held), len(self._names) + held.shape[1]))
+        grips = (held > 0).sum(axis=1)
+        for count in np.unique(grips).tolist():
+            rows = np.flatnonzero(grips == count)
+            nodes = held[rows, held.shape[1] - count :]
+            found = self._found(bricks, count, nodes)
+            out[rows, : len(self._names)] = found[:, : len(self._names)]
+            out[rows, out.shape[1] - count :] = found[:, len(self._names) :]
+        return out[:, : len(self._names)], out[:, len(self._names) :]
+
+    def _found(self, bricks: int, count: int, nodes: Ints) -> Floats:
+        """Return responses and forces of sets (S, count), those that are new solved now."""
+        return self._known.of(
+            (bricks, count), self._codes(nodes), lambda new: self._solve(bricks, nodes[new])
+        )
+
+    def _codes(self, nodes: Ints) -> Ints:
+        """Return a number for every set (S, r) that no other one has."""
+        out = np.zeros(len(nodes), dtype=np.int64)
+        for column in nodes.T:
+            out = out * len(self._number) + column
+        return out
+
+    def _solve(self, bricks: int, nodes: Ints) -> Floats:
+        """Return responses and forces of sets, (S, R + r)."""
+        if self._store is None:
+            self._store = open_store(self._resources.cache, self._engine)
+        sets = Block(bricks, self._number[nodes], self._names, self._screen)
+        return solve_sets(self._engine, sets, self._resources, self._store)
+
+
+_SHARED = 64  # least sets of a task
+
+
+def solve_sets(
+    engine: Engine, sets: Block, resources: Resources = HERE, store: Store | None = None
+) -> Floats:
+    """Return the responses of grip sets, then the forces of grips; infinite where a part is loose.
+
+    ``sets``: with one brick count; ``resources``: who solves them; ``store``: what is known. Result
+    (S, R + r): SI units. Raises `SolverError`, `WorkerError`.
+    """
+    grips, alone = sets.grips, resources.executor is None and resources.workers == 1
+    most = BLOCK if alone and store is None else min(BLOCK, max(_SHARED, len(grips) // 32))
+    parts = [replace(sets, grips=grips[at : at + most]) for at in range(0, len(grips), most)]
+    workers = (resources.executor, resources.workers) if len(parts) > 1 else (None, 1)
+
+    def known(part: Block) -> Floats | None:
+        found = None if store is None else store.find(part)
+        return None if found is None else _columns(part, found)
+
+    def done(part: Block, rows: Floats) -> None:
+        if store is not None and np.isfinite(rows).all():
+            columns = rows.T
+            values = dict(zip(part.names, columns, strict=False))
+            store.keep(part, Answers(values, columns[len(values) :].T))
+
+    with hire(*workers) as crew:
+        solved = partial(_sent, pack(engine)) if crew is not None else partial(_solved, engine)
+        rows = [*map_ordered(solved, parts, crew, known, done)]
+    return np.concatenate([np.zeros((0, len(sets.names) + grips.shape[1])), *rows])
+
+
+def _sent(shipment: Shipment, part: Block) -> Floats:
+    return _solved(engine_of(shipment), part)
+
+
+def _solved(engine: Engine, part: Block) -> Floats:
+    """Return what is known of a few sets; those that leave something loose are found by halving."""
+    try:
+        return _columns(part, answer(engine, part))
+    except MechanismError:
+        count = len(part.grips)
+        if count == 1:
+            return np.full((1, len(part.names) + part.grips.shape[1]), np.inf)
+        halves = part.grips[: count // 2], part.grips[count // 2 :]
+        return np.concatenate([_solved(engine, replace(part, grips=half)) for half in halves])
+
+
+def _columns(part: Block, found: Answers) -> Floats:
+    return np.column_stack([*(found.values[name] for name in part.names), found.forces])

@@ -1,0 +1,217 @@
+"""Make a scene of what a file says and what the user adds; say what was assumed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+
+from seqopt.errors import SceneError
+from seqopt.scene._checks import LARGEST_NUMBER, positive, short, whole_between
+from seqopt.scene.boxes import as_vector, block_brick, spring_fields
+from seqopt.scene.imports._content import MOST_CORNERS, UNITS, UPS, Content, FileJoint, Given
+from seqopt.scene.imports._meshes import Repaired, repair_shape
+from seqopt.scene.imports.contacts import GROUND, Contacts, face_ground, face_joint, find_contacts
+from seqopt.scene.library.common import MASONRY, JointLaw, mobile_robots, touching_order
+from seqopt.scene.parts import Brick, Ground, Joint
+from seqopt.scene.scene import Scene
+from seqopt.scene.shape import Polyhedron, plane_axes
+
+
+def upward_order(
+    rank: Sequence[tuple[float, ...]],
+    pairs: Iterable[tuple[int, int]],
+    starts: Iterable[int],
+    keys: Sequence[str],
+) -> list[int]:
+    """Return blocks in an order in which each touches the ground or what stands before it."""
+    order = touching_order(rank, pairs, starts)
+    lost = [keys[i] for i in sorted({*range(len(rank))} - {*order})]
+    if lost:
+        raise SceneError(
+            f"{len(lost)} blocks touch nothing that leads to the ground, the first of them "
+            f"{', '.join(lost[:5])}; name supports, or allow a wider gap between faces"
+        )
+    return order
+
+
+_STUB = 0.1  # of a ground end, over the smallest dimension of its block
+
+
+def build_scene(content: Content, given: Given, source: str) -> Scene:
+    """Return the scene of what a file and its user say, for which shapely is needed.
+
+    ``source``: what the file is called. What was read, mended and assumed stands in the provenance.
+    """
+    try:
+        said = list(content.said)
+        _check_size(content)
+        content = content.placed(_unit(content, given, said), _up(given, said))
+        supports = _supports(content, given, said)
+        blocks = [repair_shape(b, may_be_open=i in supports) for i, b in enumerate(content.blocks)]
+        total = sum((block.mended for block in blocks), Counter[str]())
+        said += [f"{text}: {count}" for text, count in total.items()]
+        bricks = _bricks(content, given, blocks, supports, said)
+        touching = find_contacts(content, given, blocks, bricks)
+        said += touching.said
+        law = _law(content, given, touching, said)
+        springs = _springs(touching, bricks, law)
+        order = _order(touching, content, bricks, said)
+        robots = mobile_robots([*bricks.values()], whole_between("robots", given.robots, 1))
+    except SceneError as error:
+        raise SceneError(f"{source}: {error}") from error
+    said.append(f"{len(robots)} robots reach all and bear all; z is up")
+    return Scene(
+        name=given.name or source,
+        provenance="\n".join((f"imported from {source}", *said)),
+        bricks=tuple(bricks.values()),
+        joints=springs[0],
+        grounds=springs[1],
+        build_order=tuple(bricks[i].name for i in order),
+        robots=robots,
+    )
+
+
+def _check_size(content: Content) -> None:
+    corners = sum(len(face) for block in content.blocks for face in block.faces)
+    if not content.blocks:
+        raise SceneError("it has no blocks; give an assembly with some")
+    if corners > MOST_CORNERS:
+        raise SceneError(f"its blocks have {corners} corners; {MOST_CORNERS} is the most")
+
+
+def _unit(content: Content, given: Given, said: list[str]) -> float:
+    """Return the file's unit of length in m."""
+    if given.unit is not None and given.unit not in UNITS:
+        raise SceneError(f"unit is {short(given.unit)}; give one of {', '.join(UNITS)}")
+    if content.unit is None and given.unit is None:
+        raise SceneError(f"it does not say its unit of length; give one of {', '.join(UNITS)}")
+    if content.unit is not None and given.unit not in (None, content.unit):
+        raise SceneError(f"its lengths are known in {content.unit}; give no other unit")
+    if content.unit is None:
+        said.append(f"lengths are in {given.unit}, as given")
+    return UNITS[content.unit or given.unit or "m"]
+
+
+def _up(given: Given, said: list[str]) -> str:
+    """Return the axis of the file that points up."""
+    if given.up not in UPS:
+        raise SceneError(f"up is {short(given.up)}; give one of {', '.join(UPS)}")
+    if given.up == "y":
+        said.append("y is up in the file, as given: (x, y, z) is (x, -z, y) here")
+    return given.up
+
+
+def _supports(content: Content, given: Given, said: list[str]) -> set[int]:
+    """Return the places of the blocks that are the ground."""
+    place = {block.key: i for i, block in enumerate(content.blocks)}
+    marked = [block.key for block in content.blocks if block.support]
+    keys = marked if given.supports is None else [*given.supports]
+    for key in keys:
+        if key not in place:
+            known = short(", ".join(place), 200)
+            raise SceneError(f"there is no block {short(key)}; known are {known}")
+    if keys:
+        shown = ", ".join(keys[:8])
+        more = "" if len(keys) <= 8 else f" and {len(keys) - 8} more"
+        origin = "as the file says" if given.supports is None else "as given"
+        said.append(f"supports are blocks {shown}{more}, {origin}: the ground")
+    supports = {place[key] for key in keys}
+    if len(supports) == len(place):
+        raise SceneError("all blocks are supports; leave one to be built")
+    return supports
+
+
+def _bricks(
+    content: Content, given: Given, blocks: Sequence[Repaired], supports: set[int], said: list[str]
+) -> dict[int, Brick]:
+    """Return the bricks of the blocks that are built, by their places in the file."""
+    keys = [block.key for block in content.blocks]
+    numbers = block_numbers(keys)
+    if [str(number) for number in numbers] != keys:
+        said.append("blocks are numbered from 1 in the file's order")
+    density = None if given.density is None else positive("density", given.density, "kg/m³")
+    built = [(i, block) for i, block in enumerate(content.blocks) if i not in supports]
+    silent = [block.key for _, block in built if block.density is None]
+    if silent and density is None:
+        raise SceneError(f"block {silent[0]} has no density; give one in kg/m³")
+    if silent:
+        said.append(f"density of {len(silent)} blocks is {density:g} kg/m³, as given")
+    return {
+        i: block_brick(numbers[i], solid, block.density or density or 0.0)
+        for i, block in built
+        if isinstance(solid := blocks[i].solid, Polyhedron)
+    }
+
+
+def block_numbers(keys: Sequence[str]) -> list[int]:
+    """Return names of bricks: the keys of all blocks where these are numbers, else from 1."""
+    if all(key.isascii() and key.isdigit() and len(key) < 10 for key in keys):
+        found = [int(key) for key in keys]
+        if len(set(found)) == len(keys) and max(found) < LARGEST_NUMBER // 4:
+            return found
+    return [*range(1, len(keys) + 1)]
+
+
+def _law(content: Content, given: Given, touching: Contacts, said: list[str]) -> JointLaw:
+    law = given.law or content.law or MASONRY
+    if touching.faces or any(joint.translational is None for joint in touching.joints):
+        origin = "as given" if given.law else "of the file" if content.law else "by default"
+        along, across, _ = law.translational
+        said.append(f"joints are {along:g} and {across:g} N/m³ stiff along and across, {origin}")
+    return law
+
+
+def _springs(
+    touching: Contacts, bricks: Mapping[int, Brick], law: JointLaw
+) -> tuple[tuple[Joint, ...], tuple[Ground, ...]]:
+    """Return the joints and ground ends where blocks touch."""
+    made: list[Joint | Ground] = []
+    for (a, b), face in touching.faces:
+        last = bricks[b]
+        if a == GROUND:
+            made.append(face_ground(last.name, face, law, _STUB * min(last.dimensions)))
+        else:
+            made.append(face_joint((bricks[a].name, last.name), face, law))
+    made += [_faceless(joint, bricks, law) for joint in touching.joints]
+    grounds = tuple(spring for spring in made if isinstance(spring, Ground))
+    if not grounds:
+        raise SceneError(
+            "no block stands on the ground: none is marked as a support, and none has a level face "
+            "at the bottom; name supports"
+        )
+    return tuple(spring for spring in made if isinstance(spring, Joint)), grounds
+
+
+def _faceless(joint: FileJoint, bricks: Mapping[int, Brick], law: JointLaw) -> Joint | Ground:
+    """Return a joint, or a ground end, that has no face."""
+    a, b = joint.blocks
+    shift, turn = law.stiffness(joint.side**2, (joint.side**4 / 12,) * 2)
+    stiffness = (joint.translational or shift, joint.rotational or turn)
+    fields = spring_fields(joint.position, joint.along, plane_axes(joint.along)[1], stiffness)
+    if a != GROUND:
+        return Joint(bricks=(bricks[a].name, bricks[b].name), **fields)
+    behind = joint.position - _STUB * min(bricks[b].dimensions) * joint.along
+    return Ground(brick=bricks[b].name, anchor=as_vector(behind), **fields)
+
+
+def _order(
+    touching: Contacts, content: Content, bricks: Mapping[int, Brick], said: list[str]
+) -> list[int]:
+    """Return the places of the bricks in the order of building."""
+    places = [*bricks]
+    row = {i: k for k, i in enumerate(places)}
+    courses = [content.blocks[i].course for i in places]
+    known = None not in courses
+    heights = [round(bricks[i].position[2], 6) for i in places]
+    said.append(
+        "blocks are placed by the file's courses"
+        if known
+        else "blocks are placed from the bottom up"
+    )
+    order = upward_order(
+        [(c or 0.0 if known else 0.0, h) for c, h in zip(courses, heights, strict=True)],
+        [(row[a], row[b]) for a, b in touching.pairs if a != GROUND],
+        [row[b] for a, b in touching.pairs if a == GROUND],
+        [content.blocks[i].key for i in places],
+    )
+    return [places[k] for k in order]

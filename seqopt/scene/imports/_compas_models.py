@@ -1,0 +1,434 @@
+"""Assemblies and models of COMPAS's packages: what blocks they have, and where these touch.
+
+Assemblies of compas_assembly and compas_cra are graphs, with meshes in or beside them, or lists of
+meshes. Models of compas_dem are elements with transformations. Beams of compas_timber are their
+blanks; the model's own joints say which run into each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.errors import SceneError
+from seqopt.scene._checks import short
+from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
+from seqopt.scene.imports._content import (
+    Content,
+    Entry,
+    FileBlock,
+    FileFace,
+    FileJoint,
+    entry,
+    listing,
+    mapping,
+    number,
+    point,
+    points,
+)
+from seqopt.scene.library.common import JointLaw
+
+_PLAIN = 1e-9  # by how much rounding may change the last row of a transformation
+_Solid = tuple[Floats, list[list[int]]]
+
+
+def payload(value: Any) -> Any:
+    """Return what an object holds, under whichever key its version uses; itself if it is bare."""
+    for _ in range(4):
+        if isinstance(value, dict):
+            inner = value.get("data", value.get("value"))
+            value = inner if isinstance(inner, dict | list) else value
+    return value
+
+
+def _held(where: str, value: Any) -> Entry:
+    """Return what a serialized object holds, which is an object too."""
+    return mapping(where, payload(value))
+
+
+def kind(value: Any) -> str:
+    """Return the last part of what an object says that it is, in small letters; empty if none."""
+    name = value.get("dtype") if isinstance(value, dict) else None
+    return name.rsplit("/", 1)[-1].lower() if isinstance(name, str) else ""
+
+
+def _mesh(where: str, value: Any) -> _Solid:
+    """Return the vertices (V, 3) and faces of a mesh, a polyhedron or a box."""
+    held = payload(value)
+    if isinstance(held, dict) and {"xsize", "ysize", "zsize"} <= set(held):
+        return _box(where, held)
+    if isinstance(held, dict) and "vertices" in held:
+        rows = [point(f"{where}: a vertex", row) for row in listing(where, held["vertices"])]
+        sides = listing(where, entry(where, held, "faces"))
+        return np.array(rows).reshape(-1, 3), [_corners(where, side, None) for side in sides]
+    return _halfedge(where, held)
+
+
+def _halfedge(where: str, held: Any) -> _Solid:
+    """Return a mesh whose vertices and faces have keys."""
+    vertex = mapping(f"{where}: vertex", entry(where, held, "vertex"))
+    face = mapping(f"{where}: face", entry(where, held, "face"))
+    place = {key: i for i, key in enumerate(vertex)}
+    rows = [
+        [number(f"{where}: vertex {key}", mapping(where, v).get(axis, 0.0)) for axis in "xyz"]
+        for key, v in vertex.items()
+    ]
+    return np.array(rows).reshape(-1, 3), [
+        _corners(f"{where}: face {key}", side, place) for key, side in face.items()
+    ]
+
+
+def _corners(where: str, side: Any, place: dict[str, int] | None) -> list[int]:
+    """Return the places of a face's vertices; a vertex that closes the circle is left out."""
+    keys = listing(where, side)
+    out = []
+    for key in keys:
+        named = place.get(str(key)) if place is not None else key
+        if not isinstance(named, int) or isinstance(named, bool):
+            raise SceneError(f"{where}: there is no vertex {short(key)}")
+        out.append(named)
+    return out[:-1] if len(out) > 1 and out[0] == out[-1] else out
+
+
+def _box(where: str, held: dict[str, Any]) -> _Solid:
+    """Return a box, whose frame is in its middle."""
+    size = [number(f"{where}: {key}", held[key]) for key in ("xsize", "ysize", "zsize")]
+    origin, axes = _frame(where, held.get("frame"))
+    return origin + 0.5 * (BOX_CORNERS * size) @ axes, [list(face) for face in BOX_FACES]
+
+
+def _frame(where: str, value: Any) -> tuple[Floats, Floats]:
+    """Return the origin (3,) and the axes (3, 3), as rows, of a frame; the world's if None."""
+    if value is None:
+        return np.zeros(3), np.eye(3)
+    held = payload(value)
+    origin, first, second = (
+        point(f"{where}: {key}", entry(where, held, key)) for key in ("point", "xaxis", "yaxis")
+    )
+    third = np.cross(first, second)
+    sizes = [float(np.linalg.norm(axis)) for axis in (first, third)]
+    if not min(sizes) > 0:
+        raise SceneError(f"{where}: xaxis and yaxis span no plane")
+    first, third = first / sizes[0], third / sizes[1]
+    return origin, np.stack([first, np.cross(third, first), third])
+
+
+def _transformation(where: str, value: Any) -> Floats:
+    """Return a transformation (4, 4): with a ``matrix``, or a matrix; none if None."""
+    if value is None:
+        return np.eye(4)
+    held = payload(value)
+    if isinstance(held, dict) and "matrix" not in held and "point" in held:
+        origin, axes = _frame(where, held)
+        return np.vstack([np.column_stack([axes.T, origin]), np.eye(4)[3]])
+    rows = listing(where, held.get("matrix", held) if isinstance(held, dict) else held)
+    matrix = [[number(where, x) for x in listing(where, row)] for row in rows]
+    if [len(row) for row in matrix] != [4] * 4:
+        raise SceneError(f"{where} is {short(value)}; a matrix of four by four is expected")
+    if not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), rtol=0.0, atol=_PLAIN):
+        raise SceneError(f"{where} ends in {matrix[3]}; give a matrix that ends in 0, 0, 0, 1")
+    return np.array(matrix)
+
+
+def _moved(place: Floats, matrix: Floats) -> Floats:
+    """Return points (k, 3) after a transformation (4, 4)."""
+    return np.asarray(place @ matrix[:3, :3].T + matrix[:3, 3])
+
+
+@dataclass(frozen=True)
+class _Element:
+    """An element of a model."""
+
+    where: str  # what to call it in messages
+    kind: str  # the last part of what it says that it is, in small letters
+    guid: str  # its identifier
+    held: Entry  # what it holds
+    matrix: Floats  # (4, 4); from its own coordinates to those of the model's world
+
+
+def _elements(source: str, held: Entry) -> list[_Element]:
+    """Return the elements of a model, groups too, each where COMPAS places it.
+
+    Its transformation is relative to its parent in the tree, and the first of them to the model's.
+    """
+    rows = [*by_guid(f"{source}: elements", entry(source, held, "elements"))]
+    named = {guid: f"{source}: element {i}" for i, (guid, _) in enumerate(rows)}
+    inner = {guid: _held(named[guid], item) for guid, item in rows}
+    placed: dict[str | None, Floats] = {
+        None: _transformation(f"{source}: transformation", held.get("transformation"))
+    }
+    for guid, parent in _tree(source, held):
+        if guid not in inner or guid in placed:
+            why = "occurs twice" if guid in placed else "is not there"
+            raise SceneError(f"{source}: element {short(guid)} of the tree {why}")
+        placed[guid] = placed[parent] @ _own(named[guid], inner[guid])
+    for guid in inner.keys() - placed.keys():
+        placed[guid] = placed[None] @ _own(named[guid], inner[guid])
+    return [
+        _Element(named[guid], kind(item), guid, inner[guid], placed[guid]) for guid, item in rows
+    ]
+
+
+def by_guid(where: str, found: Any) -> Iterator[tuple[str, Entry]]:
+    """Yield serialized objects, which stand by their identifiers or in a list, with these."""
+    listed = not isinstance(found, dict)
+    for key, item in enumerate(listing(where, found)) if listed else found.items():
+        held = mapping(f"{where} {key}", item)
+        yield str(held.get("guid", key) if listed else key), held
+
+
+def _own(where: str, held: Entry) -> Floats:
+    """Return the transformation of an element to its parent; early ones have a frame too."""
+    frame = _transformation(f"{where}: frame", held.get("frame"))
+    return frame @ _transformation(f"{where}: transformation", held.get("transformation"))
+
+
+def _tree(source: str, held: Entry) -> Iterator[tuple[str, str | None]]:
+    """Yield the identifiers of elements and of their parents, parents first."""
+    tree = _held(f"{source}: tree", held.get("tree") or {})
+    waiting: list[tuple[Any, str | None]] = [(tree.get("root") or {}, None)]
+    while waiting:
+        node, above = waiting.pop()
+        guid = mapping(f"{source}: a node of the tree", node).get("element")
+        if guid is not None:
+            yield str(guid), above
+            above = str(guid)
+        children = listing(f"{source}: children in the tree", node.get("children") or [])
+        waiting += [(child, above) for child in children]
+
+
+def read_assembly(document: Any, source: str) -> Content:
+    """Return what an assembly says."""
+    if isinstance(document, list):
+        return _meshes(document, source)
+    graph, meshes = assembly_graph(document, source)
+    nodes = mapping(f"{source}: node", entry(source, graph, "node", "vertex"))
+    common = _held(source, graph.get("node_attributes") or graph.get("dva") or {})
+    keys = [key for key in nodes if meshes is None or key in meshes]
+    blocks = []
+    for key in keys:
+        node = common | mapping(source, nodes[key])
+        blocks.append(_node_block(f"{source}: block {key}", key, node, meshes))
+    place = {key: i for i, key in enumerate(keys)}
+    faces = [
+        FileFace((place[a], place[b]), corners)
+        for a, b, where, held in _edges(source, mapping(f"{source}: edge", graph.get("edge") or {}))
+        for corners in _interfaces(where, held if isinstance(held, dict) else {})
+        if a in place and b in place
+    ]
+    said = [f"{len(nodes) - len(keys)} nodes have no block"] if len(keys) < len(nodes) else []
+    return Content(tuple(blocks), tuple(faces), said=tuple(said))
+
+
+def assembly_graph(document: Any, source: str) -> tuple[Entry, dict[str, Any] | None]:
+    """Return the graph of an assembly, and its meshes by key where they stand beside it."""
+    held = _held(source, document)
+    if "blocks" in held and "assembly" in held:
+        graph = _held(f"{source}: assembly", held["assembly"])
+        return graph, mapping(f"{source}: blocks", held["blocks"])
+    if "graph" in held:
+        held = _held(f"{source}: graph", held["graph"])
+    if "node" not in held:
+        raise SceneError(f"{source}: neither graph nor node is there; give an assembly")
+    return held, None
+
+
+def _meshes(document: list[Any], source: str) -> Content:
+    """Return a list of meshes as blocks."""
+    blocks = []
+    for i, item in enumerate(document):
+        while isinstance(item, list) and len(item) == 1:
+            item = item[0]  # noqa: PLW2901  # some files wrap each mesh
+        blocks.append(FileBlock(str(i), *_mesh(f"{source}: mesh {i}", item)))
+    return Content(tuple(blocks), said=("a list of meshes: no supports, faces or order",))
+
+
+def _node_block(where: str, key: str, node: Entry, meshes: dict[str, Any] | None) -> FileBlock:
+    held = meshes[key] if meshes is not None else entry(where, node, "block")
+    vertices, faces = _mesh(where, held)
+    course = node.get("course")
+    return FileBlock(
+        key,
+        vertices,
+        faces,
+        support=node.get("is_support") is True,
+        course=None if course is None else number(f"{where}: course", course),
+    )
+
+
+def _edges(source: str, found: Entry) -> Iterator[tuple[str, str, str, Any]]:
+    """Yield the ends of a graph's edges, what messages call them, and what they hold."""
+    for a, ends in found.items():
+        for b, held in mapping(f"{source}: edge {a}", ends).items():
+            yield a, b, f"{source}: edge {a}-{b}", held
+
+
+def _interfaces(where: str, held: Entry) -> Iterator[Floats]:
+    """Yield the corners of the faces on an edge, under whichever key its version uses."""
+    found = listing(where, held.get("interfaces") or [])
+    if not found and held.get("interface"):
+        found = [held["interface"]]
+    if held.get("interface_points"):
+        found = [{"points": held["interface_points"]}]
+    for face in found:
+        yield points(where, entry(where, payload(face), "points"))
+
+
+def read_model(document: Any, source: str) -> Content:
+    """Return what a block model, or a problem about one, says."""
+    held = _held(source, document)
+    law, said = None, list[str]()
+    if kind(document) == "problem":
+        law = _law(source, held.get("contact_properties"))
+        said.append("loads of the problem are left out; blocks carry their weight")
+        if "model" not in held:  # some versions keep its identifier alone
+            raise SceneError(
+                f"{source}: the problem does not hold its model; give the model itself"
+            )
+        held = _held(f"{source}: model", held["model"])
+    elements = _elements(source, held)
+    densities = _densities(source, held)
+    kept = {i: e for i, e in enumerate(elements) if e.kind != "group"}
+    blocks = [_block(str(i), element, densities) for i, element in kept.items()]
+    if len(kept) < len(elements):
+        said.append(f"{len(elements) - len(kept)} groups only place what is in them")
+    known: dict[str, int | None] = {element.guid: None for element in elements}
+    known |= {element.guid: k for k, element in enumerate(kept.values())}
+    place = _places(source, held, known)
+    faces = tuple(
+        FileFace((entry(source, place, a), entry(source, place, b)), corners)
+        for a, b, corners in _contacts(source, held)
+    )
+    return Content(tuple(blocks), faces, law=law, said=tuple(said))
+
+
+def _densities(source: str, held: Entry) -> dict[str, float]:
+    """Return the densities of materials by their identifier."""
+    items = by_guid(f"{source}: materials", held.get("materials") or [])
+    found = {guid: _held(source, item).get("density") for guid, item in items}
+    return {
+        g: number(f"{source}: density", value) for g, value in found.items() if value is not None
+    }
+
+
+def _block(key: str, element: _Element, densities: dict[str, float]) -> FileBlock:
+    where, held = element.where, element.held
+    vertices, faces = _mesh(where, entry(where, held, "geometry", "shape"))
+    return FileBlock(
+        key,
+        _moved(vertices, element.matrix),
+        faces,
+        support=held.get("is_support") is True,
+        density=densities.get(str(held.get("material"))),
+    )
+
+
+def _places(source: str, held: Entry, known: dict[str, int | None]) -> dict[str, int]:
+    """Return the places of the blocks of the graph's nodes; groups have none."""
+    nodes = mapping(source, mapping(source, held.get("graph") or {}).get("node") or {})
+    out = {}
+    for key, node in nodes.items():
+        element = mapping(f"{source}: node {key}", node).get("element")
+        if str(element) not in known:
+            raise SceneError(f"{source}: node {key} is of element {element}, which is not there")
+        place = known[str(element)]
+        if place is not None:
+            out[key] = place
+    return out
+
+
+def _contacts(source: str, held: Entry) -> Iterator[tuple[str, str, Floats]]:
+    """Yield the keys of blocks that touch, and the corners of each face."""
+    graph = mapping(source, held.get("graph") or {})
+    for a, b, where, item in _edges(source, mapping(source, graph.get("edge") or {})):
+        for face in listing(where, mapping(where, item or {}).get("contacts") or []):
+            corners = points(where, _held(where, face).get("points") or [])
+            if len(corners) > 2:  # of points and edges nothing is carried over a face
+                yield a, b, corners
+
+
+def _law(source: str, held: Any) -> JointLaw | None:
+    """Return the stiffness of joints by area, if the model has one."""
+    if held is None:
+        return None
+    properties = _held(source, held)
+    found = properties.get("joint_model") or properties.get("contact_model") or {}
+    model = _held(f"{source}: joint model", found)
+    normal = model.get("kn", model.get("k_n"))
+    side = model.get("kt", model.get("k_t"))
+    if normal is None or side is None:
+        return None
+    across = number(f"{source}: kt", side)
+    return JointLaw(translational=(number(f"{source}: kn", normal), across, across))
+
+
+def read_timber(document: Any, source: str) -> Content:
+    """Return the beams of a model, which must have some."""
+    elements = _elements(source, held := _held(source, document))
+    beams = [element for element in elements if element.kind == "beam"]
+    if not beams:
+        raise SceneError(f"{source}: it has no beams; give a model with some")
+    blocks = tuple(_beam(f"{source}: beam {i}", str(i), beam) for i, beam in enumerate(beams))
+    place = {beam.guid: i for i, beam in enumerate(beams)}
+    joints = tuple(_joint(blocks, pair) for pair in _pairs(source, held, place))
+    said = ["beams are their blanks: cuts and fasteners are left out"]
+    if len(beams) < len(elements):
+        said.append(f"{len(elements) - len(beams)} elements that are not beams are left out")
+    return Content(blocks, joints=joints, said=tuple(said))
+
+
+def _beam(where: str, key: str, beam: _Element) -> FileBlock:
+    """Return a beam; its frame, where it has one, is that in the model, not that in its group."""
+    held = beam.held
+    names = ("length", "width", "height")
+    size = np.array([number(f"{where}: {name}", entry(where, held, name)) for name in names])
+    if not size.min() > 0:
+        raise SceneError(f"{where}: its sizes are {size.tolist()}; give positive ones")
+    local: Floats = 0.5 * (BOX_CORNERS + np.array([1.0, 0.0, 0.0])) * size
+    if held.get("frame") is not None:
+        origin, axes = _frame(where, held["frame"])
+        return FileBlock(key, np.asarray(origin + local @ axes), BOX_FACES)
+    return FileBlock(key, _moved(local, beam.matrix), BOX_FACES)
+
+
+def _pairs(source: str, held: Entry, place: dict[str, int]) -> Iterable[tuple[int, int]]:
+    """Return the places of beams that the model's own joints hold together, each pair once."""
+    items = by_guid(f"{source}: joints", held.get("joints") or [])
+    ends = [listing(source, _held(source, item).get("element_guids") or []) for _, item in items]
+    known = [sorted(place[str(x)] for x in found if str(x) in place) for found in ends]
+    return dict.fromkeys(pair for found in known for pair in combinations(found, 2))
+
+
+def _joint(blocks: tuple[FileBlock, ...], pair: tuple[int, int]) -> FileJoint:
+    """Return a joint halfway between the center lines of two beams, where these are nearest."""
+    (start, step, side), (other, reach, width) = (_center_line(blocks[i].vertices) for i in pair)
+    at, to = _nearest((start, step), (other, reach))
+    middle = 0.5 * (start + at * step + other + to * reach)
+    first, last = (blocks[i].vertices.mean(axis=0) for i in pair)
+    size = float(np.linalg.norm(last - first))
+    along = (last - first) / size if size > 0 else np.array([0.0, 0.0, 1.0])
+    return FileJoint(pair, middle, along, min(side, width))
+
+
+def _center_line(corners: Floats) -> tuple[Floats, Floats, float]:
+    """Return the start of a beam's center line, the step to its end, and its smaller side."""
+    start, end = corners[:4].mean(axis=0), corners[4:].mean(axis=0)
+    sides = np.linalg.norm(corners[[1, 2]] - corners[0], axis=1)
+    return start, end - start, float(sides.min())
+
+
+def _nearest(first: tuple[Floats, Floats], second: tuple[Floats, Floats]) -> tuple[float, float]:
+    """Return at which shares of two lines, starts and steps, they are nearest to each other."""
+    (start, step), (other, reach) = first, second
+    gap = start - other
+    a, b, c = float(step @ step), float(step @ reach), float(reach @ reach)
+    d, e = float(step @ gap), float(reach @ gap)
+    apart = a * c - b * b
+    at = 0.5 if apart <= 1e-12 * a * c else float(np.clip((b * e - c * d) / apart, 0.0, 1.0))
+    to = float(np.clip((b * at + e) / c, 0.0, 1.0))
+    return float(np.clip((b * to - d) / a, 0.0, 1.0)), to

@@ -1,0 +1,178 @@
+"""What a file says about an assembly, what the user has to add, and JSON that is read strictly."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.errors import SceneError
+from seqopt.scene._checks import as_float, reading_json, short
+from seqopt.scene.library.common import JointLaw
+from seqopt.work.progress import Tell
+
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}  # m
+UPS = ("z", "y")
+_Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # (x, y, z) to (x, -z, y)
+LARGEST = 1e15  # number: products of coordinates beyond lose all digits
+MOST_BLOCKS = 20_000
+MOST_CORNERS = 2_000_000  # of all faces of all blocks
+
+
+@dataclass(frozen=True)
+class FileBlock:
+    """A block as a file has it."""
+
+    key: str  # what the file calls it
+    vertices: Floats  # (V, 3); in the file's unit of length
+    faces: Sequence[Sequence[int]]  # places among the vertices
+    support: bool = False  # whether it is fixed
+    density: float | None = None  # kg/m³
+    course: float | None = None  # its place in the build; lower ones come first
+
+
+@dataclass(frozen=True)
+class FileFace:
+    """Where two blocks touch, as a file has it."""
+
+    blocks: tuple[int, int]  # places among the blocks
+    corners: Floats  # (m, 3); once around, in the file's unit of length
+
+
+@dataclass(frozen=True)
+class FileJoint:
+    """A joint that has a place and no face. Where its blocks touch over faces, these count.
+
+    ``blocks``: -1 first for the ground. ``side``: of the square over which the law of joints is
+    taken, in the file's unit, unless ``translational``, N/m, and ``rotational``, N m/rad, are
+    given.
+    """
+
+    blocks: tuple[int, int]
+    position: Floats
+    along: Floats
+    side: float
+    translational: tuple[float, float, float] | None = None
+    rotational: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a file says about an assembly."""
+
+    blocks: tuple[FileBlock, ...]
+    faces: tuple[FileFace, ...] = ()  # empty where the file has none
+    joints: tuple[FileJoint, ...] = ()  # of frames and of beams that run into each other
+    unit: str | None = None  # unit of length, one of `UNITS`, if the file says it
+    law: JointLaw | None = None  # if the file has stiffnesses
+    said: tuple[str, ...] = ()  # what was read, left out or assumed
+
+    def placed(self, unit: float, up: str) -> Content:
+        """Return the content in m, with z up. ``unit``: of its lengths, m; ``up``: one of `UPS`."""
+        turn = _Y_TO_Z if up == "y" else np.eye(3)
+        blocks = (replace(b, vertices=unit * b.vertices @ turn) for b in self.blocks)
+        faces = (replace(f, corners=unit * f.corners @ turn) for f in self.faces)
+        joints = (
+            replace(
+                joint,
+                position=unit * joint.position @ turn,
+                side=unit * joint.side,
+                along=joint.along @ turn,
+            )
+            for joint in self.joints
+        )
+        return replace(self, blocks=tuple(blocks), faces=tuple(faces), joints=tuple(joints))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Given:
+    """What the user adds if a file does not say it.
+
+    ``unit``: unit of length of the file, one of `UNITS`; ``up``: which axis of the file points up,
+    ``z`` or ``y``; ``density``: of blocks for which the file has none, kg/m³; ``supports``: keys of
+    blocks that are fixed, in place of those of the file; ``law``: stiffness of joints by area, in
+    place of that of the file; ``gap``: most that may lie between faces that touch, m; ``detect``:
+    whether to look for faces although the file has some; ``robots``: how many mobile robots the
+    scene gets; ``name``: of the scene; ``progress``: told how far it is to find faces, which takes
+    long of many blocks.
+    """
+
+    unit: str | None = None
+    up: str = "z"
+    density: float | None = None
+    supports: Sequence[str] | None = None
+    law: JointLaw | None = None
+    gap: float | None = None
+    detect: bool = False
+    robots: int = 3
+    name: str | None = None
+    progress: Tell | None = None
+
+
+Entry = dict[str, Any]
+
+
+def parse_json(text: str, source: str) -> Any:
+    """Return a JSON document, nested no deeper and with no longer numbers than Python reads."""
+    with reading_json(source, "an assembly"):
+        return json.loads(text, parse_constant=partial(_refuse, source))
+
+
+def _refuse(source: str, name: str) -> float:
+    raise SceneError(f"{source}: {name} stands where a number should; give finite numbers")
+
+
+def mapping(where: str, value: object) -> Entry:
+    """Return an object of a document."""
+    if not isinstance(value, dict):
+        raise SceneError(f"{where} is {short(value)}; an object is expected")
+    return value
+
+
+def entry(where: str, holder: object, *keys: str) -> Any:
+    """Return what stands in an object under the first of some keys that there is."""
+    found = mapping(where, holder)
+    for key in keys:
+        if key in found:
+            return found[key]
+    raise SceneError(f"{where}: {' or '.join(keys)} is missing")
+
+
+def listing(where: str, value: object, most: int = 10**7) -> list[Any]:
+    """Return a list of a document. ``most``: entries that it may have."""
+    if not isinstance(value, list):
+        raise SceneError(f"{where} is {short(value)}; a list is expected")
+    if len(value) > most:
+        raise SceneError(f"{where} has {len(value)} entries; {most} is the most")
+    return value
+
+
+def number(where: str, value: object) -> float:
+    """Return a finite number of a document, up to `LARGEST`."""
+    found = as_float(value)
+    if not abs(found) <= LARGEST or isinstance(value, bool):
+        raise SceneError(
+            f"{where} is {short(value)}; a finite number up to {LARGEST:g} is expected"
+        )
+    return found
+
+
+def point(where: str, value: object) -> Floats:
+    """Return a point (3,) of a document: three numbers, as they are or in an object of COMPAS."""
+    plain = value
+    while isinstance(plain, dict):
+        plain = entry(where, plain, "data", "value", "point")
+    row = listing(where, plain)
+    if len(row) != 3:
+        raise SceneError(f"{where} is {short(value)}; three numbers are expected")
+    return np.array([number(where, x) for x in row])
+
+
+def points(where: str, value: object) -> Floats:
+    """Return the points (k, 3) of a list of a document."""
+    return np.array([point(where, row) for row in listing(where, value)]).reshape(-1, 3)

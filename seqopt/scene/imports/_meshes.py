@@ -1,0 +1,360 @@
+"""Meshes of blocks: OBJ with its polygons and objects, PLY and STL, read and repaired.
+
+trimesh reads PLY and STL. Of an OBJ it keeps triangles alone, cut as fans, which a face that is not
+convex does not survive, and joins all objects; so OBJ has a few lines of its own here.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from seqopt.arrays import Floats, Ints
+from seqopt.errors import FileError, SceneError
+from seqopt.scene._checks import short
+from seqopt.scene.boxes import as_vectors
+from seqopt.scene.imports._content import LARGEST, MOST_BLOCKS, Content, FileBlock
+from seqopt.scene.shape import FLAT, Polyhedron, Surface, bend, edges, fans
+
+_Polygons = Sequence[Sequence[int]]
+_Edges = frozenset[tuple[int, int]]
+_LEAST = 4  # faces of a closed block
+_WELD = 1e-6  # distance of vertices that are one, over the size of the block
+
+
+def _split_blocks(vertices: Floats, faces: _Polygons) -> list[list[int]]:
+    """Return the places of the faces of each block of a mesh.
+
+    A block ends where, in the file's order, every edge has been used twice, corners in one place
+    being one. If blocks are left open so, one is what shares vertices, where these say it.
+    """
+    place = _united(vertices)
+    united = [[int(place[v]) for v in face] for face in faces]
+    sides = [_edges(face) for face in united]
+    part = _parts(len(vertices), faces)
+    blocks, rest = _closed(range(len(faces)), sides)
+    if rest:
+        alone = len({v for face in faces for v in face}) == sum(map(len, faces))
+        groups = _grouped(range(len(faces)), _parts(len(vertices), united) if alone else part)
+        ends = [_closed(group, sides) for group in groups]
+        return [block for closed, left in ends for block in [*closed, left] if block]
+    return _once([own for block in blocks for own in _unmixed(block, sides, part)], sides)
+
+
+def _united(vertices: Floats) -> Ints:
+    """Return one number for all vertices in one place."""
+    from scipy.spatial import KDTree  # noqa: PLC0415  # slow to import, and seldom needed
+
+    points, place = np.unique(vertices, axis=0, return_inverse=True)
+    reach = _WELD * float(np.ptp(points, axis=0).max(initial=0.0))
+    pairs = KDTree(points).query_pairs(reach, output_type="ndarray")
+    return _linked(len(points), pairs)[place.reshape(-1)]
+
+
+def _edges(face: Sequence[int]) -> _Edges:
+    """Return the edges of a face, without those that it passes twice."""
+    out = set[tuple[int, int]]()
+    for a, b in edges(face):
+        out ^= {(min(a, b), max(a, b))} if a != b else set()
+    return frozenset(out)
+
+
+def _closed(faces: Iterable[int], sides: Sequence[_Edges]) -> tuple[list[list[int]], list[int]]:
+    """Return the blocks that faces close one after the other, and the faces that are left."""
+    blocks, block = list[list[int]](), list[int]()
+    seen, once = set[_Edges](), set[tuple[int, int]]()
+    for i in faces:
+        block.append(i)
+        once ^= sides[i] if sides[i] not in seen else set()
+        seen.add(sides[i])
+        if not once and len(seen) >= _LEAST:
+            blocks.append(block)
+            block, seen = [], set()
+    if blocks and {sides[i] for i in block} <= {sides[i] for i in blocks[-1]}:
+        blocks[-1] += block
+        block = []
+    return blocks, block
+
+
+def _unmixed(block: list[int], sides: Sequence[_Edges], part: Ints) -> list[list[int]]:
+    """Return closed faces, in parts that share no vertices if each is closed too."""
+    groups = _grouped(block, part)
+    return [block] if any(_closed(group, sides)[1] for group in groups) else groups
+
+
+def _once(blocks: list[list[int]], sides: Sequence[_Edges]) -> list[list[int]]:
+    """Return blocks of which no two have the same faces; what stands there twice is one."""
+    found = defaultdict[frozenset[_Edges], list[int]](list)
+    for block in blocks:
+        found[frozenset(sides[i] for i in block)] += block
+    return [*found.values()]
+
+
+def _grouped(faces: Iterable[int], part: Ints) -> list[list[int]]:
+    """Return faces by the part that they belong to, in their order."""
+    out = defaultdict(list)
+    for i in faces:
+        out[part[i]].append(i)
+    return [*out.values()]
+
+
+def _parts(count: int, faces: _Polygons) -> Ints:
+    """Return the number of the part of every face; parts share no vertex."""
+    ends = np.array([(face[0], v) for face in faces for v in face[1:]]).reshape(-1, 2)
+    return _linked(count, ends)[[face[0] for face in faces]]
+
+
+def _linked(count: int, links: Ints) -> Ints:
+    """Return the number of the group that each of so many things is in, given links."""
+    graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+_UNASKED = logging.NullHandler()  # else Python prints what no one listens to
+
+
+def read_obj(text: str, source: str) -> Content:
+    """Return the blocks of a Wavefront OBJ file, named as objects, or groups if they are more."""
+    vertices: list[list[float]] = []
+    faces: list[list[int]] = []
+    named = {"o": "", "g": ""}
+    names: dict[str, list[str]] = {"o": [], "g": []}
+    for i, line in enumerate(text.splitlines(), start=1):
+        words = line.split("#", 1)[0].split()
+        if words and words[0] == "v":
+            vertices.append(_numbers(f"{source}, line {i}", words[1:4]))
+        elif words and words[0] == "f":
+            face = [_place(f"{source}, line {i}", w, len(vertices)) for w in words[1:]]
+            if len(face) < 3:
+                raise SceneError(f"{source}, line {i}: a face has three vertices or more")
+            faces.append(face)
+            for kind, name in named.items():
+                names[kind].append(name)
+        elif words and words[0] in named:
+            named[words[0]] = " ".join(words[1:])
+    points = np.array(vertices, dtype=float).reshape(-1, 3)
+    return _content(points, faces, source, max(names.values(), key=lambda own: len(set(own))))
+
+
+def read_mesh(content: bytes, source: str, form: str) -> Content:
+    """Return the blocks of a ``ply`` or ``stl`` file, for which trimesh is needed."""
+    if find_spec("trimesh") is None:
+        raise FileError(f"{source}: reading {form} needs trimesh; pip install 'seqopt[blocks]'")
+    vertices, faces = _loaded(content, source, form)
+    if not (np.abs(vertices) <= LARGEST).all():
+        raise SceneError(f"{source}: a vertex is not finite; give numbers up to {LARGEST:g}")
+    if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
+        raise SceneError(f"{source}: a face names a vertex that is not there; {len(vertices)} are")
+    if form == "stl":  # it repeats the vertices of every triangle
+        vertices, place = np.unique(vertices, axis=0, return_inverse=True)
+        faces = place.reshape(-1)[faces]
+    return _content(vertices, faces.tolist(), source)
+
+
+def _loaded(content: bytes, source: str, form: str) -> tuple[Floats, Ints]:
+    """Return what trimesh makes of bytes; what it logs is for those who asked for logs."""
+    logging.getLogger("trimesh").addHandler(_UNASKED)
+    try:
+        found = import_module("trimesh").load_mesh(
+            io.BytesIO(content), file_type=form, process=False
+        )
+        return np.asarray(found.vertices, dtype=float), np.asarray(found.faces, dtype=np.int64)
+    except MemoryError:
+        raise
+    except Exception as error:  # whatever a reader of broken bytes may raise
+        said = short(str(error) or type(error).__name__, 80)
+        raise SceneError(f"{source}: no {form} file that can be read: {said}") from error
+
+
+def _content(vertices: Floats, faces: _Polygons, source: str, names: Sequence[str] = ()) -> Content:
+    if not faces:
+        raise SceneError(f"{source}: it has no faces; give closed meshes")
+    own = _split_blocks(vertices, faces)
+    if len(own) > MOST_BLOCKS:
+        raise SceneError(f"{source}: {len(own)} blocks; {MOST_BLOCKS} is the most")
+    keys = _keys([names[block[0]] if names else "" for block in own])
+    parts = (_compact(vertices, [faces[i] for i in block]) for block in own)
+    blocks = tuple(FileBlock(key, *part) for key, part in zip(keys, parts, strict=True))
+    return Content(blocks, said=("a mesh: no supports, faces or order",))
+
+
+def _keys(names: Sequence[str]) -> list[str]:
+    """Return the names of blocks, numbered where several have one; places if some have none."""
+    seen = Counter[str]()
+    keys = []
+    for name in names:
+        seen[name] += 1
+        keys.append(name if seen[name] == 1 else f"{name}-{seen[name]}")
+    return keys if "" not in seen and len(set(keys)) == len(keys) else [*map(str, range(len(keys)))]
+
+
+def _compact(points: Floats, faces: _Polygons) -> tuple[Floats, tuple[tuple[int, ...], ...]]:
+    """Return the points that faces use, and the faces between these."""
+    used = sorted({v for face in faces for v in face})
+    place = {v: i for i, v in enumerate(used)}
+    return points[used], tuple(tuple(place[v] for v in face) for face in faces)
+
+
+def _numbers(where: str, words: list[str]) -> list[float]:
+    try:
+        row = [float(word) for word in words]
+    except ValueError:
+        row = []
+    if len(row) != 3 or not (np.abs(row) <= LARGEST).all():
+        raise SceneError(f"{where}: a vertex is {short(' '.join(words))}; give three numbers")
+    return row
+
+
+def _place(where: str, word: str, count: int) -> int:
+    """Return which vertex a word names: from 1, or back from the last."""
+    try:
+        named = int(word.split("/", 1)[0])
+    except ValueError:
+        named = 0
+    place = named - 1 if named > 0 else count + named
+    if named == 0 or not 0 <= place < count:
+        raise SceneError(f"{where}: there is no vertex {short(word)}; {count} stand before")
+    return place
+
+
+_Loop = tuple[int, ...]
+
+_CUT = "faces that are not flat are cut into triangles"
+_WELDED = "vertices in one place are united"
+_TWICE = "faces that stand there twice are left out"
+_OPEN = "supports are surfaces that are not closed"
+_TURNED = "faces are turned so that all agree which side is outside"
+
+
+@dataclass(frozen=True)
+class Repaired:
+    """A block whose faces are in order, or a support as a surface, and what was mended how often.
+
+    ``facets``: its faces as the file has them, also those that are not flat: where it touches
+    others.
+    """
+
+    solid: Polyhedron | Surface
+    facets: Surface
+    mended: Counter[str]
+
+
+def repair_shape(block: FileBlock, *, may_be_open: bool = False) -> Repaired:
+    """Return a block as a polyhedron, or as a surface if it is not closed and may be."""
+    mended: Counter[str] = Counter()
+    points, faces = block.vertices, [_plain(face) for face in block.faces]
+    size = float(np.ptp(points, axis=0).max(initial=0.0)) if len(points) else 0.0
+    if _open_edges(faces):
+        points, faces = _welded(points, faces, _WELD * size, mended)
+    faces = [face for face in _unrepeated(faces, mended) if len(face) > 2]
+    faces = _agreeing(points, faces, mended)
+    facets = Surface(points, tuple(face for face in faces if bend(points[list(face)]) < np.inf))
+    faces = [part for face in faces for part in _flat(points, face, size, mended)]
+    corners, named = _compact(points, faces)
+    try:
+        return Repaired(Polyhedron(as_vectors(corners), named), facets, mended)
+    except SceneError as error:
+        if may_be_open and faces:
+            mended[_OPEN] += 1
+            both = Surface(points, (*facets.faces, *(face[::-1] for face in facets.faces)))
+            return Repaired(both, both, mended)
+        raise SceneError(f"block {block.key}: {error}") from error
+
+
+def _plain(face: Sequence[int]) -> _Loop:
+    """Return a face without vertices that follow themselves."""
+    return tuple(v for v, before in zip(face, (*face[-1:], *face[:-1]), strict=True) if v != before)
+
+
+def _unrepeated(faces: list[_Loop], mended: Counter[str]) -> list[_Loop]:
+    """Return faces of which no two have the same vertices."""
+    found = {frozenset(face): face for face in reversed(faces)}
+    if len(found) < len(faces):
+        mended[_TWICE] += len(faces) - len(found)
+    return [face for face in faces if found.get(frozenset(face)) is face]
+
+
+def _open_edges(faces: Sequence[_Loop]) -> bool:
+    """Return whether an edge has fewer or more than two faces."""
+    times = Counter(frozenset(edge) for face in faces for edge in edges(face))
+    return any(count != 2 for count in times.values())
+
+
+def _welded(
+    points: Floats, faces: list[_Loop], reach: float, mended: Counter[str]
+) -> tuple[Floats, list[_Loop]]:
+    """Return points, those in one place united, and the faces between them."""
+    from scipy.spatial import KDTree  # noqa: PLC0415  # slow to import, and seldom needed
+
+    first = np.arange(len(points))
+    for a, b in sorted(KDTree(points).query_pairs(reach)) if len(points) and reach > 0 else ():
+        first[b] = min(first[b], first[a])
+    if united := int((first != np.arange(len(points))).sum()):
+        mended[_WELDED] += united
+    return points, [_plain(tuple(int(first[v]) for v in face)) for face in faces]
+
+
+def _flat(points: Floats, face: _Loop, size: float, mended: Counter[str]) -> list[_Loop]:
+    """Return a face, or triangles in its place if it is not flat; none if it has no area."""
+    refused = len(set(face)) < len(face)  # by the polyhedron
+    if refused or len(face) == 3 or bend(points[list(face)]) <= FLAT * size:
+        return [face]
+    mended[_CUT] += 1
+    if len(face) == 4:
+        a, b, c, d = face
+        shorter = np.linalg.norm(points[a] - points[c]) <= np.linalg.norm(points[b] - points[d])
+        return [(a, b, c), (a, c, d)] if shorter else [(a, b, d), (b, c, d)]
+    return [(a, b, c) for a, b, c in fans([face]).tolist()]
+
+
+def _agreeing(points: Floats, faces: list[_Loop], mended: Counter[str]) -> list[_Loop]:
+    """Return faces turned so that they agree which side is outside, and that it is outside."""
+    beside = defaultdict(list)
+    for i, face in enumerate(faces):
+        for a, b in edges(face):
+            beside[frozenset((a, b))].append((i, a < b))
+    turned: dict[int, bool] = {}
+    for start in range(len(faces)):
+        if start not in turned:
+            turned[start] = False
+            _spread(start, faces, beside, turned)
+    out = [face[::-1] if turned[i] else face for i, face in enumerate(faces)]
+    if _volume(points, out) < 0:
+        out = [face[::-1] for face in out]
+    if changed := sum(face != before for face, before in zip(out, faces, strict=True)):
+        mended[_TURNED] += changed
+    return out
+
+
+def _spread(
+    start: int,
+    faces: list[_Loop],
+    beside: dict[frozenset[int], list[tuple[int, bool]]],
+    turned: dict[int, bool],
+) -> None:
+    """Note which faces must be turned to agree with one, neighbor by neighbor."""
+    waiting = [start]
+    while waiting:
+        i = waiting.pop()
+        face = faces[i]
+        for a, b in edges(face):
+            meet = beside[frozenset((a, b))]
+            for j, up in meet if len(meet) == 2 else ():
+                if j not in turned:
+                    turned[j] = turned[i] ^ (up == (a < b))
+                    waiting.append(j)
+
+
+def _volume(points: Floats, faces: list[_Loop]) -> float:
+    """Return six times the signed volume within faces."""
+    spokes = points - points.mean(axis=0)
+    return float(np.linalg.det(spokes[fans(faces)]).sum())

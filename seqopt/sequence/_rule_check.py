@@ -1,0 +1,167 @@
+"""The rules of a free schedule, one state after the other, in plain words.
+
+A second route to what `seqopt.sequence._rule_space` does for many states at a time: it shares
+nothing with it, and judges what was found there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from seqopt.errors import StepError
+from seqopt.network.network import Network
+from seqopt.sequence.rules import Ending, FreeRules, Newest
+from seqopt.sequence.schedule import islands
+from seqopt.sequence.steps import Grips, Step, StepKind, reachable
+from seqopt.sequence.two_robots import placing_node
+
+
+@dataclass(frozen=True)
+class RuleBook:
+    """The rules of a free schedule in a scene."""
+
+    network: Network
+    rules: FreeRules
+
+    @cached_property
+    def team(self) -> tuple[int, ...]:
+        """Indices of the robots that take part."""
+        return self.rules.team(self.network.scene)
+
+    @cached_property
+    def reached(self) -> dict[tuple[int, int], tuple[int, ...]]:
+        """By robot and brick count, the nodes that it may hold."""
+        scene = self.network.scene
+        counts = range(len(scene.placed) + 1)
+        return {(r, b): reachable(scene, scene.robots[r], b) for r in self.team for b in counts}
+
+    @cached_property
+    def takes(self) -> dict[tuple[int, int], tuple[int, ...]]:
+        """By robot and brick count, the nodes of bricks that stand that it may take hold of."""
+        counts = range(len(self.network.scene.placed) + 1)
+        near = [self.rules.near(self.network.scene, b) for b in counts]
+        return {
+            (r, b): tuple(n for n in nodes if n in near[b])
+            for (r, b), nodes in self.reached.items()
+        }
+
+    @cached_property
+    def newest_nodes(self) -> dict[tuple[int, int], tuple[int, ...]]:
+        """By robot and brick count, at which nodes it holds the newest brick."""
+        out = {}
+        for r in self.team:
+            robot = self.network.scene.robots[r]
+            for b, brick in enumerate(self.network.scene.placed, start=1):
+                nodes = tuple(node for node in brick.nodes if node in self.reached[r, b])
+                if self.rules.newest is Newest.PLACING and nodes:
+                    nodes = (placing_node(self.network, robot, brick),)
+                out[r, b] = nodes
+        return out
+
+    @cached_property
+    def _islands(self) -> dict[int, tuple[frozenset[int], ...]]:
+        counts = range(1, len(self.network.scene.placed) + 1)
+        return {b: islands(self.network, b) for b in counts}
+
+    def fault(self, bricks: int, grips: Grips) -> str:
+        """Return which rule a state breaks, the ending aside.
+
+        ``grips``: node that each of the scene's robots holds. Result: in a few words; empty if it
+        breaks none.
+        """
+        held = [node for node in grips if node is not None]
+        if bricks > 1 and len(held) < self.rules.least_grips:
+            return f"{len(held)} grips, fewer than least_grips={self.rules.least_grips}"
+        if self.rules.newest is not Newest.FREE:
+            on = [r for r in self.team if grips[r] in self.newest_nodes[r, bricks]]
+            if not on:
+                return f"nobody holds the newest brick (newest={self.rules.newest.value})"
+        names = {self.network.scene.brick_of_node[node].name for node in held}
+        if any(not names & island for island in self._islands[bricks]):
+            return "a part that no joint ties to the ground is held by nobody"
+        return ""
+
+    def follow(
+        self, bricks: int, grips: Grips, regrips: int
+    ) -> Iterator[tuple[StepKind, int, Grips, int]]:
+        """Yield every step that is possible from a state.
+
+        ``bricks``: zero before the first; ``regrips``: grips taken since the last brick.
+        """
+        last = len(self.network.scene.placed)
+        keeps = bricks > 0 and not self.fault(bricks, grips)
+        if keeps and (self.rules.regrips is None or regrips < self.rules.regrips):
+            for after in self._held(bricks, grips):
+                yield StepKind.REPOSITION, bricks, after, regrips + 1
+        for after in self._released(bricks, grips):
+            yield StepKind.RELEASE, bricks, after, regrips
+        if bricks < last and (keeps or not bricks):
+            for after in self._placed(bricks + 1, grips):
+                yield StepKind.PLACE, bricks + 1, after, 0
+
+    def _held(self, bricks: int, grips: Grips) -> Iterator[Grips]:
+        """Yield the grips after one more is taken, which breaks no rule."""
+        for robot in self.team:
+            for node in self.takes[robot, bricks] if grips[robot] is None else ():
+                if node not in grips:
+                    yield _with(grips, robot, node)
+
+    def _released(self, bricks: int, grips: Grips) -> Iterator[Grips]:
+        """Yield the grips after one is let go, or at the end all."""
+        ends = bricks == len(self.network.scene.placed)
+        letting_go = ends and self.rules.ending is Ending.ONE_BY_ONE
+        for robot in self.team:
+            if grips[robot] is not None:
+                after = _with(grips, robot, None)
+                if letting_go or not self.fault(bricks, after):
+                    yield after
+        if ends and self.rules.ending is Ending.RELEASED and any(n is not None for n in grips):
+            yield (None,) * len(grips)
+
+    def _placed(self, bricks: int, grips: Grips) -> Iterator[Grips]:
+        """Yield the grips after the next brick is placed."""
+        names = [robot.name for robot in self.network.scene.robots]
+        for robot in self.team:
+            able = not self.rules.placers or names[robot] in self.rules.placers
+            for node in self.newest_nodes[robot, bricks] if able and grips[robot] is None else ():
+                after = _with(grips, robot, node)
+                if not self.fault(bricks, after):
+                    yield after
+
+    def ends(self, bricks: int, grips: Grips) -> bool:
+        """Return whether a state ends the build."""
+        if bricks < len(self.network.scene.placed):
+            return False
+        if self.rules.ending is Ending.HELD:
+            return not self.fault(bricks, grips)
+        return all(node is None for node in grips)
+
+
+def check_free(network: Network, rules: FreeRules, steps: Sequence[Step]) -> None:
+    """Require that a sequence keeps the rules of a free schedule, payloads aside.
+
+    ``steps``: of one that `seqopt.sequence.steps.check_sequence` accepts. Raises `StepError` if a
+    step is not among those that were possible; the message says which.
+    """
+    book = RuleBook(network, rules)
+    state: tuple[int, Grips, int] = (0, (None,) * len(network.scene.robots), 0)
+    for step in steps:
+        found = [
+            (bricks, grips, regrips)
+            for kind, bricks, grips, regrips in book.follow(*state)
+            if (kind, bricks, grips) == (step.kind, step.bricks, step.grips)
+        ]
+        if not found:
+            why = book.fault(step.bricks, step.grips) or "no rule allows it after the one before"
+            raise StepError(f"step {step.number} ({step.kind.value}) of a free schedule: {why}")
+        state = found[0]
+    if not book.ends(*state[:2]):
+        raise StepError(
+            f"step {len(steps)}: the build does not end there (ending={rules.ending.value})"
+        )
+
+
+def _with(grips: Grips, robot: int, node: int | None) -> Grips:
+    return (*grips[:robot], node, *grips[robot + 1 :])

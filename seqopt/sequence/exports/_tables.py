@@ -1,0 +1,176 @@
+"""Plans as a table and as JSON: absent, placed or held, by block and step.
+
+Also as sequencer_benchmark writes them: parts that a step installs, and parts that it holds.
+`assembly_sequence` of https://github.com/KIKI007/sequencer_benchmark is read there by
+``AssemblySequence::loadFromJson``. A part is the name of a brick.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from seqopt._files import harmless
+from seqopt.errors import StepError
+from seqopt.scene._checks import short
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Step, StepKind, check_sequence
+
+
+class BlockState(Enum):
+    """The state of a block in a step."""
+
+    ABSENT = "absent"
+    PLACED = "placed"
+    HELD = "held"  # placed, and held by a robot
+
+
+@dataclass(frozen=True)
+class StepStates:
+    """A step by its blocks.
+
+    ``new``: names of the bricks that this step places; ``holds`` (int, int): node and brick that
+    robots hold, by the robots' names; ``states``: by the names of all bricks of the scene, in build
+    order.
+    """
+
+    step: Step
+    new: tuple[int, ...]
+    holds: dict[str, tuple[int, int]]
+    states: dict[int, BlockState]
+
+
+def step_states(scene: Scene, steps: Sequence[Step]) -> Iterator[StepStates]:
+    """Yield what becomes of every block in every step.
+
+    ``steps``: checked, of a plan for the scene.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> scene = seqopt.load_scene("arch25")
+    >>> steps = seqopt.sequential(seqopt.build_network(scene))
+    >>> second = [*step_states(scene, steps)][1]
+    >>> second.new, [second.states[name].value for name in (1, 2, 3)]
+    ((2,), ['held', 'held', 'absent'])
+    """
+    before = 0
+    names = [brick.name for brick in scene.placed]
+    for step in steps:
+        holds = {
+            robot.name: (node, scene.brick_of_node[node].name)
+            for robot, node in zip(scene.robots, step.grips, strict=True)
+            if node is not None
+        }
+        held = {brick for _, brick in holds.values()}
+        states = {
+            name: BlockState.ABSENT
+            if i >= step.bricks
+            else BlockState.HELD
+            if name in held
+            else BlockState.PLACED
+            for i, name in enumerate(names)
+        }
+        yield StepStates(step, tuple(names[before : step.bricks]), holds, states)
+        before = step.bricks
+
+
+FORMAT, VERSION = "seqopt-plan", 1
+
+
+def plan_csv(scene: Scene, steps: Sequence[Step]) -> str:
+    """Return a plan as CSV.
+
+    Result: a row per step: ``step``, ``type``, the ``placed`` bricks, what every robot holds as
+    ``NAME_node`` and ``NAME_brick``, and a column ``block_N`` for every brick in build order.
+    """
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    robots = [robot.name for robot in scene.robots]
+    grips = [f"{name}_{what}" for name in robots for what in ("node", "brick")]
+    blocks = [f"block_{brick.name}" for brick in scene.placed]
+    writer.writerow(["step", "type", "bricks", "placed", *map(harmless, grips), *blocks])
+    for row in step_states(scene, steps):
+        held = [cell for name in robots for cell in row.holds.get(name, ("", ""))]
+        placed = " ".join(map(str, row.new))
+        step = row.step
+        states = [state.value for state in row.states.values()]
+        writer.writerow([step.number, step.kind.value, step.bricks, placed, *held, *states])
+    return out.getvalue()
+
+
+def plan_json(scene: Scene, steps: Sequence[Step]) -> str:
+    """Return a plan as JSON.
+
+    Result: ``blocks``, the names of all bricks in build order; and ``steps``, each with its
+    ``type``, the bricks that are ``placed``, what robots hold as ``holds``, and the ``states`` of
+    all blocks in their order.
+    """
+    rows = [
+        {
+            "step": row.step.number,
+            "type": row.step.kind.value,
+            "placed": list(row.new),
+            "holds": {
+                name: {"node": node, "block": brick} for name, (node, brick) in row.holds.items()
+            },
+            "states": [state.value for state in row.states.values()],
+        }
+        for row in step_states(scene, steps)
+    ]
+    whole = {
+        "format": FORMAT,
+        "version": VERSION,
+        "scene": scene.name,
+        "blocks": [brick.name for brick in scene.placed],
+        "robots": [robot.name for robot in scene.robots],
+        "steps": rows,
+    }
+    return json.dumps(whole, ensure_ascii=False) + "\n"
+
+
+def parse_plan_json(scene: Scene, text: str) -> tuple[Step, ...]:
+    """Return the checked steps of a plan that `plan_json` wrote.
+
+    ``scene``: in which every step must be possible. Raises `StepError` if it is no such plan, or of
+    other blocks or robots, or a step is impossible.
+    """
+    try:
+        whole = json.loads(text)
+        if (whole["format"], whole["version"]) != (FORMAT, VERSION):
+            raise StepError(f"plan: format is {short(whole['format'])}; give a {FORMAT}")
+        if whole["blocks"] != [brick.name for brick in scene.placed]:
+            raise StepError(f"plan: its blocks are not those of scene {scene.name}")
+        robots = [robot.name for robot in scene.robots]
+        unknown = {name for row in whole["steps"] for name in row["holds"]} - set(robots)
+        if unknown:
+            raise StepError(f"plan: there is no robot {short(min(unknown))} in scene {scene.name}")
+        steps, count = [], 0
+        for i, row in enumerate(whole["steps"], start=1):
+            count += len(row["placed"])
+            grips = tuple(row["holds"].get(name, {}).get("node") for name in robots)
+            steps.append(Step(i, StepKind(row["type"]), count, grips))
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        if isinstance(error, StepError):
+            raise
+        raise StepError(f"plan: no {FORMAT} document: {short(error, 80)}") from error
+    return check_sequence(scene, steps)
+
+
+def sequencer_json(scene: Scene, steps: Sequence[Step]) -> str:
+    """Return a plan as an ``assembly_sequence``.
+
+    Result: JSON; which robot holds, and where, it does not say.
+    """
+    rows = [
+        {
+            "installPartIDs": list(row.new),
+            "holdPartIDs": sorted({brick for _, brick in row.holds.values()}),
+        }
+        for row in step_states(scene, steps)
+    ]
+    return json.dumps({"assembly_sequence": rows}) + "\n"

@@ -1,0 +1,219 @@
+"""Rules of the free schedule: any robot may release, hold or place next, as far as these allow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from enum import Enum
+from numbers import Integral
+
+from seqopt.errors import StepError, did_you_mean
+from seqopt.scene._checks import short
+from seqopt.scene.parts import Robot
+from seqopt.scene.scene import Scene
+from seqopt.sequence.schedule import Near
+
+FREE = "free"  # the schedule that is no list of steps
+_MOST_ROBOTS = 5
+
+
+class Newest(Enum):
+    """Where the newest brick is held until the next one is placed."""
+
+    EITHER = "either"  # at either of its free nodes
+    PLACING = "placing"  # at the node at which its holder would place it
+    FREE = "free"  # it is placed at either node, and may be let go at once
+
+
+class Payload(Enum):
+    """Whether the force of a grip may exceed the payload of its robot."""
+
+    KEPT = "kept"
+    IGNORED = "ignored"
+
+
+class Ending(Enum):
+    """How the build ends."""
+
+    HELD = "held"  # with the last brick placed, and held
+    RELEASED = "released"  # all robots let go at once
+    ONE_BY_ONE = "one-by-one"  # one robot lets go after the other
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeRules:
+    """The rules of a free schedule, in addition to reach and one robot per node.
+
+    Parameters
+    ----------
+    robots : tuple of str
+        Names of the robots that take part, two to five; by default all of the scene.
+    placers : tuple of str
+        Names of the robots that may place a brick; by default all that take part.
+    least_grips : int
+        Least number of nodes held, from the second brick on.
+    newest : Newest or str
+        Where the newest brick is held.
+    payload : Payload or str
+        Whether payloads are kept.
+    regrips : int or None
+        Most grips taken between two bricks, besides those that place; by default any number.
+    ending : Ending or str
+        How the build ends.
+    candidates : str
+        Where bricks that stand may be taken hold of: ``near:6`` or ``within:1.5``, as of
+        `seqopt.sequence.schedule.Near`; by default wherever robots reach.
+
+    Raises
+    ------
+    StepError
+        If a rule is malformed; the message gives its value and what would be accepted.
+
+    Examples
+    --------
+    >>> FreeRules(newest="placing").newest
+    <Newest.PLACING: 'placing'>
+    """
+
+    robots: tuple[str, ...] = ()
+    placers: tuple[str, ...] = ()
+    least_grips: int = 2
+    newest: Newest = Newest.EITHER
+    payload: Payload = Payload.KEPT
+    regrips: int | None = None
+    ending: Ending = Ending.RELEASED
+    candidates: str = ""
+
+    def __post_init__(self) -> None:
+        for name, kind in (("newest", Newest), ("payload", Payload), ("ending", Ending)):
+            object.__setattr__(self, name, _choice(name, kind, getattr(self, name)))
+        for name in ("robots", "placers"):
+            object.__setattr__(self, name, _names(name, getattr(self, name)))
+        object.__setattr__(self, "least_grips", _count("least_grips", self.least_grips, 0))
+        if self.regrips is not None:
+            object.__setattr__(self, "regrips", _count("regrips", self.regrips, 0))
+        if self.candidates:
+            object.__setattr__(self, "candidates", Near(self.candidates).rule)
+
+    def near(self, scene: Scene, bricks: int) -> frozenset[int]:
+        """Return the nodes of bricks that stand, of so many, that may be taken hold of."""
+        nodes = [node for brick in scene.placed[:bricks] for node in brick.nodes]
+        if not self.candidates:
+            return frozenset(nodes)
+        return frozenset(Near(self.candidates).nodes(scene, bricks, nodes))
+
+    def team(self, scene: Scene) -> tuple[int, ...]:
+        """Return which of a scene's robots take part.
+
+        Result: indices of its robots, ascending. Raises `StepError` if a robot is not in the scene,
+        too few or too many take part, or fewer than must hold.
+        """
+        known = [robot.name for robot in scene.robots]
+        for name in (*self.robots, *self.placers):
+            if name not in known:
+                listed = ", ".join(known)
+                hint = did_you_mean(name, known)
+                raise StepError(f"robot {name!r} does not exist{hint}; give some of {listed}")
+        team = tuple(i for i, name in enumerate(known) if name in self.robots or not self.robots)
+        if not 2 <= len(team) <= _MOST_ROBOTS:
+            raise StepError(
+                f"the free schedule: {len(team)} robots take part; name two to {_MOST_ROBOTS}"
+            )
+        outside = [name for name in self.placers if known.index(name) not in team]
+        if outside:
+            raise StepError(
+                f"rule placers: {outside[0]} takes no part; name some of "
+                f"{', '.join(known[i] for i in team)}"
+            )
+        if self.least_grips > len(team):
+            raise StepError(
+                f"rule least_grips: {self.least_grips} grips of {len(team)} robots; "
+                f"give at most {len(team)}"
+            )
+        return team
+
+    def described(self, scene: Scene) -> dict[str, object]:
+        """Return the rules with their values, ready for JSON. Result: by name."""
+        names = [scene.robots[i].name for i in self.team(scene)]
+        return {
+            "robots": names,
+            "placers": list(self.placers) or names,
+            "least_grips": self.least_grips,
+            "newest": self.newest.value,
+            "payload": self.payload.value,
+            "regrips": "any" if self.regrips is None else self.regrips,
+            "ending": self.ending.value,
+            "candidates": self.candidates or "all",
+        }
+
+    def loosened(self) -> Iterator[tuple[str, FreeRules]]:
+        """Yield the rules with one of them loosened, and how a user says so."""
+        for least in range(self.least_grips - 1, -1, -1):
+            yield f"least_grips={least}", replace(self, least_grips=least)
+        if self.newest is Newest.PLACING:
+            yield "newest=either", replace(self, newest=Newest.EITHER)
+        if self.newest is not Newest.FREE:
+            yield "newest=free", replace(self, newest=Newest.FREE)
+        if self.regrips is not None:
+            yield f"regrips={self.regrips + 1}", replace(self, regrips=self.regrips + 1)
+            yield "regrips=any", replace(self, regrips=None)
+        for name, value, said in _LOOSEST:
+            if getattr(self, name) != value:
+                yield f"{name}={said}", replace(self, **{name: value})  # type: ignore[arg-type]
+
+
+_LOOSEST = (
+    ("candidates", "", "all"),
+    ("placers", (), "any"),
+    ("payload", Payload.IGNORED, "ignored"),
+    ("ending", Ending.HELD, "held"),
+)  # rules that are loosened as a whole, and how a user says so
+
+
+def with_robots(scene: Scene, count: int) -> Scene:
+    """Return a scene with a number of robots: its own first, then mobile ones that reach all.
+
+    ``count``: from two to five. Result: further robots reach every node and have the largest
+    payload of the scene's own. Raises `StepError` if there would be fewer or more.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> [robot.name for robot in with_robots(seqopt.load_scene("arch25"), 4).robots]
+    ['rob1', 'rob2', 'rob3', 'rob4']
+    """
+    if not isinstance(count, Integral) or not 2 <= count <= _MOST_ROBOTS:
+        raise StepError(f"{short(count)} robots: the free schedule takes two to {_MOST_ROBOTS}")
+    robots = list(scene.robots[:count])
+    names = {robot.name for robot in robots}
+    payload = max((robot.payload for robot in scene.robots), default=float("nan"))
+    fresh = (f"rob{i}" for i in range(1, 2 * _MOST_ROBOTS + 1) if f"rob{i}" not in names)
+    robots += [Robot(name=next(fresh), payload=payload) for _ in range(count - len(robots))]
+    return replace(scene, robots=tuple(robots))
+
+
+def _choice(name: str, kind: type[Enum], given: object) -> Enum:
+    try:
+        return kind(given)
+    except ValueError:
+        known = [str(member.value) for member in kind]
+        hint = did_you_mean(given, known)
+        raise StepError(
+            f"rule {name}: {short(given)}{hint}; give one of {', '.join(known)}"
+        ) from None
+
+
+def _names(name: str, given: object) -> tuple[str, ...]:
+    names = (given,) if isinstance(given, str) else given
+    if not isinstance(names, tuple | list) or not all(isinstance(n, str) for n in names):
+        raise StepError(f"rule {name}: {short(given)}; give names of robots")
+    twice = [n for n in names if names.count(n) > 1]
+    if twice:
+        raise StepError(f"rule {name}: {twice[0]} occurs twice; name it once")
+    return tuple(names)
+
+
+def _count(name: str, given: object, least: int) -> int:
+    if not isinstance(given, Integral) or isinstance(given, bool) or given < least:
+        raise StepError(f"rule {name}: {short(given)}; give a whole number from {least} on")
+    return int(given)

@@ -1,0 +1,379 @@
+"""A partial structure with whatever grips: a question, solved only where nothing is known.
+
+Forces that hold a structure hold it with more grips, larger payloads, or without a grip that they
+leave idle. A motion in which it falls makes it fall with any grips whose payloads can take up less
+work than the loads do in it: with all, if none of their nodes moves. Neither asks a solver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.contact.assembly import Assembly
+from seqopt.contact.faces import Contacts, bare_assembly
+from seqopt.errors import plugins
+from seqopt.network.network import Network
+from seqopt.stability.limit_analysis import (
+    CAP,
+    LARGEST_FORCE,
+    ROUNDING,
+    Answer,
+    Case,
+    Sense,
+    is_finite,
+    limits,
+    violation,
+)
+
+Enough = Callable[[Answer], bool]
+"""Says whether an answer proves what is asked, or the program must be refined."""
+
+HeldProgram = Callable[[Floats, Enough], Answer]
+"""A case of one assembly, solved for the payloads (N) of all its grips; none for one not held.
+
+Where no forces exist, the answer claims that, has no value and a motion that says why.
+"""
+
+CompileHeld = Callable[[Assembly, Case], HeldProgram]
+"""Makes the program of an assembly, whose grips are all that may ever be held, and a case."""
+
+
+def compile_held(assembly: Assembly, case: Case) -> HeldProgram:
+    """Return the registered linear program (entry points ``seqopt.limit_analysis``).
+
+    ``assembly``: its grips are all that may ever be held.
+    """
+    entry = plugins("seqopt.limit_analysis")["lp"]
+    compiled: CompileHeld = entry.load()
+    return compiled(assembly, case)
+
+
+_SIDES = 8  # of a cone to start with, the axes of its contact among them
+_SPREAD = np.array([p for p in product((-1.0, 0.0, 1.0), repeat=3) if any(p)])
+_GAIN = 1e-7  # least gain for which a direction joins, over the largest entry of the motion
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Directions(FrozenValue):
+    """Directions in which corners and grips act.
+
+    ``owner`` (n,): corner, or grip counted on after the corners. ``unit`` (n, 3): unit vectors;
+    those of a corner have no normal part.
+    """
+
+    owner: Ints
+    unit: Floats
+
+    def joined(self, other: Directions) -> Directions:
+        """Return these directions and others after them."""
+        return Directions(
+            np.concatenate([self.owner, other.owner]), np.concatenate([self.unit, other.unit])
+        )
+
+
+def first_directions(corners: int, grips: int) -> Directions:
+    """Return directions to start with, the same ones for every corner and for every grip.
+
+    ``corners``, ``grips``: how many there are.
+
+    Examples
+    --------
+    >>> len(first_directions(4, 1).owner)
+    58
+    """
+    angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
+    flat = np.stack([np.zeros(_SIDES), np.cos(angle), np.sin(angle)], axis=1)
+    space = _SPREAD / np.linalg.norm(_SPREAD, axis=1, keepdims=True)
+    owner = np.concatenate(
+        [np.repeat(np.arange(corners), _SIDES), corners + np.repeat(np.arange(grips), len(space))]
+    )
+    return Directions(
+        owner, np.concatenate([np.tile(flat, (corners, 1)), np.tile(space, (grips, 1))])
+    )
+
+
+def better_directions(known: Directions, along: Floats, wanted: Bools) -> Directions:
+    """Return the best directions of corners and grips where those known are not as good.
+
+    ``along`` (m, 3): what a force of every corner or grip is worth, per component; the normal parts
+    of corners are zero. ``wanted`` (m,): whose directions are asked for.
+    """
+    best = np.zeros(len(along))
+    np.maximum.at(best, known.owner, np.einsum("ij,ij->i", known.unit, along[known.owner]))
+    size = np.linalg.norm(along, axis=1)
+    which = np.flatnonzero(wanted & (size - best > _GAIN))
+    return Directions(which, along[which] / size[which, None])
+
+
+_TIGHT = 1e-8  # largest violation of forces that prove, over the force scale and max(1, z)
+_IDLE = 1e-10  # a grip's force treated as zero, over the force scale
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HoldingForces(FrozenValue):
+    """Forces with which a structure is in equilibrium."""
+
+    value: float  # their z
+    needed: Floats  # (G,); what every grip exerts, over the force scale
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _FallingMotion(FrozenValue):
+    """A motion of the blocks, and what counts for any grips.
+
+    ``work``, ``growth``: of the loads, less what contacts take up, and its growth with z;
+    ``closing``: by which contacts close, priced by the largest corner force; ``speed`` (G,): of
+    every node.
+    """
+
+    work: float
+    growth: float
+    closing: float
+    speed: Floats
+
+
+class Known:
+    """What is proven of one structure and case, whoever holds it.
+
+    ``assembly``: its grips are all that may ever be held.
+    """
+
+    def __init__(self, assembly: Assembly, case: Case) -> None:
+        self._assembly, self._case = assembly, case
+        self._forces: list[HoldingForces] = []
+        self._motions: list[_FallingMotion] = []
+
+    def bracket(self, places: Ints, payload: Floats) -> Floats:
+        """Return between which values z is proven to lie.
+
+        ``places`` (S, r): grips of the assembly that are held, from 0; as many as it has for none.
+        ``payload`` (S, r): of those that hold them, N; zero for none. Result (S, 2): the least z
+        that suffices is no smaller and no larger; of a largest z, the one proven to be survived
+        (less than none, if nothing is) and the one that is not exceeded.
+        """
+        out = self._nothing(len(places))
+        return self._tightened(out, self._forces, self._motions, places, payload)
+
+    def learn(self, answer: Answer, held: Floats) -> Known:
+        """Keep what an answer proves by itself; a solver's claim is not believed.
+
+        ``held`` (G,): payload of every grip for which it was found, N; zero for one not held.
+        Result: of this answer alone.
+        """
+        new = Known(self._assembly, self._case)
+        new._forces += self._proven_forces(answer, held)
+        new._motions += self.motions_of(answer.motion)
+        self._forces += new._forces
+        self._motions += new._motions
+        return new
+
+    def joined(self, other: Known) -> Known:
+        """Return what is known by either. ``other``: of the same structure and case."""
+        out = Known(self._assembly, self._case)
+        out._forces = self._forces + other._forces
+        out._motions = self._motions + other._motions
+        return out
+
+    def motions_of(self, motion: Floats) -> list[_FallingMotion]:
+        """Return what counts of a motion, at most one; none if it is not finite or none.
+
+        ``motion`` (B, 6): as of `seqopt.stability.limit_analysis.Answer`.
+        """
+        assembly, case = self._assembly, self._case
+        size = np.abs(motion).max(initial=0.0)
+        if motion.shape != (len(assembly.centroid), 6) or not 0 < size < np.inf:
+            return []
+        flat = np.ldexp(motion, -np.frexp(size)[1]).ravel()
+        parting = (assembly.contact_map.T @ flat).reshape(-1, 3)
+        sliding = np.linalg.norm(parting[:, 1:], axis=1)
+        opening = parting[:, 0] - case.friction * sliding
+        nobody = np.zeros(len(assembly.payload))
+        taken = []
+        for z in (0.0, 1.0):
+            tension, cohesion, _ = limits(assembly, case, z, nobody)
+            if z == 0.0:
+                tip = case.friction * tension > cohesion
+            cut = np.where(tip, cohesion / (case.friction or 1.0), tension)
+            taken.append(float(cohesion @ sliding + cut @ np.maximum(opening, 0)))
+        speed = np.linalg.norm((assembly.grip_map.T @ flat).reshape(-1, 3), axis=1)
+        return [
+            _FallingMotion(
+                work=float(assembly.load() @ flat) - taken[0],
+                growth=float(assembly.load(case.pull) @ flat) - (taken[1] - taken[0]),
+                closing=LARGEST_FORCE * float(np.maximum(-opening, 0).sum()),
+                speed=speed,
+            )
+        ]
+
+    def tightened(self, bracket: Floats, places: Ints, payload: Floats) -> Floats:
+        """Return brackets no wider than others, by what is known here.
+
+        ``bracket`` (S, 2); ``places`` (S, r); ``payload`` (S, r): as of `bracket`. Result (S, 2).
+        """
+        return self._tightened(bracket.copy(), self._forces, self._motions, places, payload)
+
+    def _nothing(self, count: int) -> Floats:
+        least = 0.0 if self._case.sense is Sense.SMALLEST else -np.inf
+        most = np.inf if self._case.sense is Sense.SMALLEST else CAP
+        return np.tile([least, most], (count, 1))
+
+    def _tightened(
+        self,
+        out: Floats,
+        forces: list[HoldingForces],
+        motions: list[_FallingMotion],
+        places: Ints,
+        payload: Floats,
+    ) -> Floats:
+        smallest = self._case.sense is Sense.SMALLEST
+        for known in forces:
+            holds = self._hold(known, places, payload)
+            side = out[holds, int(smallest)]
+            better = np.minimum if smallest else np.maximum
+            out[holds, int(smallest)] = better(side, known.value)
+        for motion in motions:
+            value = self._proven_by(motion, places, payload)
+            if smallest:
+                out[:, 0] = np.maximum(out[:, 0], value)
+            else:
+                out[:, 1] = np.minimum(out[:, 1], value)
+        return out
+
+    def _proven_forces(self, answer: Answer, held: Floats) -> list[HoldingForces]:
+        """Return the forces of an answer if they hold what is held, by the assembly's own data."""
+        if not is_finite(self._assembly, answer):
+            return []
+        case = self._case
+        idle = np.linalg.norm(answer.grip_force, axis=1) <= _IDLE
+        grip = np.where(idle[:, None], 0.0, answer.grip_force)
+        value = max(answer.value, 0.0)
+        clean = Answer(answer.claim, value, answer.contact_force, grip, answer.motion)
+        if not violation(self._assembly, case, clean, held) <= _TIGHT * max(1.0, value):
+            return []
+        if grip[held <= 0].any():
+            return []
+        return [HoldingForces(value, np.linalg.norm(grip, axis=1))]
+
+    def _hold(self, known: HoldingForces, places: Ints, payload: Floats) -> Floats:
+        """Return which grips can exert the forces."""
+        needed = np.flatnonzero(known.needed)
+        own, common = self._case.payload
+        most = own * payload / self._assembly.scales[0] + known.value * common * (payload > 0)
+        out = np.ones(len(places), dtype=bool)
+        for grip in needed.tolist():
+            able = (places == grip) & (payload > 0)
+            able &= most >= known.needed[grip] - _TIGHT * max(1.0, known.value)
+            out &= able.any(axis=1)
+        return out
+
+    def _proven_by(self, motion: _FallingMotion, places: Ints, payload: Floats) -> Floats:
+        """Return the value of z that a motion proves for every row."""
+        own, common = self._case.payload
+        force = self._assembly.scales[0]
+        weights = np.linalg.norm(self._assembly.weight, axis=1).sum()
+        speed = np.append(motion.speed, 0.0)[places]
+        work = motion.work - own * (payload * speed).sum(axis=1) / force
+        work -= motion.closing * (weights + payload.sum(axis=1)) / force
+        growth = motion.growth - common * (speed * (payload > 0)).sum(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.abs(work / growth)
+        if self._case.sense is Sense.SMALLEST:
+            value = np.where(growth < 0, np.minimum(ratio, CAP), CAP)
+            return np.where(work > ROUNDING, value, 0.0)
+        value = np.where(work > 0, 0.0, np.minimum(ratio, CAP))
+        return np.where(growth > 0, value, CAP)
+
+
+_Settled = Callable[[Floats], Bools]
+"""Says which brackets (S, 2) are narrow enough."""
+
+
+def node_assembly(network: Network, bricks: int, known: Contacts | None = None) -> Assembly:
+    """Return a partial structure with a grip without payload at every inner node, in build order.
+
+    As of `seqopt.contact.faces.step_assembly`.
+    """
+    bare = bare_assembly(network, bricks, known)
+    nodes = network.inner[:bricks].ravel()
+    return replace(
+        bare,
+        grip_block=np.repeat(np.arange(bricks), 2),
+        grip_position=network.node_position[nodes],
+        payload=np.zeros(len(nodes)),
+    )
+
+
+class HeldStates:
+    """One question about one structure, asked of any number of grip sets.
+
+    ``assembly``: its grips are all that may ever be held; ``case``: what is bracketed;
+    ``compiled``: makes the program to solve; ``easier``: what a program is asked before that, as
+    forces for a z of zero. ``assembly``: whose grips are all that may ever be held; ``solved``: how
+    many times the program was called.
+    """
+
+    def __init__(
+        self, assembly: Assembly, case: Case, compiled: CompileHeld, easier: Case | None = None
+    ) -> None:
+        self.assembly = assembly
+        self._case = case
+        self._asked = [case] if easier is None else [easier, case]
+        self._compile = compiled
+        self._programs: list[HeldProgram] = []
+        self._known = Known(assembly, case)
+        self._tried: set[bytes] = set()
+        self.solved = 0
+
+    def bracket(self, places: Ints, payload: Floats, settled: _Settled) -> Floats:
+        """Return proven brackets of z, as narrow as needed where the solver's answers allow it.
+
+        ``places`` (S, r): grips of the assembly that are held, from 0; as many as it has for none.
+        ``payload`` (S, r): of those that hold them, N; zero for none. ``settled``: says which
+        brackets are narrow enough. Result (S, 2): as of
+        `seqopt.stability._held_states.Known.bracket`.
+        """
+        out = self._known.bracket(places, payload)
+        open_ = ~settled(out)
+        for row in np.argsort((payload > 0).sum(axis=1), kind="stable").tolist():
+            if not open_[row]:
+                continue
+            held = self._held(places[row], payload[row])
+            open_[row] = False
+            if held.tobytes() in self._tried:
+                continue
+            self._tried.add(held.tobytes())
+            rest = np.flatnonzero(open_)
+            new = self._solve(held, settled)
+            out[row] = new.tightened(out[[row]], places[[row]], payload[[row]])[0]
+            out[rest] = new.tightened(out[rest], places[rest], payload[rest])
+            open_[rest] = ~settled(out[rest])
+        return out
+
+    def _held(self, places: Ints, payload: Floats) -> Floats:
+        """Return the payload of every grip, (G,), N."""
+        out = np.zeros(len(self.assembly.payload) + 1)
+        np.maximum.at(out, places, payload)
+        return out[:-1]
+
+    def _solve(self, held: Floats, settled: _Settled) -> Known:
+        """Return what answers prove for those grips."""
+        places, payload = np.flatnonzero(held)[None], held[held > 0][None]
+        new = Known(self.assembly, self._case)
+
+        def enough(answer: Answer) -> bool:
+            only = Known(self.assembly, self._case).learn(answer, held)
+            return bool(settled(only.bracket(places, payload))[0])
+
+        for i in range(len(self._asked)):
+            if i == len(self._programs):
+                self._programs.append(self._compile(self.assembly, self._asked[i]))
+            self.solved += 1
+            new = new.joined(self._known.learn(self._programs[i](held, enough), held))
+            if settled(new.bracket(places, payload))[0]:
+                break
+        return new

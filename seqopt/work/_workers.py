@@ -1,0 +1,534 @@
+"""One function over many tasks; results in their order.
+
+The number of tasks under way is limited, so that neither they nor their results pile up. What a
+task raises is raised for the first task that does, as in a loop.
+
+Workers are processes of our own, each with a queue of its own, or an executor of the caller. Our
+own end with the one that started them, however that ends.
+"""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import os
+import signal
+import threading
+import traceback
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
+
+from seqopt.errors import WorkerError
+
+_MEMORY = Path("/proc/meminfo")
+_OWN = Path("/proc/self/statm")
+_GROUPS = (
+    (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory.current")),
+    (
+        Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"),
+        Path("/sys/fs/cgroup/memory/memory.usage_in_bytes"),
+    ),
+)  # what a container may have, and has
+
+
+def free_memory() -> float:
+    """Return how much memory can still be had.
+
+    Result: bytes; infinite where the system does not say.
+    """
+    return max(min(_free_at_all(), _free_in_group(), _free_within_limit()), 0.0)
+
+
+def _free_at_all() -> float:
+    if not _MEMORY.exists():
+        return math.inf
+    rows = (line.split() for line in _MEMORY.read_text(encoding="ascii").splitlines())
+    return next((1024.0 * int(row[1]) for row in rows if row[0] == "MemAvailable:"), math.inf)
+
+
+def _free_in_group() -> float:
+    """Return what is left of the memory that a container may have."""
+    for limit, used in _GROUPS:
+        try:
+            return float(limit.read_text("ascii")) - float(used.read_text("ascii"))
+        except (OSError, ValueError):  # not there, or "max"
+            continue
+    return math.inf
+
+
+def _free_within_limit() -> float:
+    """Return what is left of the addresses that this process may have."""
+    if os.name != "posix":
+        return math.inf
+    import resource  # noqa: PLC0415  # POSIX has it alone
+
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit == resource.RLIM_INFINITY:
+        return math.inf
+    own = int(_OWN.read_text("ascii").split()[0]) * resource.getpagesize() if _OWN.exists() else 0
+    return float(limit - own)
+
+
+class Lanes:
+    """Processes that get the tasks of one lane each; see `seqopt.work._workers.Crew`.
+
+    For tasks of which neighbors share what a process prepares for one of them.
+
+    ``workers``: how many.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self._lanes = [Processes(1) for _ in range(workers)]
+
+    @property
+    def workers(self) -> int:
+        """How many tasks are worked on at once."""
+        return len(self._lanes)
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Give a call out; see `Crew`. ``*arguments``: the last one has a ``lane``."""
+        lane: int = arguments[-1].lane
+        return self._lanes[lane].submit(function, *arguments)
+
+    def drop(self, calls: Iterable[Future[Any]]) -> None:
+        """Leave calls to their processes; see `Crew`."""
+
+    def look_after(self) -> None:
+        """End processes if one has died while it sent an answer; see `Crew`."""
+        for lane in self._lanes:
+            lane.look_after()
+
+    def replace(self, error: BaseException) -> bool:
+        """Take new processes for those that died; see `Crew`. Result: True."""
+        self.end(now=True)
+        return True
+
+    def end(self, *, now: bool) -> None:
+        """End the processes, and wait for their end.
+
+        ``now``: whether at once, or when all that was given out is done.
+        """
+        for lane in self._lanes:
+            lane.end(now=now)
+
+
+class Processes:
+    """Processes of our own: started when they are needed, replaced when they die.
+
+    They end with the process that started them, however that ends.
+
+    ``workers``: how many.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self.workers = workers
+        self._pool: ProcessPoolExecutor | None = None
+        self._leash: Connection | None = None
+        self._started: list[BaseProcess] = []
+
+    def submit(self, function: Callable[..., Any], *arguments: object) -> Future[Any]:
+        """Give a call out; see `Crew`."""
+        if self._pool is None:
+            context = multiprocessing.get_context("spawn")  # threads and fork do not go together
+            end, self._leash = context.Pipe(duplex=False)
+            self._pool = ProcessPoolExecutor(self.workers, context, _follow, (end,))
+        before = [] if self._started else multiprocessing.active_children()
+        with _deaf():
+            future = self._pool.submit(function, *arguments)
+        if not self._started:
+            self._started = [p for p in multiprocessing.active_children() if p not in before]
+        return future
+
+    def drop(self, calls: Iterable[Future[Any]]) -> None:
+        """Leave calls to the pool, which cancels them when it ends; see `Crew`.
+
+        If its processes end before it has seen that a call was cancelled, its thread ends with an
+        `InvalidStateError` (Python's issue gh-107219) and leaves other calls without an answer.
+        """
+
+    def look_after(self) -> None:
+        """End all processes if one has died while it sent an answer; see `Crew`.
+
+        The rest of that answer would be waited for without end: others, and this process itself,
+        keep open what it was sent through. Once they let go, the pool knows that it is broken.
+        """
+        if self._leash is None or all(process.is_alive() for process in self._started):
+            return
+        self._leash.close()
+        results = getattr(self._pool, "_result_queue", None)  # there is no public way to it
+        writer = getattr(results, "_writer", None)
+        if writer is not None:
+            writer.close()
+
+    def replace(self, error: BaseException) -> bool:
+        """Take new processes for those that died; see `Crew`. Result: True."""
+        self.end(now=True)
+        return True
+
+    def end(self, *, now: bool) -> None:
+        """End the processes, and wait for their end.
+
+        ``now``: whether at once, or when all that was given out is done.
+        """
+        if self._leash is not None and now:
+            self._leash.close()
+        if self._pool is not None:
+            self._pool.shutdown(wait=True, cancel_futures=True)
+        if self._leash is not None and not now:
+            self._leash.close()
+        self._pool = self._leash = None
+        self._started = []
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Let processes that start here hear no interrupt: it is their master's."""
+    if os.name != "posix":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _follow(end: Connection) -> None:
+    """Let a process of ours live no longer than its leash, and leave interrupts to its master."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)  # errors are sent; what dies is replaced
+    warnings.simplefilter("ignore", RuntimeWarning)
+    np.seterr(all="ignore")  # what is not finite is an error of its own
+    threading.Thread(target=_wait_and_end, args=(end,), daemon=True).start()
+
+
+def _wait_and_end(end: Connection) -> None:
+    with suppress(EOFError, OSError):
+        end.recv()
+    os._exit(1)
+
+
+_UNKNOWN = 16  # workers of an executor that does not say how many it has
+
+
+class Crew(Protocol):
+    """Workers that work on tasks."""
+
+    @property
+    def workers(self) -> int:
+        """How many tasks are worked on at once."""
+
+    def submit(self, function: Callable[..., Any], *arguments: object) -> Future[Any]:
+        """Give a call out.
+
+        Parameters
+        ----------
+        function : callable
+            Of a module, so that it can be sent to another process.
+        *arguments : object
+
+        Returns
+        -------
+        concurrent.futures.Future
+        """
+
+    def drop(self, calls: Iterable[Future[Any]]) -> None:
+        """Let go of calls whose answers nobody waits for any more.
+
+        Parameters
+        ----------
+        calls : iterable of concurrent.futures.Future
+        """
+
+    def look_after(self) -> None:
+        """See to it that a worker that has died does not keep the others waiting."""
+
+    def replace(self, error: BaseException) -> bool:
+        """Take new workers for those that died.
+
+        Parameters
+        ----------
+        error : BaseException
+            What came in place of an answer.
+
+        Returns
+        -------
+        bool
+            Whether there are workers again.
+        """
+
+
+@dataclass(frozen=True)
+class _Given:
+    """An executor of the caller, who also ends it.
+
+    ``workers``: how many tasks it works on at once.
+    """
+
+    executor: Executor
+    workers: int
+
+    def submit(self, function: Callable[..., Any], *arguments: object) -> Future[Any]:
+        """Give a call out; see `Crew`."""
+        return self.executor.submit(function, *arguments)
+
+    def drop(self, calls: Iterable[Future[Any]]) -> None:
+        """Cancel calls; see `Crew`."""
+        for call in calls:
+            call.cancel()
+
+    def look_after(self) -> None:
+        """Leave the workers to the executor; see `Crew`."""
+
+    def replace(self, error: BaseException) -> bool:
+        """Say whether the executor still takes work; its workers are its own matter."""
+        try:
+            self.executor.submit(_nothing)
+        except Exception:  # whatever an executor of others may raise where it is broken
+            return False
+        return True
+
+
+@contextmanager
+def hire(
+    executor: Executor | None = None, workers: int = 1, *, lanes: bool = False
+) -> Iterator[Crew | None]:
+    """Hire workers for the duration of a with block.
+
+    Parameters
+    ----------
+    executor : concurrent.futures.Executor, optional
+        Any; by default processes of our own.
+    workers : int, optional
+        How many processes, or how many tasks the executor works on at once if it does not say.
+    lanes : bool, optional
+        Whether tasks have a ``lane``: each process of our own then gets those of one.
+
+    Yields
+    ------
+    Crew or None
+        None where there is but this process.
+    """
+    kept = _KEPT.get()
+    if kept is not None and not lanes:
+        yield kept
+    elif executor is not None:
+        known = getattr(executor, "_max_workers", None)
+        most = known if isinstance(known, int) else _UNKNOWN
+        yield _Given(executor, workers if workers > 1 else most)
+    elif workers > 1:
+        processes = Lanes(workers) if lanes else Processes(workers)
+        try:
+            yield processes
+        except BaseException:
+            processes.end(now=True)
+            raise
+        processes.end(now=False)
+    else:
+        yield None
+
+
+_KEPT: ContextVar[Crew | None] = ContextVar("_KEPT", default=None)
+
+
+@contextmanager
+def keep(executor: Executor | None = None, workers: int = 1) -> Iterator[None]:
+    """Hire workers once for all who `hire` some within a with block, without lanes."""
+    with hire(executor, workers) as crew:
+        before = _KEPT.set(crew)
+        try:
+            yield
+        finally:
+            _KEPT.reset(before)
+
+
+_Task = TypeVar("_Task")
+_Result = TypeVar("_Result")
+_UNDER_WAY = 4  # tasks given out or waiting to be taken, for every worker
+_PATIENCE = 1.0  # s without an answer, after which workers are looked after
+_FAILURES = 3  # times in a row that workers may end without any answer
+_GUARD = 'if __name__ == "__main__":'
+
+
+def map_ordered(
+    function: Callable[[_Task], _Result],
+    tasks: Iterable[_Task],
+    crew: Crew | None = None,
+    known: Callable[[_Task], _Result | None] | None = None,
+    done: Callable[[_Task, _Result], None] | None = None,
+) -> Generator[_Result, None, None]:
+    """Return what a function makes of every task, in their order.
+
+    Parameters
+    ----------
+    function : callable
+        Takes a task; of a module, or a `functools.partial` of such a one.
+    tasks : iterable
+        Taken as they are needed.
+    crew : Crew, optional
+        From `hire`; by default this process.
+    known : callable, optional
+        Returns the result of a task that needs no work, or None.
+    done : callable, optional
+        Told here of every task and its result, as soon as there is one.
+
+    Yields
+    ------
+    object
+        The result of one task after the other.
+
+    Raises
+    ------
+    WorkerError
+        If workers end again and again, or an executor takes no more work.
+
+    Examples
+    --------
+    >>> from seqopt.work._workers import hire
+    >>> with hire(workers=1) as crew:
+    ...     list(map_ordered(abs, [-3, 2], crew))
+    [3, 2]
+    """
+    known = known or _unknown
+    done = done or _nothing
+    if crew is not None:
+        yield from _Course(function, crew, known, done).run(iter(tasks))
+        return
+    for task in tasks:
+        result = known(task)
+        if result is None:
+            result = function(task)
+            done(task, result)
+        yield result
+
+
+@dataclass
+class _Course(Generic[_Task, _Result]):
+    """What was given out, what came back, and what is to be given out again."""
+
+    function: Callable[[_Task], _Result]
+    crew: Crew
+    known: Callable[[_Task], _Result | None]
+    done: Callable[[_Task, _Result], None]
+    waiting: dict[int, _Task] = field(default_factory=dict)  # to be given out
+    running: dict[Future[Any], tuple[int, _Task]] = field(default_factory=dict)
+    ready: dict[int, tuple[bool, Any]] = field(default_factory=dict)
+    failures: int = 0
+
+    def run(self, tasks: Iterator[_Task]) -> Iterator[_Result]:
+        """Yield the results in order."""
+        taken = given = 0
+        more = True
+        try:
+            while more or taken < given:
+                while more and given - taken < _UNDER_WAY * self.crew.workers:
+                    more = self._take(given, tasks)
+                    given += more
+                if taken not in self.ready and taken < given:
+                    self._give_out()
+                    self._collect()
+                while taken in self.ready:
+                    fine, result = self.ready.pop(taken)
+                    taken += 1
+                    if not fine:
+                        raise result
+                    yield result
+        finally:
+            self.crew.drop(self.running)
+
+    def _take(self, number: int, tasks: Iterator[_Task]) -> bool:
+        """Take the next task up, whose result may be known; return whether there was one."""
+        for task in tasks:
+            result = self.known(task)
+            if result is None:
+                self.waiting[number] = task
+                self._give_out()
+            else:
+                self.ready[number] = True, result
+            return True
+        return False
+
+    def _give_out(self) -> None:
+        for number in sorted(self.waiting):
+            task = self.waiting[number]
+            try:
+                future = self.crew.submit(_attempt, self.function, task)
+            except Exception as error:  # whatever an executor of others may raise
+                self._failed(error)
+                return
+            self.running[future] = number, self.waiting.pop(number)
+
+    def _collect(self) -> None:
+        """Wait for an answer at least; what came without one is to be given out again."""
+        failure: BaseException | None = None
+        for future in self._ended():
+            number, task = self.running.pop(future)
+            try:
+                fine, result = future.result()
+            except Exception as error:  # the work itself raises nothing: its worker is gone
+                failure = error
+                self.waiting[number] = task
+                continue
+            self.failures = 0
+            self.ready[number] = fine, result
+            if fine:
+                self.done(task, result)
+        if failure is not None:
+            self._failed(failure)
+
+    def _ended(self) -> set[Future[Any]]:
+        """Wait until a call at least has ended."""
+        while True:
+            ended = wait(self.running, _PATIENCE, FIRST_COMPLETED).done
+            if ended:
+                return ended
+            self.crew.look_after()
+
+    def _failed(self, error: BaseException) -> None:
+        """Replace workers that died, unless there are none any more."""
+        self.failures += 1
+        if self.failures <= _FAILURES and self.crew.replace(error):
+            gone = [future for future in self.running if future.done() and _lost(future)]
+            self.waiting |= dict(self.running.pop(future) for future in gone)
+            return
+        raise WorkerError(
+            f"workers ended {self.failures} times without an answer ({_said(error)}); give another "
+            f"executor, or fewer workers where memory is short; a script starts under {_GUARD}"
+        ) from error
+
+
+def _attempt(function: Callable[[_Task], _Result], task: _Task) -> tuple[bool, _Result | Exception]:
+    """Return a result, or the error in its place: what is raised beside tells of the worker."""
+    try:
+        return True, function(task)
+    except Exception as error:  # raised again where the result is taken
+        error.add_note(traceback.format_exc())
+        return False, error
+
+
+def _lost(future: Future[Any]) -> bool:
+    """Return whether a call that ended did so without an answer."""
+    return future.cancelled() or future.exception() is not None
+
+
+def _unknown(task: object) -> None:
+    """Know no result."""
+
+
+def _nothing(*arguments: object) -> None:
+    """Do nothing."""
+
+
+def _said(error: BaseException) -> str:
+    """Return what an error of others says, in a line."""
+    return " ".join(f"{type(error).__name__}: {error}".split()).rstrip(": ")
