@@ -278,7 +278,9 @@ def rooms() -> set[str]:
 
 def untested(names: set[str]) -> set[str]:
     """Return the rooms that no folder of tests mirrors."""
-    return {name for name in names if not list((ROOT / "tests" / name.strip("_")).glob("test_*.py"))}
+    return {
+        name for name in names if not list((ROOT / "tests" / name.strip("_")).glob("test_*.py"))
+    }
 
 
 def test_every_room_has_a_folder_of_tests():
