@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from io import StringIO
 from pathlib import Path
 from tokenize import COMMENT, DEDENT, ENDMARKER, INDENT, NEWLINE, NL, generate_tokens
@@ -51,6 +52,7 @@ SAID = (ast.Module, ast.ClassDef, ast.FunctionDef)  # what may have a docstring
 PARAMETERS = 6  # of an experiment's function
 DRAWS_ON_ALL = "study"  # the topic that sets every other one beside the paper
 MOST_ROOMS = 16
+MOST_NAMES = 455  # functions and classes without an underscore
 
 
 def sources(folder: str) -> list[Path]:
@@ -178,6 +180,40 @@ def test_a_page_of_exports_opens_its_own_room_only():
         assert all(target.startswith((own, "__future__")) for target in imports(path)), own
 
 
+def is_private(dotted_name: str) -> bool:
+    """Return whether a module, or a folder that it is in, has a leading underscore."""
+    return any(part[0] == "_" and part[-2:] != "__" for part in dotted_name.split("."))
+
+
+def public_names(module: str, text: str) -> list[str]:
+    """Return the functions and classes of a module that others may build on."""
+    if is_private(module):
+        return []
+    parts = ast.parse(text).body
+    named = [part.name for part in parts if isinstance(part, ast.ClassDef | ast.FunctionDef)]
+    return [f"{module}.{name}" for name in named if name[0] != "_"]
+
+
+def test_few_names_are_public():
+    assert public_names("a._b", "def f(): ...") == public_names("a.b", "class _C: ...") == []
+    assert public_names("a.__main__", "def f(): ...\nx = 1") == ["a.__main__.f"]
+    files = [*sources("seqopt"), *sources("formulations")]
+    found = [n for path in files for n in public_names(dotted(path), path.read_text("utf-8"))]
+    assert 100 < len(found) <= MOST_NAMES
+
+
+def private_imports(page: str) -> list[str]:
+    """Return the lines of a page that import something private."""
+    lines = re.findall(r"(?m)^ *(?:>>> )?((?:from|import) (?:seqopt|formulations)\b.*)$", page)
+    return [line for line in lines if re.search(r"[. ,]_[a-z]", line)]
+
+
+def test_pages_use_what_is_public():
+    assert len(private_imports("from seqopt import _a\n>>> import seqopt.a._b\nimport seqopt")) == 2
+    pages = {path: path.read_text(encoding="utf-8") for path in (ROOT / "docs").rglob("*.md")}
+    assert {path: found for path, page in pages.items() if (found := private_imports(page))} == {}
+
+
 def test_few_rooms():
     top = {p.stem for p in (ROOT / "seqopt").iterdir() if p.suffix == ".py" or p.is_dir()}
     rooms = {p.name for p in (ROOT / "seqopt").iterdir() if p.is_dir() and p.name[0] != "_"}
@@ -278,9 +314,8 @@ def rooms() -> set[str]:
 
 def untested(names: set[str]) -> set[str]:
     """Return the rooms that no folder of tests mirrors."""
-    return {
-        name for name in names if not list((ROOT / "tests" / name.strip("_")).glob("test_*.py"))
-    }
+    folders = {name: ROOT / "tests" / name.strip("_") for name in names}
+    return {name for name, folder in folders.items() if not list(folder.glob("test_*.py"))}
 
 
 def test_every_room_has_a_folder_of_tests():

@@ -63,7 +63,7 @@ class Costs(Protocol):
 Found_co = TypeVar("Found_co", bound=Costs, covariant=True)
 
 
-class Costed(Protocol[Found_co]):
+class _Costed(Protocol[Found_co]):
     """What has costs to be summed up, and costs whose largest counts."""
 
     @property
@@ -88,7 +88,7 @@ class Aim(Enum):
             return lambda costs, choice: costs.cost(choice)
         return lambda costs, choice: costs.worst(choice)
 
-    def costs(self, problem: Costed[Found_co]) -> Found_co:
+    def costs(self, problem: _Costed[Found_co]) -> Found_co:
         """Return the costs of a problem that this aim is about: its sums or its peaks."""
         return problem.sums if self is Aim.SUM else problem.peaks
 
