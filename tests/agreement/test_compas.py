@@ -63,6 +63,7 @@ def test_too_little_friction_falls_for_both():
     assert mine.verdict is force_only(sample_scene("bridge"), 0.05).verdict is Verdict.FALLS
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_armadillo_on_its_true_faces():
     """366 blocks on 33 supports, 1,014 faces."""

@@ -75,9 +75,15 @@ def difference(first: Fields, second: Fields) -> float:
     return worst
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[] if name == WORDS[0] else pytest.mark.slow) for name in ALL]
-)
+def marks(name: str) -> list[pytest.MarkDecorator]:
+    """Return whether a scene is for every day, or for a release."""
+    if name == WORDS[0]:
+        return []
+    large = name in ("vault338", ARMADILLO)
+    return [pytest.mark.slow, *[pytest.mark.long] * large]
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=marks(name)) for name in ALL])
 def test_the_engine_agrees_with_a_dense_solver(name):
     network = build_network(scene_of(name))
     engine = ComplianceEngine(network)

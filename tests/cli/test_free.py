@@ -72,6 +72,7 @@ def test_states_that_must_stand(capsys, tmp_path, arch):
     assert (said["cohesion_Pa"], said["undecided"]) == (0, 0)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_sturdiest_plan_is_in_degrees(capsys, tmp_path, arch):
     out = tmp_path / "out"

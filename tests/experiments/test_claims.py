@@ -10,10 +10,17 @@ from tests.commands import run
 
 ALWAYS = "frame_contrast"  # one that takes a second runs among the quick tests too
 
+LONG = ("identify_arch25", "dry_map")
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[] if n == ALWAYS else pytest.mark.slow) for n in claims()]
-)
+
+def marks(name):
+    """Whether a claim is for every day, or for a release."""
+    if name == ALWAYS:
+        return []
+    return [pytest.mark.slow, pytest.mark.long] if name in LONG else pytest.mark.slow
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=marks(n)) for n in claims()])
 def test_a_quick_run_ends_with_a_verdict(name):
     before = sorted((ROOT / "experiments" / "results").glob("*"))
     times = [path.stat().st_mtime_ns for path in before]

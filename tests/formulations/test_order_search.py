@@ -160,6 +160,7 @@ def test_the_proof_of_orders_knows_what_must_stand():
     assert finds_better_order(standing, least * (1 + 1e-6))
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @given(build=free_builds(most_bricks=5, most_robots=3))
 @settings(max_examples=6, deadline=None)

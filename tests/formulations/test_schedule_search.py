@@ -113,6 +113,7 @@ def test_over_scenarios_it_equals_brute_force(build):
             judge_schedule(replace(problem, scenarios=tuple(milder)), plan.selection, plan.steps)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @given(build=free_builds(most_bricks=6, most_robots=4))
 @settings(max_examples=8, deadline=None)

@@ -38,6 +38,7 @@ from tests.builders import small_arch
 from tests.strategies import free_builds
 
 slow = pytest.mark.slow
+TILTS = pytest.param("tilt,minmax", marks=(slow, pytest.mark.long))
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
 
 
@@ -107,6 +108,7 @@ def test_a_small_arch_equals_brute_force(least):
     check(small_arch(4), FreeRules(least_grips=least))
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @given(build=free_builds(most_bricks=4, most_robots=3))
 @settings(max_examples=6, deadline=None)
@@ -150,8 +152,7 @@ def test_a_better_plan_that_stands_is_seen(dry):
 
 
 @pytest.mark.parametrize(
-    "aim",
-    ["bond", *(pytest.param(a, marks=slow) for a in ("bond,steps", "friction", "tilt,minmax"))],
+    "aim", ["bond", *(pytest.param(a, marks=slow) for a in ("bond,steps", "friction")), TILTS]
 )
 def test_a_margin_is_the_best_to_its_width(dry, aim):
     """With the value that was found a plan exists; past the bound none does."""
@@ -180,9 +181,7 @@ def leaning(scale=1.0, stands=None, aim="bond"):
     return build_states(engine, FreeRules(), ONES, aim, stands=stands)
 
 
-@pytest.mark.parametrize(
-    "aim", ["bond,minmax", "friction,minmax", pytest.param("tilt,minmax", marks=slow)]
-)
+@pytest.mark.parametrize("aim", ["bond,minmax", "friction,minmax", TILTS])
 def test_a_margin_is_sought_among_what_stands_as_demanded(aim):
     """The demand was forgotten for the margin: plans were found that do not meet it."""
     with pytest.raises(InfeasibleError, match=r"brick 2 \(2 of 3\) is never placed.*a bond of"):
@@ -251,6 +250,7 @@ def test_the_bond_that_is_named_is_enough():
         seqopt.solve(weak, "schedule_search")
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_tilts_by_steps_are_those_of_the_program(dry):
     network = dry.network

@@ -90,6 +90,7 @@ def test_scales_are_those_of_the_scenes_own_methods(arch25):
         assert heavy.reference[name] == pytest.approx(2 * value)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_method_that_falls_on_its_way_gives_no_scales():
     network = build_network(small_arch(9))

@@ -109,6 +109,7 @@ def test_the_check_of_the_stored_rows_can_fail(column, value):
     assert not holds(table, survivors.drop(index=named.index[0]))
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_quick_run_kills_enough():
     words = [sys.executable, "-W", "error", "-m", "tests.quality.mutation_testing", "--quick"]

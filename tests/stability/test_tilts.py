@@ -123,6 +123,7 @@ def test_what_falls_survives_no_tilt():
     assert "tilt" not in repr(result)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_half_a_vault_with_epoxy_has_a_tilt():
     """Two hundred bricks: its motions are not good to a thousandth, and a tilt of NaN was said."""
