@@ -57,7 +57,7 @@ class IntegerProgram(Terse):
         if not np.isfinite(optimum.value):
             return stopped(problem, self.aim, written.bound(optimum.bound))
         choice = written.choice(np.asarray(written.whole.value))
-        worth = self.aim.worth(self.aim.costs(problem), choice)
+        worth = self.aim.value_of(self.aim.costs(problem), choice)
         bound = written.bound(optimum.bound if optimum.stopped else optimum.value)
         end = End.STOPPED if optimum.stopped else End.DONE
         return Selection(choice, worth, bound, {}, optimum.compile_seconds, end)

@@ -137,6 +137,6 @@ def _likeness(one: str, other: str) -> float:
     return difflib.SequenceMatcher(None, one.lower(), other.lower()).ratio()
 
 
-def said(error: BaseException) -> str:
+def message_of(error: BaseException) -> str:
     """Return the message of an error in one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())

@@ -163,7 +163,7 @@ def _judged(reference: Layers, aim: Aim, choice: tuple[int, ...], seconds: dict[
 def worth(reference: Layers, aim: Aim, choice: tuple[int, ...]) -> tuple[float, float]:
     """Return the value of a choice by the reference's data, and its gap to the optimum there."""
     costs = aim.costs(reference)
-    value, bound = float(aim.worth(costs, choice)), least(costs, aim)
+    value, bound = float(aim.value_of(costs, choice)), least(costs, aim)
     return value, max(0.0, value - bound) / max(abs(bound), np.finfo(float).tiny)
 
 

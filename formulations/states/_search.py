@@ -17,14 +17,20 @@ from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, TimeUpErro
 from seqopt.graph._budgets import Within, within_budgets
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.graph import Graph
-from seqopt.graph.orders import AllOrders, OrderSelection, OrderStates, TooManySetsError, Trial
-from seqopt.graph.orders import worth as worth_of
+from seqopt.graph.orders import (
+    AllOrders,
+    OrderSelection,
+    OrderStates,
+    TooManySetsError,
+    Trial,
+    order_value,
+)
 from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
 from seqopt.graph.states._visits import FreeStates, ScenarioSums, explore
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import Watch
-from seqopt.plan.search._sturdiest import best_margin
+from seqopt.plan.search._margin_search import best_margin
 from seqopt.work._workers import free_memory
 from seqopt.work.progress import Stage, Tell
 
@@ -53,7 +59,7 @@ def best_order(
     found, own = Explorer(space, width, tell), np.inf
     try:
         if width is None and problem.allows(order):
-            own = worth_of(problem, Trial(order, np.inf))
+            own = order_value(problem, Trial(order, np.inf))
         found.rise(own if space.peaks[0] else np.inf)
         if not found.whole:
             raise InfeasibleError("no order of the bricks has a plan")
@@ -68,8 +74,8 @@ def best_order(
     except StopError as stop:
         raise _too_little(stop) from None
     value, stopped = own, "time" * early
-    if path and worth(visited.graph, path)[0] < own:
-        value = worth(visited.graph, path)[0]
+    if path and path_values(visited.graph, path)[0] < own:
+        value = path_values(visited.graph, path)[0]
         order = tuple(dict.fromkeys(part[1] for _, part, _ in visited.of(path)))
     if not np.isfinite(value):
         raise TimeUpError("no order with a plan was found yet; give more")
@@ -124,7 +130,7 @@ def chosen(problem: States, choose: _Choose, watch: Watch, tell: Watching) -> St
         return plan_by_then(first, stop)
     stopped = ("interrupt" if watch.interrupted else "time") * early
     if path:
-        values = worth(graph, path)
+        values = path_values(graph, path)
         found = _selection(Visited(graph, states), Best(path, values))
     if not path or (first and early and first.objective < values):
         found = plan_by_then(first, KeyboardInterrupt() if watch.interrupted else StopError("time"))
@@ -139,7 +145,7 @@ def _on_paths(graph: Graph) -> Graph:
     return graph.only(reached(graph)[graph.source] & to_end[graph.target])
 
 
-def worth(graph: Graph, path: Sequence[int]) -> tuple[float, ...]:
+def path_values(graph: Graph, path: Sequence[int]) -> tuple[float, ...]:
     """Return what every goal takes of a path."""
     moves = [a * graph.states + b for a, b in pairwise((0, *path))]
     kept = np.isin(graph.source.astype(np.int64) * graph.states + graph.target, moves)

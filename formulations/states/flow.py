@@ -43,7 +43,7 @@ import numpy as np
 from scipy import sparse
 
 from formulations.solvers import STOPS, Point, minimize_rows
-from formulations.states._search import worth
+from formulations.states._search import path_values
 from formulations.states.on_graph import Choice, on_graph
 from seqopt.arrays import Floats
 from seqopt.graph.graph import Graph
@@ -79,7 +79,7 @@ def _linear(graph: Graph, watch: Watch) -> Choice:
 def _least_sum(graph: Graph, goal: int, watch: Watch) -> tuple[Graph, float, bool]:
     """Return the moves on paths of least sum, that sum, and whether time was over before."""
     rows, right = _rows(graph)
-    scale = worth(graph, fewest_moves(graph))[goal] or 1.0
+    scale = path_values(graph, fewest_moves(graph))[goal] or 1.0
     costs = np.pad(graph.amounts[:, goal] / scale, (0, rows.shape[1] - len(graph.source)))
     found = minimize_rows(costs, rows, right, watch=watch)
     if found.end in STOPS:
@@ -111,7 +111,7 @@ def _whole(graph: Graph, watch: Watch) -> Choice:
     path, bounds = fewest_moves(graph), list[float]()
     caps: list[tuple[Floats, float]] = []
     for goal, peak in enumerate(graph.peaks):
-        scale = worth(graph, path)[goal] or 1.0
+        scale = path_values(graph, path)[goal] or 1.0
         costs = graph.amounts[:, goal] / scale
         found = _minimize(graph, (costs, peak), caps, watch)
         used = found.values[: len(costs)] > 0.5

@@ -38,9 +38,9 @@ from seqopt.graph.orders import (
     OrderStates,
     TooManySetsError,
     Trial,
+    order_value,
     trying,
     whole_bound,
-    worth,
 )
 from seqopt.graph.paths import keep_best, lexicographic, reached
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
@@ -82,7 +82,7 @@ class _Search:
     def try_order(self, order: Order) -> None:
         """Keep an order if it is allowed, and better than the best so far."""
         if self.problem.allows(order):
-            self.take(order, worth(self.problem, self.trial(order)))
+            self.take(order, order_value(self.problem, self.trial(order)))
 
     def trial(self, order: Order) -> Trial:
         """Return an order to be tried against the best so far; end the search in time."""

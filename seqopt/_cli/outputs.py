@@ -74,7 +74,7 @@ def plan_files(
         files["trace.csv"] = csv_text(pd.DataFrame(rows))
     if trial is not None:
         files["scenarios.csv"] = csv_text(trial.table)
-    files[PAGE] = plan_page(plan.engine, plan.title, table, plan.worth, stands)
+    files[PAGE] = plan_page(plan.engine, plan.title, table, plan.result, stands)
     return files
 
 

@@ -300,7 +300,7 @@ class Trial:
     ceiling: float
 
 
-def worth(problem: AllOrders, trial: Trial) -> float:
+def order_value(problem: AllOrders, trial: Trial) -> float:
     """Return the first goal of the best plan of an order.
 
     Result: infinite where no plan of it stays below the ceiling.
@@ -318,11 +318,11 @@ def trying(problem: AllOrders, *, elsewhere: bool) -> Callable[[Trial], float]:
     """Return the function that tries orders.
 
     ``elsewhere``: whether it is to be sent to other processes: then with the scene, not with an
-    engine. Result: takes a trial, returns its `worth`. Raises `ProblemError`, `SceneError` if a
-    criterion or an engine of one's own cannot be sent.
+    engine. Result: takes a trial, returns its `order_value`. Raises `ProblemError`, `SceneError` if
+    a criterion or an engine of one's own cannot be sent.
     """
     if not elsewhere:
-        return partial(worth, problem)
+        return partial(order_value, problem)
     free = replace(problem.states, resources=problem.states.resources.alone())
     sent = ("engine", "scenarios")
     rest = {f.name: getattr(free, f.name) for f in fields(free) if f.name not in sent}
@@ -340,4 +340,4 @@ def trying(problem: AllOrders, *, elsewhere: bool) -> Callable[[Trial], float]:
 def _sent(shipment: Shipment, content: bytes, trial: Trial) -> float:
     rest, others, among = pickle.loads(content)  # our own, from `trying`
     rest["scenarios"] = tuple(map(engine_of, others))
-    return worth(AllOrders(States(engine=engine_of(shipment), **rest), among), trial)
+    return order_value(AllOrders(States(engine=engine_of(shipment), **rest), among), trial)

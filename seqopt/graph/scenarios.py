@@ -376,7 +376,7 @@ class ScenarioLayers(Shown):
         ``choice``: a candidate for every move; ``aim``: its total, or its largest cost. Result
         (S,): infinite where it exceeds a limit.
         """
-        return np.array([aim.worth(costs, choice) for costs in self.layered(aim)])
+        return np.array([aim.value_of(costs, choice) for costs in self.layered(aim)])
 
     def layered(self, aim: Aim) -> tuple[LayeredCosts, ...]:
         """Return the costs that an aim is about, scenario by scenario.

@@ -46,7 +46,7 @@ class ShownBuild(Shown):
             """The name of the plan where it is shown next to others."""
 
         @property
-        def worth(self) -> str:
+        def result(self) -> str:
             """The value of the plan, and what is proven about it, in words."""
 
         @property
@@ -182,7 +182,7 @@ class GivenSequence(ShownBuild):
         return f"<GivenSequence {self.title} of {name}: {len(self.steps)} steps>"
 
     @property
-    def worth(self) -> str:
+    def result(self) -> str:
         """What it is worth, in words."""
         return "given, not optimized"
 

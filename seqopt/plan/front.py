@@ -26,7 +26,7 @@ from seqopt.plan.solving import states_of
 from seqopt.problem.problem import Measure, Problem
 from seqopt.sequence.rules import Ending
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.work.progress import Tell, told
+from seqopt.work.progress import Tell, with_progress
 
 DIGITS = 9  # after the first
 EDGE = 1e-9  # of a rounding step: how far above a multiple a value still counts as it
@@ -380,7 +380,7 @@ def _require_apart(points: Floats) -> None:
 def _require_complete(problem: FrontProblem, points: Floats, progress: Tell) -> None:
     """Raise an error if a plan exists that no point dominates: bounds are searched again."""
     bounds = upper_bounds(points)
-    for bound in told("proving that no plan is missing", bounds, progress):
+    for bound in with_progress("proving that no plan is missing", bounds, progress):
         if not problem.is_empty_below(bound):
             raise SolverError(f"the set lacks a point below {bound.tolist()}")
 

@@ -99,7 +99,7 @@ class Plan(ShownBuild):
 
     def __repr__(self) -> str:
         what = f"{self.scene_name!r}, {self.method!r}, " if self.steps else ""
-        return f"Plan({what}by {self.formulation.name}: {len(self.steps)} steps, {self.worth})"
+        return f"Plan({what}by {self.formulation.name}: {len(self.steps)} steps, {self.result})"
 
     @property
     def layers(self) -> Layers:
@@ -198,7 +198,7 @@ class Plan(ShownBuild):
     def status(self) -> Status:
         """What is known of the plan, among the candidates that were looked at.
 
-        A margin of stability is optimal within the gap, which ``worth`` and the summary name.
+        A margin of stability is optimal within the gap, which ``result`` and the summary name.
         """
         proof = self.certificate
         if self.order is not None and self.order.status is not Status.OPTIMAL:
@@ -216,7 +216,7 @@ class Plan(ShownBuild):
         return Status.CLAIMED if proof.claimed_gap <= TOLERANCE else Status.FEASIBLE
 
     @property
-    def worth(self) -> str:
+    def result(self) -> str:
         """The value of the plan, and what is proven about it, in words."""
         if isinstance(self.graph, States):
             values = ", ".join(f"{name} {value:.6g}" for name, value in self.objective.items())

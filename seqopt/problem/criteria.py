@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from seqopt.arrays import Floats, Terse
-from seqopt.errors import ProblemError, said
+from seqopt.errors import ProblemError, message_of
 from seqopt.problem.requirements import NEVER, ROUNDED, ChoiceResponses, SceneFacts
 from seqopt.responses.quantities import robot_response
 from seqopt.scene._checks import short
@@ -465,9 +465,9 @@ class StepCost:
             with np.errstate(all="ignore"):
                 found = np.array(self.function(given, bricks), dtype=float)
         except Exception as error:  # whatever a function of others may raise
-            raise ProblemError(f"criterion {self.name}: its function failed: {said(error)}") from (
-                error
-            )
+            raise ProblemError(
+                f"criterion {self.name}: its function failed: {message_of(error)}"
+            ) from (error)
         if found.shape != impossible.shape:
             raise ProblemError(
                 f"criterion {self.name}: its function returned shape {found.shape} for responses "

@@ -82,7 +82,7 @@ class Aim(Enum):
     PEAK = "peak"
 
     @property
-    def worth(self) -> Callable[[Costs, Sequence[int]], float]:
+    def value_of(self) -> Callable[[Costs, Sequence[int]], float]:
         """The value of a choice: its total, or its largest cost."""
         if self is Aim.SUM:
             return lambda costs, choice: costs.cost(choice)

@@ -198,7 +198,7 @@ def _build(value: ShownBuild) -> _Card:
     if isinstance(value, Plan):
         posed = value.states if isinstance(value.graph, States) else value.layers
         rows |= {"criterion": posed.criterion.name} if posed.criterion.name else {}
-    rows |= {"result": value.worth, "steps": len(value.steps), **(_worst(value) if small else {})}
+    rows |= {"result": value.result, "steps": len(value.steps), **(_worst(value) if small else {})}
     if value.seconds:
         rows["time to find it, s"] = f"{sum(value.seconds.values()):.3g}"
     return _Card(f"Plan for {scene.name}", rows, lambda: _of_build(value, small=small))

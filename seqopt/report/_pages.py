@@ -242,4 +242,4 @@ def build_page(plan: ShownBuild, *others: ShownBuild) -> Page:
         names = chain([other.title], (f"{other.title} ({number})" for number in count(2)))
         tables[next(name for name in names if name not in tables)] = other.responses()
     table = tables.pop(plan.title)
-    return Page(plan_page(engine, plan.title, table, plan.worth, others=tables))
+    return Page(plan_page(engine, plan.title, table, plan.result, others=tables))

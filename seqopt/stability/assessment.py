@@ -29,7 +29,7 @@ from seqopt.stability.limit_analysis import (
     Sense,
     compile_equilibrium,
 )
-from seqopt.work.progress import Tell, told
+from seqopt.work.progress import Tell, with_progress
 
 _STILL = 1e-6  # motion slower than this, beside the fastest, is none
 
@@ -318,7 +318,7 @@ def assess_steps(
     """
     network, mortar = network_of(network), find_mortar(mortar)
     known, up, out = Contacts(network), network.scene.up, []
-    for step in told("assessing steps", require_steps(steps), progress):
+    for step in with_progress("assessing steps", require_steps(steps), progress):
         out.append(assess(step_assembly(network, step.bricks, step.grips, known), mortar, up))
     return tuple(out)
 

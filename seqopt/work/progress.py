@@ -78,7 +78,9 @@ class Progress:
         self._tell(Stage(self._what, share, left))
 
 
-def told(what: str, items: _SizedIterable[_Item_co], tell: Tell | None) -> Iterator[_Item_co]:
+def with_progress(
+    what: str, items: _SizedIterable[_Item_co], tell: Tell | None
+) -> Iterator[_Item_co]:
     """Yield items one after the other, and tell how far that is.
 
     ``what``: what is done with the items, in a few words; ``tell``: told a `Stage` before the work
@@ -86,7 +88,7 @@ def told(what: str, items: _SizedIterable[_Item_co], tell: Tell | None) -> Itera
 
     Examples
     --------
-    >>> [item for item in told("steps", [4, 7], print)]
+    >>> [item for item in with_progress("steps", [4, 7], print)]
     steps: 0 %
     steps: 50 %
     [4, 7]

@@ -74,7 +74,7 @@ def test_states_that_must_stand(capsys, tmp_path, arch):
 
 @pytest.mark.long
 @pytest.mark.slow
-def test_the_sturdiest_plan_is_in_degrees(capsys, tmp_path, arch):
+def test_the_margin_search_plan_is_in_degrees(capsys, tmp_path, arch):
     out = tmp_path / "out"
     words = ["--stands", "dry", "--aim", "tilt"]
     status, said, _ = run(capsys, "optimize", arch, "--schedule", "free", *words, "--out", str(out))

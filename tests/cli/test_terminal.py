@@ -13,7 +13,7 @@ from seqopt._cli import watcher
 from seqopt._cli.main import main
 from seqopt._cli.terminal import colored, columns, complain, note, painted, show_text, wrapped
 from seqopt._cli.watcher import Watcher
-from seqopt.work.progress import Stage, told, within
+from seqopt.work.progress import Stage, with_progress, within
 
 posix = pytest.mark.skipif(os.name != "posix", reason="terminals are POSIX's")
 
@@ -126,9 +126,9 @@ def test_the_time_left_of_a_stage_is_that_of_its_own_work(patient, monkeypatch):
 
 def test_items_and_times_are_told_as_stages():
     said = []
-    assert [*told("steps", "ab", said.append)] == ["a", "b"]
+    assert [*with_progress("steps", "ab", said.append)] == ["a", "b"]
     assert [(stage.what, stage.share) for stage in said] == [("steps", 0.0), ("steps", 0.5)]
-    assert [*told("steps", "ab", None)] == ["a", "b"]
+    assert [*with_progress("steps", "ab", None)] == ["a", "b"]
     within(said.append, float("inf"))("words")
     assert said[-1] == "words"
     within(said.append, 60.0)("words")

@@ -186,7 +186,7 @@ def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, l
     if plan is None:
         return
     aim = formulation.aim
-    worth = aim.worth(aim.costs(problem), plan.selection.choice)
+    worth = aim.value_of(aim.costs(problem), plan.selection.choice)
     assert plan.certificate.objective == pytest.approx(worth)
     assert all(b.spent(plan.selection.choice) <= b.bound + 1e-6 for b in problem.budgets)
     assert plan.selection.bound <= best + 1e-6 <= worth + 2e-6

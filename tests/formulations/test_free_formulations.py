@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from formulations.states._search import _on_paths, worth
+from formulations.states._search import _on_paths, path_values
 from formulations.states._totals import least_total
 from formulations.states.on_graph import Choice, on_graph
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -110,7 +110,7 @@ def test_it_finds_the_best_path_of_any_graph(name, graph):
     found = sorted(values_of(graph, moves) for moves in simple_paths(graph))
     if found:
         choice = ALL[name].solve.choose(graph, Watch(np.inf))
-        assert worth(graph, choice.path) == pytest.approx(found[0])
+        assert path_values(graph, choice.path) == pytest.approx(found[0])
         assert choice.bounds == pytest.approx(found[0])
 
 
@@ -212,7 +212,7 @@ def test_a_heuristic_that_promises_nothing_is_shown_with_its_gap():
     assert plan.certificate.bounds[0] == pytest.approx(best)
     assert plan.certificate.gap == pytest.approx((value - best) / value)
     assert plan.status == "feasible"
-    assert f"feasible within {plan.certificate.gap:.2g}" in plan.worth
+    assert f"feasible within {plan.certificate.gap:.2g}" in plan.result
     assert solve(problem, modest, proof=False).status == "unproven"
 
 

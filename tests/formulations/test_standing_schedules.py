@@ -206,7 +206,7 @@ def test_a_bond_is_found_to_its_share_at_every_size(scale):
     assert 0.98 * value <= bound <= true <= value * (1 + 2 * GAP)
     assert plan.certificate.gap == pytest.approx((value - bound) / value)
     assert plan.summary()["gap"] == plan.certificate.gap > 1e-3
-    assert f"optimal within {plan.certificate.gap:.2g}" in plan.worth
+    assert f"optimal within {plan.certificate.gap:.2g}" in plan.result
 
 
 def test_demands_that_others_imply_are_not_asked():

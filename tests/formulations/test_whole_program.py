@@ -39,10 +39,10 @@ def costs_of(lowest, seed=0):
 def test_the_choice_and_its_bound_are_the_least(name, lowest):
     costs, formulation = costs_of(lowest), PROGRAMS[name]
     problem, aim = CostProblem(costs), formulation.aim
-    least = min(aim.worth(costs, choice) for choice in product(*map(range, costs.sizes)))
+    least = min(aim.value_of(costs, choice) for choice in product(*map(range, costs.sizes)))
     found = formulation.solve(problem)
     assert found.end is End.DONE
-    assert aim.worth(costs, found.choice) == found.objective == pytest.approx(least, rel=1e-9)
+    assert aim.value_of(costs, found.choice) == found.objective == pytest.approx(least, rel=1e-9)
     assert least - 1e-4 * max(abs(least), 9.0) <= found.bound <= least
     told = []
     watch = Watch(progress=told.append)
@@ -54,10 +54,10 @@ def test_the_choice_and_its_bound_are_the_least(name, lowest):
 def test_without_time_it_is_an_allowed_choice_and_what_is_known_of_the_least(name):
     costs, formulation = costs_of(-9.0), PROGRAMS[name]
     aim = formulation.aim
-    least = min(aim.worth(costs, choice) for choice in product(*map(range, costs.sizes)))
+    least = min(aim.value_of(costs, choice) for choice in product(*map(range, costs.sizes)))
     found = formulation.solve(CostProblem(costs), watch=Watch(time_limit=0.0))
     assert found.end is End.STOPPED
-    assert found.bound <= least <= found.objective == aim.worth(costs, found.choice)
+    assert found.bound <= least <= found.objective == aim.value_of(costs, found.choice)
 
 
 def test_a_program_is_itself_and_one_without_a_choice_is_infeasible():

@@ -128,7 +128,7 @@ def values(goals):
     """What every allowed choice is worth, in the order of the aims."""
     found = {}
     for choice in product(*(range(size) for size in goals[0][0].sums.sizes)):
-        worth = tuple(aim.worth(problem.sums, choice) for problem, aim in goals)
+        worth = tuple(aim.value_of(problem.sums, choice) for problem, aim in goals)
         if np.isfinite(worth).all():
             found[choice] = worth
     return found

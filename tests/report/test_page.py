@@ -225,7 +225,7 @@ def test_what_robots_cannot_carry_is_said_first_in_the_table_and_at_the_step(eng
 
 def test_what_robots_carry_is_not_said_to_be_too_much(arch25):
     plan = optimize(arch25, "free")
-    text = plan_page(plan.engine, "free schedule", plan.responses(), plan.worth)
+    text = plan_page(plan.engine, "free schedule", plan.responses(), plan.result)
     assert '<p id="sentence">3 robots build arch25 in ' in text
     assert not any(data_of(text)["builds"][0]["marks"])
 

@@ -36,7 +36,7 @@ from seqopt.network.build import build_network
 from seqopt.responses._staged import Placing, staged_fields
 from seqopt.responses.table import LinearRange, archive, response_table, step_fields
 from seqopt.sequence.steps import Step
-from seqopt.work.progress import told
+from seqopt.work.progress import with_progress
 
 DESCRIPTION = (
     "Compute how the structure responds in every step of one sequence, and write a table with the "
@@ -125,7 +125,7 @@ def _step_answers(
     options: argparse.Namespace, engine: Engine, steps: Sequence[Step]
 ) -> Iterator[tuple[Step, Fields]]:
     """Return steps with their fields, each from scratch or with what earlier ones lock in."""
-    each = told("steps", steps, options.tell)
+    each = with_progress("steps", steps, options.tell)
     if options.staged is None:
         return ((step, step_fields(engine, step)) for step in each)
     if options.engine != "compliance":

@@ -239,14 +239,14 @@ def _said(found: _Found) -> str:
     if found.trial is not None:
         unseen = found.trial.summary()["unseen"]
         return (
-            f"{how}: {plan.worth} over {len(found.trial.known)} scenarios ({plan.title}); over "
+            f"{how}: {plan.result} over {len(found.trial.known)} scenarios ({plan.title}); over "
             f"unseen ones {unseen['robust']:.6g}, the nominal plan {unseen['nominal']:.6g}"
         )
     counts = f"{plan.models} models"
     if isinstance(plan.graph, States):
         counts = f"{len(plan.steps)} steps, {plan.regrips} regrips, {counts}"
-        return f"{how}: {plan.worth}; {counts}"
-    return f"{how}: {plan.worth}, {counts}"
+        return f"{how}: {plan.result}; {counts}"
+    return f"{how}: {plan.result}, {counts}"
 
 
 def _posed_notes(problem: Problem) -> tuple[str, ...]:

@@ -36,7 +36,7 @@ from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import SCHEDULES
-from seqopt.work.progress import told, within
+from seqopt.work.progress import with_progress, within
 
 FOUR = "F_largest,M_sup,T_max,D_max"
 DESCRIPTION = (
@@ -130,7 +130,7 @@ def _front_files(
     engine, tell = free.engine, options.tell
     known: dict[tuple[Step, ...], pd.DataFrame] = {}
     plans = []
-    for number, steps in enumerate(told("analyzing plans", front.steps, tell), start=1):
+    for number, steps in enumerate(with_progress("analyzing plans", front.steps, tell), start=1):
         table = known.setdefault(steps, analyze(engine, steps))
         plans.append(table.assign(point=number))
     tell("drawing and writing the page")

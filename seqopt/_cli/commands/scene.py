@@ -16,7 +16,7 @@ from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, dump_scene, load_scene
-from seqopt.work.progress import told
+from seqopt.work.progress import with_progress
 
 DESCRIPTION = (
     "Check a scene, say what is in it, and write it as a JSON file if asked; or list all built-in "
@@ -80,7 +80,7 @@ def _list(options: argparse.Namespace) -> Answer:
     """Return all built-in scenes and kinds of scenes."""
     found = {
         name: load_scene(name)
-        for name in told("reading built-in scenes", builtin_scenes(), options.tell)
+        for name in with_progress("reading built-in scenes", builtin_scenes(), options.tell)
     }
     lines = [f"{name}: {_size(scene)}; {ABOUT[name]}" for name, scene in found.items()]
     lines += [kind.about for kind in KINDS.values()]

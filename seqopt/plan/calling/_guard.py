@@ -20,7 +20,7 @@ import numpy as np
 
 from seqopt._interrupts import answered
 from seqopt.arrays import FrozenValue, Ints
-from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, SolverError, said
+from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, SolverError, message_of
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.scenarios import ScenarioLayers, largest_of
@@ -58,7 +58,7 @@ def called(
         except (SeqoptError, MemoryError, KeyboardInterrupt):
             raise
         except BaseException as error:  # whatever a formulation of others may raise, exits too
-            raise SolverError(f"formulation {name} failed: {said(error)}") from error
+            raise SolverError(f"formulation {name} failed: {message_of(error)}") from error
     if not isinstance(found, kind):
         raise SolverError(
             f"formulation {name} returned a {type(found).__name__}, not a {kind.__name__}"
@@ -92,7 +92,7 @@ def readable(name: str) -> Iterator[None]:
     try:
         yield
     except (TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise SolverError(f"formulation {name} returned nonsense: {said(error)}") from error
+        raise SolverError(f"formulation {name} returned nonsense: {message_of(error)}") from error
 
 
 def text(given: object) -> str:

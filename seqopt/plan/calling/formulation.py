@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from seqopt.arrays import FrozenValue
-from seqopt.errors import ProblemError, did_you_mean, plugins, said
+from seqopt.errors import ProblemError, did_you_mean, message_of, plugins
 from seqopt.problem.problem import Aim
 
 
@@ -342,7 +342,7 @@ def _load(entry: EntryPoint) -> Formulation:
         found = entry.load()
     except Exception as error:  # whatever a package of others may raise
         raise ProblemError(
-            f"formulation {entry.name!r}: {entry.value} cannot be loaded: {said(error)}; "
+            f"formulation {entry.name!r}: {entry.value} cannot be loaded: {message_of(error)}; "
             "reinstall it or remove it"
         ) from error
     if not isinstance(found, Formulation):

@@ -193,7 +193,7 @@ def stopped(
     costs = aim.costs(problem)
     for choice in _choices(problem, costs):
         if all(budget.slack(choice) >= 0 for budget in problem.budgets):
-            value = aim.worth(costs, choice)
+            value = aim.value_of(costs, choice)
             return Selection(choice, value, max(bound, at_least(costs, aim)), end=End.STOPPED)
     known = f" (no choice is below {bound:.6g})" if np.isfinite(bound) else ""
     if why:

@@ -21,7 +21,7 @@ from seqopt.graph.states.states import States
 from seqopt.plan.judge._budget_proof import least_within
 from seqopt.plan.judge._proof import Proof
 from seqopt.plan.judge.certificate import least_sum
-from seqopt.plan.search._sturdiest import WORST, bisected, with_margin
+from seqopt.plan.search._margin_search import WORST, bisected, with_margin
 from seqopt.problem.problem import STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
 from seqopt.sequence.rules import FreeRules, Payload

@@ -116,7 +116,7 @@ def _least(free: States, nodes: list[int], count: int) -> float:
     """Return the least that the goal takes of the whole with so many grips; infinite of none."""
     grips = np.array([*combinations(nodes, count)], dtype=np.int64)
     found = ask(free, len(free.network.inner), grips.reshape(comb(len(nodes), count), count))
-    return float(found.worth[found.fit, 0].min(initial=np.inf))
+    return float(found.values[found.fit, 0].min(initial=np.inf))
 
 
 def _closed(problem: AllOrders, key: Key, parts: list[_Entries], below: float) -> _Reached:

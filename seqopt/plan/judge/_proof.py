@@ -34,12 +34,12 @@ from seqopt.sequence.schedule import Schedule
 class Answers(NamedTuple):
     """What is known of grip sets.
 
-    ``worth`` (S, g): what every goal takes of them; zero of one that is about moves or margins;
+    ``values`` (S, g): what every goal takes of them; zero of one that is about moves or margins;
     ``forces`` (S, r): of their grips, N; ``fit`` (S,): which hang together and are within all
     limits.
     """
 
-    worth: Floats
+    values: Floats
     forces: Floats
     fit: Bools
 
@@ -62,7 +62,7 @@ def _worst(problem: States, bricks: int, grips: Ints, most: float) -> Answers:
     for number, each in enumerate(problem.each):
         rows = np.flatnonzero(fit & (out[:, 0] <= most))
         found = ask(each, bricks, grips[rows])
-        out[rows] = problem.joined(out[rows], found.worth, number)
+        out[rows] = problem.joined(out[rows], found.values, number)
         forces[rows], fit[rows] = np.maximum(forces[rows], found.forces), found.fit
     return Answers(out, forces, fit)
 
@@ -229,7 +229,7 @@ class Passable:
 
             def compute(new: Ints, nodes: Ints = nodes) -> Floats:
                 found = ask(self.problem, bricks, self.tables.nodes[nodes[new]], below)
-                return np.column_stack([found.worth, found.forces, found.fit])
+                return np.column_stack([found.values, found.forces, found.fit])
 
             found = self._known.of((bricks, taken, below), codes, compute)
             out[rows, :goals] = found[:, :goals]

@@ -209,7 +209,7 @@ def _value(costs: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
     for k, (index, size) in enumerate(zip(choice, sizes, strict=True), start=1):
         if not 0 <= index < size:
             raise SolverError(f"the answer names candidate {index} of {size} for move {k}")
-    value = aim.worth(costs, choice)
+    value = aim.value_of(costs, choice)
     if not np.isfinite(value):
         raise SolverError("the choice is not allowed by the problem; the solver's answer is wrong")
     return value

@@ -65,7 +65,9 @@ def solve_in_order(goals: Sequence[tuple[PlacementProblem, Aim]]) -> InOrder:
     choice: list[int] = []
     for mask in masks:  # pairs without a way on are left out of every mask
         choice.append(int(np.argmax(mask[choice[-1] if choice else 0])))
-    values = tuple(aim.worth(costs, choice) for costs, (_, aim) in zip(layers, goals, strict=True))
+    values = tuple(
+        aim.value_of(costs, choice) for costs, (_, aim) in zip(layers, goals, strict=True)
+    )
     return InOrder(tuple(choice), values)
 
 
