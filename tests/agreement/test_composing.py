@@ -181,7 +181,7 @@ def best_of(plans, aims, caps):
 
 
 @given(data=st.data())
-@settings(max_examples=20)
+@settings(max_examples=15)
 @pytest.mark.parametrize("name", ["free", "three-robot", "modified-sequential", "own"])
 def test_everything_goes_with_everything(name, data):
     def pick(*some):
@@ -229,7 +229,7 @@ def costs_in_each(name, grips_of):
     return np.array([(each / SCALES).max() for each in found])
 
 
-@pytest.mark.parametrize("over", ["worst-total", "cvar=0.5", "cvar=0"])
+@pytest.mark.parametrize("over", ["worst-total", "cvar=0.5"])
 @pytest.mark.parametrize("name", ["free", "own", "modified-sequential"])
 def test_totals_over_scenarios_are_the_least_of_every_path(name, over):
     words = tuple(f"sum in {k}" for k in range(4))

@@ -121,7 +121,7 @@ def test_another_order_is_found_where_the_own_one_has_no_plan():
     assert seqopt.solve(problem, FORMULATION).order.selection.order == (2, 1)
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_the_worst_of_scenarios_equals_brute_force(workers):
     """Another order is the best where the worst of some scenarios counts, and it is found."""
     scene = small_arch(4)

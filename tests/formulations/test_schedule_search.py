@@ -82,6 +82,7 @@ def test_it_equals_brute_force(build):
     check_against_brute_force(*build)
 
 
+@pytest.mark.slow
 @given(build=free_builds(most_bricks=4, most_robots=3))
 @settings(max_examples=6, deadline=None)
 def test_over_scenarios_it_equals_brute_force(build):

@@ -32,6 +32,7 @@ def test_without_weight_nothing_is_above_the_best():
     assert table.loc["free", ["objective", "gap"]].tolist() == [0.0, 0.0]
 
 
+@pytest.mark.slow
 def test_the_free_schedule_is_compared_by_the_criterion_that_is_asked_for(engine25):
     """No figure of the row is above the least of the closed rows and the published plan."""
     published = CRITERIA["worst-ratio-published"]

@@ -141,6 +141,7 @@ def test_fields_are_left_out_where_there_are_too_many_and_it_says_so(engine25, b
     assert data_of(report_page(engine25, list(builds.values()), ""))["note"] == ""
 
 
+@pytest.mark.slow
 def test_commands_write_it_and_folders_are_read_again(capsys, tmp_path):
     out = tmp_path / "best"
     assert main(["optimize", "--formulation", "overlap_dp", "--out", str(out)]) == 0

@@ -75,6 +75,7 @@ WANTED = [number * number for number in range(12)]
 whoever = pytest.mark.parametrize("lanes", [False, True])  # has the tasks: all, or each his own
 
 
+@pytest.mark.slow
 def test_results_come_in_order_whoever_works():
     assert list(map_ordered(square, range(12))) == WANTED
     for lanes in (False, True):
