@@ -157,7 +157,7 @@ def _best(
     """
     threshold, (ceiling, growth) = -np.inf, options
     if np.isfinite(ceiling) or problem.goals[0].measure is not Measure.PEAK:
-        threshold = ceiling / FAR_BELOW
+        threshold = max(ceiling / FAR_BELOW, proven[0])
     if problem.each and problem.goals[0].measure is Measure.PEAK:
         threshold = max(_of_one(problem, options), proven[0])
     while True:
