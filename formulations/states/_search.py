@@ -31,6 +31,7 @@ from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import Watch
 from seqopt.plan.search._margin_search import best_margin
+from seqopt.scene.scene import Order
 from seqopt.work._workers import free_memory
 from seqopt.work.progress import Stage, Tell
 
@@ -58,11 +59,14 @@ def best_order(
     space, order = OrderStates(problem, MOST_PARTS), problem.scene.build_order
     found, own = Explorer(space, width, tell), np.inf
     try:
-        if width is None and problem.allows(order):
+        totals = problem.states.totals
+        if width is None and not totals and problem.allows(order):
             own = order_value(problem, Trial(order, np.inf))
         found.rise(own if space.peaks[0] else np.inf)
         if not found.whole:
             raise InfeasibleError("no order of the bricks has a plan")
+        if totals:
+            return _order_of_total(found, problem, choose, watch)
         found.refine()
         visited = found.graph()
         path, bounds, early = choose(_on_paths(visited.graph), watch)
@@ -75,12 +79,45 @@ def best_order(
         raise _too_little(stop) from None
     value, stopped = own, "time" * early
     if path and path_values(visited.graph, path)[0] < own:
-        value = path_values(visited.graph, path)[0]
-        order = tuple(dict.fromkeys(part[1] for _, part, _ in visited.of(path)))
+        value, order = path_values(visited.graph, path)[0], _order_of(visited, path)
     if not np.isfinite(value):
         raise TimeUpError("no order with a plan was found yet; give more")
     bound = min(bounds[0] if bounds else -np.inf, value)
     return OrderSelection(order, value, bound, len(space.parts) - 1, stopped)
+
+
+def _order_of(visited: Visited, path: Sequence[int]) -> Order:
+    return tuple(dict.fromkeys(part[1] for _, part, _ in visited.of(path)))
+
+
+def _order_of_total(
+    found: Explorer, problem: AllOrders, choose: _Choose, watch: Watch
+) -> OrderSelection:
+    """Return the order of the path of least total over scenarios."""
+    visited = found.graph()
+    best = least_total(
+        _on_paths(visited.graph), problem.states.over, _cheapest(choose, watch), watch
+    )
+    stopped, parts = "time" * watch.over, len({part for _, part, _ in visited.states})
+    order, weights = _order_of(visited, best.path), tuple(best.weights.tolist())
+    return OrderSelection(order, best.value, best.bound, parts - 1, stopped, weights)
+
+
+def _cheapest(choose: _Choose, watch: Watch) -> Callable[[Graph], tuple[tuple[int, ...], float]]:
+    """Return what finds the path of least sum, and what none stays below."""
+
+    def cheapest(graph: Graph) -> tuple[tuple[int, ...], float]:
+        path, bounds, _ = choose(graph, watch)
+        if not path:
+            raise StopError("time")
+        return path, bounds[0] if bounds else -np.inf
+
+    return cheapest
+
+
+def shortest(graph: Graph, _: Watch) -> tuple[tuple[int, ...], tuple[float, ...], bool]:
+    """Return the path that is best in one goal after the other, by shortest paths."""
+    return (*lexicographic(graph), False)
 
 
 def best_total(
@@ -92,13 +129,6 @@ def best_total(
     default all, without which no plan is proven to be the least.
     """
     space = ScenarioSums(problem, regrips=width is None, standing=bool(problem.demands))
-
-    def cheapest(graph: Graph) -> tuple[tuple[int, ...], float]:
-        path, bounds, _ = choose(graph, watch)
-        if not path:
-            raise StopError("time")
-        return path, bounds[0] if bounds else -np.inf
-
     try:
         found = Explorer(space, width, tell)
         if not found.rise():
@@ -106,7 +136,7 @@ def best_total(
                 return best_total(problem, choose, watch, tell)
             raise InfeasibleError("no plan is allowed")
         visited = found.graph()
-        best = least_total(_on_paths(visited.graph), problem.over, cheapest, watch)
+        best = least_total(_on_paths(visited.graph), problem.over, _cheapest(choose, watch), watch)
     except StopError as stop:
         raise _too_little(stop) from None
     plan = _selection(visited, Best(best.path, (best.value,)))

@@ -17,7 +17,6 @@ from seqopt.arrays import Terse
 from seqopt.errors import ProblemError
 from seqopt.graph.graph import Graph
 from seqopt.graph.orders import AllOrders, OrderSelection
-from seqopt.graph.paths import lexicographic
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
@@ -85,8 +84,3 @@ def on_graph(
     """
     solve = _OnGraph(name, choose)
     return Formulation(name, summary, kind, None, solve, on=On.STATES, also=(On.ORDERS,))
-
-
-def shortest(graph: Graph, _: Watch) -> Choice:
-    """Return the path that is best in one goal after the other, by shortest paths."""
-    return Choice(*lexicographic(graph))

@@ -29,7 +29,7 @@ from itertools import islice
 
 import numpy as np
 
-from formulations.states._search import StopError, exact_best
+from formulations.states._search import StopError, best_order, exact_best, shortest
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.orders import (
@@ -123,6 +123,8 @@ def solve(
     if most < 0 or tries < 0:
         raise ProblemError(f"options most={most}, tries={tries}: give whole numbers from 0 on")
     search = _Search(problem, Watch(seconds), resources)
+    if problem.states.totals:
+        return best_order(problem, shortest, search.watch, search.tell_bricks)
     try:
         why = _run(search, most, tries, np.random.default_rng(seed))
     except StopError:

@@ -27,9 +27,10 @@ from formulations.states._search import (
     best_total,
     narrow,
     plan_by_then,
+    shortest,
     watched,
 )
-from formulations.states.on_graph import Choice, shortest
+from formulations.states.on_graph import Choice
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph._explore import Explorer
 from seqopt.graph.orders import AllOrders, OrderSelection
@@ -65,11 +66,12 @@ def solve(
     watch = Watch(seconds)
     tell = watched(states, watch, max_memory, resources.progress or progress)
     if isinstance(problem, AllOrders):
-        return best_order(problem, lambda g, _: Choice(lexicographic(g).path), watch, tell, width)
+        found = best_order(problem, lambda g, _: Choice(lexicographic(g).path), watch, tell, width)
+        return replace(found, bound=-np.inf)
 
     if states.totals:
-        found = best_total(states, shortest, watch, tell, width)
-        return replace(found, bound=(-np.inf,))
+        plan = best_total(states, shortest, watch, tell, width)
+        return replace(plan, bound=(-np.inf,))
 
     def search(rest: States) -> StatePath:
         try:

@@ -16,8 +16,11 @@ the least value below which moves connect the start to an end is found by bisect
 
 from __future__ import annotations
 
-from formulations.states.on_graph import on_graph, shortest
+from formulations.states.on_graph import Choice, on_graph
+from seqopt.graph.paths import lexicographic
 
 FORMULATION = on_graph(
-    "path_dp", "dynamic programming over all states, one goal after the other", shortest
+    "path_dp",
+    "dynamic programming over all states, one goal after the other",
+    lambda graph, _: Choice(*lexicographic(graph)),
 )

@@ -49,9 +49,9 @@ from formulations.states._search import (
     best_total,
     narrow,
     plan_by_then,
+    shortest,
     watched,
 )
-from formulations.states.on_graph import shortest
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph._budgets import is_beyond
 from seqopt.graph._explore import Explorer

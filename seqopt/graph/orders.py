@@ -17,7 +17,7 @@ from seqopt.engines.registry import make_engine, recipe_of
 from seqopt.errors import ProblemError
 from seqopt.graph._explore import Moves
 from seqopt.graph.paths import keep_best
-from seqopt.graph.states._visits import FreeStates, explore, move_amounts
+from seqopt.graph.states._visits import FreeStates, ScenarioSums, explore, move_amounts
 from seqopt.graph.states.states import States
 from seqopt.network.build import build_network
 from seqopt.problem.problem import LARGEST, Measure, Orders
@@ -49,11 +49,6 @@ class AllOrders(Shown):
                 f"aim {goal}: an order is not chosen by a margin; name minmax, a response, sum, "
                 "steps, regrips or travel first"
             )
-        if self.states.totals:
-            raise ProblemError(
-                f"robust aim {self.states.over}: orders are compared by worst steps; give "
-                "worst-peak, or an order"
-            )
         if self.states.budgets:
             raise ProblemError(
                 f"budget {self.states.goals[-1]}: an order is chosen by its first aim alone; leave "
@@ -66,7 +61,7 @@ class AllOrders(Shown):
             )
 
     def __repr__(self) -> str:
-        return f"AllOrders({self.scene.name!r}, {self.states.goals[0]}, {self.among.value} orders)"
+        return f"AllOrders({self.scene.name!r}, {self.states.names[0]}, {self.among.value} orders)"
 
     @property
     def scene(self) -> Scene:
@@ -131,7 +126,7 @@ class OrderSelection(FrozenValue):
     ``bound``: claimed lower bound over all orders; the value itself where it is proven the least;
     ``evaluated``: how many orders, or sets of bricks with a newest one, were looked at;
     ``stopped``: why the search ended before all was proven: ``size``, ``time`` or ``interrupt``;
-    empty if it did not.
+    empty if it did not; ``weights``: by scenario, that prove a bound on a total over them.
     """
 
     order: Order
@@ -139,6 +134,7 @@ class OrderSelection(FrozenValue):
     bound: float
     evaluated: int
     stopped: str = ""
+    weights: tuple[float, ...] = ()
 
 
 MOST_SETS = 200_000  # grip sets of the whole structure that are looked at
@@ -216,6 +212,8 @@ class OrderStates:
     @property
     def peaks(self) -> tuple[bool, ...]:
         """Whether the worst step counts, or what all steps take."""
+        if self.problem.states.totals:
+            return (False,) * len(self.problem.states.scenarios)
         return (self.problem.states.goals[0].measure is Measure.PEAK,)
 
     def start(self) -> tuple[Key, Ints]:
@@ -242,7 +240,7 @@ class OrderStates:
     @property
     def floors(self) -> bool:
         """Whether there are scenarios."""
-        return bool(self.problem.states.each)
+        return bool(self.problem.states.each) and not self.problem.states.totals
 
     def values(self, part: Key, states: Ints, *, rough: bool, most: float) -> tuple[Floats, Bools]:
         """Return what the first goal takes of states, and which are allowed."""
@@ -250,7 +248,7 @@ class OrderStates:
 
     def amounts(self, values: Floats, taken: Floats) -> Floats:
         """Return what the first goal takes of moves, (m, 1)."""
-        return move_amounts(self._first, values, taken)
+        return values if self.problem.states.totals else move_amounts(self._first, values, taken)
 
     @cached_property
     def _first(self) -> States:
@@ -270,7 +268,8 @@ class OrderStates:
             rest = [name for name in own if name not in part[0]]
             newest = (part[1],) if part[0] else ()
             problem = self.problem.judging((*first, *newest, *rest))
-            self.parts[part] = FreeStates(problem, standing=bool(problem.demands))
+            kind = ScenarioSums if problem.totals else FreeStates
+            self.parts[part] = kind(problem, standing=bool(problem.demands))
         return self.parts[part]
 
 

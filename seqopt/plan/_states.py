@@ -168,6 +168,10 @@ def _proven(name: str, problem: AllOrders, selection: OrderSelection, end: float
     if selection.stopped in ENDED or not isfinite(selection.bound):
         return False
     bound = min(selection.bound, selection.objective)
+    if problem.states.totals:  # what weights leave open, labels of the search alone close
+        states = replace(problem.states, weights=_weights(name, problem, selection))
+        weighed = replace(problem, states=states)
+        return finds_better_order(weighed, bound, end=end) is False
     better = finds_better_order(problem, bound, end=end)
     if better:
         raise SolverError(
@@ -177,13 +181,22 @@ def _proven(name: str, problem: AllOrders, selection: OrderSelection, end: float
     return better is False
 
 
+def _weights(name: str, problem: AllOrders, selection: OrderSelection) -> tuple[float, ...]:
+    """Return weights of scenarios that prove a bound, whatever was said."""
+    count = len(problem.states.scenarios)
+    if len(selection.weights) != count:
+        raise SolverError(f"{name}: there is no weight for every scenario")
+    return tuple(problem.states.over.allowed(np.array(selection.weights)).tolist())
+
+
 def _with_numbers(name: str, found: OrderSelection) -> OrderSelection:
     """Return a selection with numbers where numbers belong."""
     with readable(name):
         order = tuple(operator.index(brick) for brick in found.order)
         objective, bound = float(found.objective), float(found.bound)
         evaluated = operator.index(found.evaluated)
-        return OrderSelection(order, objective, bound, evaluated, text(found.stopped))
+        weights = tuple(map(float, found.weights))
+        return OrderSelection(order, objective, bound, evaluated, text(found.stopped), weights)
 
 
 def _require_allowed(name: str, problem: AllOrders, order: Order) -> None:

@@ -158,6 +158,14 @@ class RobustAim:
         weights = np.clip(1.0 - most * np.arange(count), 0.0, most)
         return np.asarray(weights / weights.sum())
 
+    def allowed(self, weights: Floats) -> Floats:
+        """Return weights of scenarios, (S,), that prove a bound on totals from 0, near some.
+
+        Any do from zero to the largest that add up to one or less.
+        """
+        within = np.clip(weights, 0.0, self.most(len(weights)))
+        return np.asarray(within / max(1.0, float(within.sum())))
+
     def value(self, values: Floats) -> float:
         """Return one value from the values of all scenarios.
 

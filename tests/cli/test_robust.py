@@ -72,10 +72,6 @@ def test_a_plan_over_scenarios_is_written(capsys, tmp_path, scene, aim):
         (["--robust", "worst-total", "--formulation", "minimax"], "use scenario_search"),
         (["--robust", "worst-peak", "--budget", "travel=0.8"], "where candidates are chosen"),
         (["--robust", "worst-peak", "--no-proof"], "ask for the proof"),
-        (
-            ["--robust", "worst-total", "--schedule", "free", "--order", "search"],
-            "orders are compared by worst steps",
-        ),
         (["--robust", "worst-total", "--schedule", "free", "--aim", "steps"], "of one sum alone"),
         (["--scenarios", "3", "--formulation", "minimax"], "--scenarios: plans over scenarios"),
         (["--seed", "3", "--schedule", "free"], "--seed: plans over scenarios alone"),

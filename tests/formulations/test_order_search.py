@@ -16,10 +16,13 @@ from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.orders import AllOrders, OrderSelection, trying, whole_bound
 from seqopt.graph.states.states import build_states, over_scenarios, within
-from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation
+from seqopt.plan._states import _proven
+from seqopt.plan._status import Status
+from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation, formulation_names
 from seqopt.plan.judge._orders import finds_better_order
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import StepCost, WorstRatio
+from seqopt.problem.problem import WORST_TOTAL, cvar
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import Resources
 from seqopt.scene.library.wall import WallShape, wall
@@ -135,6 +138,33 @@ def test_the_worst_of_scenarios_equals_brute_force(workers):
     assert found.order.selection.objective > 1.01 * min(brute_force(nominal).values())
     with pytest.raises(ProblemError, match="an order is chosen by its first aim alone"):
         replace(nominal, states=within(nominal.states, {"regrips": 1}))
+
+
+@pytest.mark.parametrize(
+    ("aim", "bricks"), [(WORST_TOTAL, 3), pytest.param(cvar(0.5), 4, marks=pytest.mark.slow)]
+)
+def test_totals_over_scenarios_equal_brute_force(aim, bricks):
+    """By every formulation; a bound is proven where weights leave nothing open, else claimed."""
+    scene = small_arch(bricks)
+    some = seqopt.scenarios(scene, count=3, density=0.9, seed=5)
+    nominal = posed(scene, aim="sum")
+    problem = replace(nominal, states=over_scenarios(nominal.states, some.scenes, aim))
+    worths = brute_force(problem)
+    for name in formulation_names(On.ORDERS, On.STATES):
+        able = find_formulation(name)
+        if On.ORDERS not in (able.on, *able.also):
+            continue
+        plan = seqopt.solve(problem, name)
+        found = plan.order.selection
+        assert found.objective == pytest.approx(plan.objective[str(aim)])
+        assert worths[found.order] == pytest.approx(found.objective, rel=1e-8)
+        assert found.bound <= min(worths.values()) * (1 + 1e-9)
+        if able.kind is FormulationKind.EXACT:
+            assert found.objective == pytest.approx(min(worths.values()), rel=1e-8)
+            assert plan.order.proven or plan.order.status is not Status.OPTIMAL
+    alone = replace(found, weights=(1.0, 0.0))
+    with pytest.raises(SolverError, match="no weight for every scenario"):
+        _proven("x", problem, replace(alone, bound=found.objective), np.inf)
 
 
 @given(build=free_builds(most_bricks=4, most_robots=3))

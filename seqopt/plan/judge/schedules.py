@@ -121,15 +121,10 @@ def _within_budgets(
 def _over_totals(
     problem: States, selection: StatePath, value: float, hint: Hint | None
 ) -> Certificate:
-    """Return the certificate of a total over scenarios: weights bound it by one weighted sum.
-
-    Any weights from zero to the largest of the aim that add up to one or less prove a bound.
-    """
-    count, most = len(problem.each), problem.over.most(len(problem.each))
-    if [*map(len, selection.prices)] != [count]:
+    """Return the certificate of a total over scenarios: weights bound it by one weighted sum."""
+    if [*map(len, selection.prices)] != [len(problem.each)]:
         raise SolverError("there is no weight for every scenario")
-    weights = np.clip(selection.prices[0], 0.0, most)
-    weights /= max(1.0, float(weights.sum()))
+    weights = problem.over.allowed(np.array(selection.prices[0]))
     proof = Proof(replace(problem, weights=tuple(weights.tolist())), hint)
     bound = min(value, proof.bounds((value,))[0])
     claimed = min(value, max(bound, selection.bound[0]))
