@@ -8,8 +8,6 @@ time. An experiment that an extra is missing for is named and left out. The exit
 claim does not hold, or if none is found.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import subprocess
@@ -30,14 +28,9 @@ TOGETHER = 2  # experiments at a time, a core each, where no time is a result
 def run(name: str, *arguments: str) -> tuple[str, float]:
     """Return how an experiment ended and the seconds it took."""
     start = time.perf_counter()
-    done = subprocess.run(
-        [sys.executable, "-m", modules()[name], *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=HOME.parent,
-        env=os.environ | ONE_CORE,
-    )
+    command = [sys.executable, "-m", modules()[name], *arguments]
+    more = {"capture_output": True, "text": True, "cwd": HOME.parent, "env": os.environ | ONE_CORE}
+    done = subprocess.run(command, check=False, **more)
     seconds = time.perf_counter() - start
     last = (done.stdout.splitlines() or [""])[-1]
     if done.returncode == 0 and last.startswith(PREFIX):
@@ -47,7 +40,6 @@ def run(name: str, *arguments: str) -> tuple[str, float]:
 
 
 def stored(column: str) -> dict[str, object]:
-    """Return a column of the last run of all, by experiment."""
     return pd.read_csv(STORE, index_col=0)[column].to_dict() if STORE.exists() else {}
 
 
@@ -92,9 +84,8 @@ def listed() -> Iterator[str]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(
-        prog="python -m experiments", description=__doc__.splitlines()[0]
-    )
+    about = {"prog": "python -m experiments", "description": __doc__.splitlines()[0]}
+    parser = argparse.ArgumentParser(**about)
     parser.add_argument("what", nargs="*", metavar="NAME", help="experiments, or list or all")
     parser.add_argument("--quick", action="store_true", help="reduced size, nothing stored")
     options = parser.parse_args()
@@ -104,9 +95,8 @@ def main() -> int:
             return 0
         only = [] if options.what == ["all"] else options.what
         if unknown := [name for name in only if name not in claims()]:
-            raise ClaimError(
-                f"{unknown[0]}: there is no such experiment; give some of {', '.join(claims())}"
-            )
+            known = ", ".join(claims())
+            raise ClaimError(f"{unknown[0]}: there is no such experiment; give some of {known}")
         table = run_all(*(["--quick"] if options.quick else []), only=only)
     except ClaimError as error:
         print(error, file=sys.stderr)

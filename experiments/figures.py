@@ -8,11 +8,8 @@ Every picture is held against the stored one before it takes its place: gray mea
 16 pixels, so that fonts do not count, may differ by a fifth of what tells the stored picture from a
 blank one.
 
-Inputs: the shipped scenes and tables. Command: ``python -m experiments.figures [--quick]``. Writes
-``docs/figures/*.png``.
+Inputs: the shipped scenes and tables. Command: ``python -m experiments.figures [--quick]``.
 """
-
-from __future__ import annotations
 
 import io
 import textwrap
@@ -25,25 +22,22 @@ from matplotlib.image import imread
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
+from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import FIGURES, save_figure
 from experiments.harness.yardstick import VALUES
+from seqopt import FreeRules, build_network, load_scene, pose, three_robot_loop
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.network.build import build_network
 from seqopt.plan.front import find_front
-from seqopt.plan.solving import pose
-from seqopt.report._style import BLUE, DPI, GRAY, GREEN, VERMILION, new_figure, plain, styled
+from seqopt.report._style import BLUE, DPI, GRAY, GREEN, VERMILION, plain, styled
 from seqopt.report.charts import draw_responses, front_figure
 from seqopt.report.comparison import method_tables
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, force_key
 from seqopt.report.text import in_words
 from seqopt.scene.boxes import boxes
 from seqopt.scene.library import DomeShape, WallShape, chain, dome, wall
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import WORST_RATIO, as_printed, printed_steps
 
 VIEW = View(azimuth=35, elevation=22)
@@ -59,16 +53,14 @@ WORDS = (
 
 @styled
 def vault(_: Engine) -> Figure:
-    """Draw the vault in three phases, and its plan with the sides of the rectangle around it."""
     net = build_network(load_scene("vault338"))
     arch = range(1, 26)
-    figure = new_figure(6.4)
-    panels = figure.subplots(2, 2).ravel()
+    figure, panels = subplots(6.4, 2, 2)
+    *parts, plan = panels.ravel()
     names = {25: "the central arch, 25 bricks", 120: "120 bricks", 338: "338 bricks"}
-    for panel, (bricks, name) in zip(panels, names.items(), strict=False):
+    for panel, (bricks, name) in zip(parts, names.items(), strict=True):
         draw_bricks(panel, net, bricks, VIEW, marked=arch)
         panel.set_title(name, loc="center")
-    plan = panels[-1]
     draw_bricks(plan, net, 338, View(azimuth=0, elevation=90), marked=arch)
     plan.set_title("from above, in mm", loc="center")
     corner = boxes(net.scene.bricks).corners().reshape(-1, 3)
@@ -82,29 +74,24 @@ def vault(_: Engine) -> Figure:
 
 @styled
 def library(_: Engine) -> Figure:
-    """Draw a chain, a wall, and a dome in either bond."""
-    figure = new_figure(5.6)
+    figure, panels = subplots(5.6, 2, 2)
+    herringbone = DomeShape(courses=10, around=24, bond="herringbone", thickness=0.06)
     scenes = {
         "chain of 50 bricks": chain(50),
-        "wall in running bond": wall(WallShape(columns=6, courses=8, gap=0.01)),
-        "dome in running bond": load_scene("dome163"),
-        "dome in herringbone": dome(
-            DomeShape(courses=10, around=24, bond="herringbone", thickness=0.06)
-        ),
+        "wall in running bond, {} bricks": wall(WallShape(columns=6, courses=8, gap=0.01)),
+        "dome in running bond, {} bricks": load_scene("dome163"),
+        "dome in herringbone, {} bricks": dome(herringbone),
     }
-    for panel, (name, scene) in zip(figure.subplots(2, 2).ravel(), scenes.items(), strict=True):
+    for panel, (name, scene) in zip(panels.ravel(), scenes.items(), strict=True):
         draw_bricks(panel, build_network(scene), len(scene.bricks), VIEW)
-        panel.set_title(
-            name if "of" in name else f"{name}, {len(scene.bricks)} bricks", loc="center"
-        )
+        panel.set_title(name.format(len(scene.bricks)), loc="center")
     return figure
 
 
 @styled
 def scenes_in_words(_: Engine) -> Figure:
-    """Draw scenes that a few words describe."""
-    figure = new_figure(7.6)
-    for panel, words in zip(figure.subplots(3, 2).ravel(), WORDS, strict=True):
+    figure, panels = subplots(7.6, 3, 2)
+    for panel, words in zip(panels.ravel(), WORDS, strict=True):
         scene = load_scene(words)
         draw_bricks(panel, build_network(scene), len(scene.bricks), VIEW)
         lines = textwrap.wrap(words.replace(",", ", "), 40)
@@ -123,9 +110,7 @@ COLUMNS = {
     "D_max_1e-3mm": "largest displacement\nD_max [1e-3 mm]",
 }
 PRINTED = {
-    "F_rob1_N": "force of robot 1 [N]",
-    "F_rob2_N": "force of robot 2 [N]",
-    "F_rob3_N": "force of robot 3 [N]",
+    **{f"F_rob{i}_N": f"force of robot {i} [N]" for i in (1, 2, 3)},
     "F_sup_N": "force of support [N]",
     "M_sup_Nm": "support moment [N m]",
     "F_min_N": "compression C_max [N]",
@@ -146,8 +131,7 @@ TABLES = {
 def twisting_step(engine: Engine) -> Figure:
     """Draw the arch, 18 bricks held off their line, and the same held on a brick along it."""
     net = engine.network
-    figure = new_figure(3.0)
-    whole, twist, calm = figure.subplots(1, 3)
+    figure, (whole, twist, calm) = subplots(3.0, 1, 3)
     draw_bricks(whole, net, 25, VIEW)
     whole.set_title("the arch of 25 bricks", loc="center")
     for axes, node, name in (
@@ -165,8 +149,7 @@ def twisting_step(engine: Engine) -> Figure:
 @styled
 def network_picture(engine: Engine) -> Figure:
     net = engine.network
-    figure = new_figure(7.2)
-    axes = figure.subplots()
+    figure, axes = subplots(7.2)
     draw_bricks(axes, net, 25, FROM_ASIDE, alpha=0.12)
     draw_network(axes, net, 25, FROM_ASIDE, numbers=True)
     keys = [
@@ -183,8 +166,7 @@ def network_picture(engine: Engine) -> Figure:
 def axial_forces(engine: Engine) -> Figure:
     """Draw the edges of two states, tension and compression in two colors."""
     net = engine.network
-    figure = new_figure(5.4)
-    axes = figure.subplots(1, 2)
+    figure, axes = subplots(5.4, 1, 2)
     states = ((12, (None, 19, None)), (17, (33, 31, None)))
     forces = [
         engine.solve(bricks, [[g for g in grips if g is not None]]).edge_force[0]
@@ -193,8 +175,7 @@ def axial_forces(engine: Engine) -> Figure:
     largest = max(float(np.abs(force).max()) for force in forces)
     for panel, (bricks, grips), force in zip(axes, states, forces, strict=True):
         draw_bricks(panel, net, bricks, VIEW, alpha=0.08)
-        look = {"edge_force": force, "largest_force": largest}
-        draw_network(panel, net, bricks, VIEW, **look)
+        draw_network(panel, net, bricks, VIEW, edge_force=force, largest_force=largest)
         draw_grips(panel, net, grips, VIEW)
         held = sum(grip is not None for grip in grips)
         panel.set_title(f"{bricks} bricks, {held} grip{'s' * (held > 1)}", loc="center")
@@ -210,8 +191,7 @@ def tables_as_printed(engine: Engine) -> dict[str, pd.DataFrame]:
 
 @styled
 def responses_along_the_build(engine: Engine) -> Figure:
-    figure = new_figure(7.8)
-    axes = figure.subplots(len(COLUMNS), 1, sharex=True)
+    figure, axes = subplots(7.8, len(COLUMNS), 1, sharex=True)
     tables = {in_words(name): table for name, table in tables_as_printed(engine).items()}
     draw_responses(axes, tables, COLUMNS)
     axes[0].get_legend().remove()
@@ -224,9 +204,9 @@ def responses_along_the_build(engine: Engine) -> Figure:
 @styled
 def printed_against_computed(engine: Engine) -> Figure:
     tables = tables_as_printed(engine)
-    figure = new_figure(8.6)
-    panels = figure.subplots(4, 3).ravel()
-    for panel, column in zip(panels, VALUES, strict=False):
+    figure, panels = subplots(8.6, 4, 3)
+    *panels, last = panels.ravel()
+    for panel, column in zip(panels, VALUES, strict=True):
         for name, (marker, color, label) in TABLES.items():
             want = printed_steps(name)[column].abs()
             look = {"ms": 4, "mfc": "none", "color": color, "ls": "none", "label": label}
@@ -238,21 +218,19 @@ def printed_against_computed(engine: Engine) -> Figure:
             plain(panel.xaxis, panel.yaxis)
         panel.set_title(PRINTED[column])
         panel.spines[["top", "right"]].set_visible(False)
-    panels[-1].set_axis_off()
-    panels[-1].legend(*panels[0].get_legend_handles_labels(), loc="center")
+    last.set_axis_off()
+    last.legend(*panels[0].get_legend_handles_labels(), loc="center")
     figure.supxlabel("printed by Bruun et al.")
     figure.supylabel("computed here")
     return figure
 
 
 def free_front(engine: Engine) -> Figure:
-    """Draw the Pareto sets of the free schedule and of the loop, and the methods of the paper."""
     names = [*ROUNDED]
     rules = FreeRules(), three_robot_loop(engine.network)
     posed = [pose(engine, each, WORST_RATIO, ",".join(names)) for each in rules]
     fronts = [find_front(problem, rounding=ROUNDED) for problem in posed]
-    methods = method_tables(engine)[0]
-    return front_figure(fronts[0], methods, {"three-robot loop": fronts[1].table})
+    return front_figure(fronts[0], method_tables(engine)[0], {"three-robot loop": fronts[1].table})
 
 
 PICTURES: dict[str, Callable[[Engine], Figure]] = {
@@ -284,20 +262,14 @@ def unlike(drawn: Floats, stored: Floats) -> float:
     return float(np.abs(own - other).mean() / np.abs(1 - other).mean())
 
 
-def rendered(figure: Figure) -> Floats:
-    """Return a figure as it would be stored: rows, columns, channels, each from 0 to 1."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, dpi=DPI, format="png")
-    buffer.seek(0)
-    return np.asarray(imread(buffer, format="png"), dtype=float)
-
-
 def differing(engine: Engine, *, store: bool) -> dict[str, float]:
     """Return how far every picture differs from the stored one, which it then may replace."""
     out = {}
     for name, draw in PICTURES.items():
-        figure, path = draw(engine), FIGURES / name
-        drawn = rendered(figure)
+        figure, path, buffer = draw(engine), FIGURES / name, io.BytesIO()
+        figure.savefig(buffer, dpi=DPI, format="png")
+        buffer.seek(0)
+        drawn = np.asarray(imread(buffer, format="png"), dtype=float)
         out[name] = unlike(drawn, np.asarray(imread(path))) if path.exists() else float("inf")
         if store:
             save_figure(figure, name)
@@ -305,8 +277,7 @@ def differing(engine: Engine, *, store: bool) -> dict[str, float]:
 
 
 def experiment(options: Options) -> Finding:
-    engine = ComplianceEngine(build_network(load_scene("arch25")))
-    far = differing(engine, store=not options.quick)
+    far = differing(ComplianceEngine(build_network(load_scene("arch25"))), store=not options.quick)
     for name, share in far.items():
         print(f"{name:20} differs from the stored one by {share:.3f} of what it shows")
     return Finding(max(far.values()) <= ALIKE)

@@ -19,25 +19,19 @@ printed size or 1 and forgiving the rounding of print, with equal states counted
 several local minima; the numbers differ between fits that are equally good.
 
 The default run repeats this in short form: from one plan angle, with at most 10 evaluations per
-degree of softening; a fit that ends worse than the shipped one goes on, up to twice. It shows that
-the tables alone lead from a catenary to a fit like the shipped one. ``--full`` starts from two plan
-angles with at most 40 evaluations, as the shipped scene did; the best of its first stages goes on.
-Either states how far its errors and numbers are from the shipped ones. The claim fails if the
-median, 90th or 95th percentile of the shipped scene's errors is above 0.15, 1.9 or 4 %, on both
-fitted tables together or on Table B.1, or if one of the new fit on the fitted tables is larger than
-the shipped one by more than the yardstick's rounding, 0.05. What the new fit gives on Table B.1 is
-shown and not judged.
+degree of softening; a fit that ends worse than the shipped one goes on, up to twice. ``--full``
+starts from two plan angles with at most 40 evaluations, as the shipped scene did; the best of its
+first stages goes on. The claim fails if the median, 90th or 95th percentile of the shipped scene's
+errors is above 0.15, 1.9 or 4 %, on both fitted tables together or on Table B.1, or if one of the
+new fit on the fitted tables is larger than the shipped one by more than the yardstick's rounding,
+0.05. What the new fit gives on Table B.1 is shown and not judged.
 
 Inputs: the tables that ship with the package. Command: ``python -m
-experiments.calibration.identify_arch25 [--quick] [--full] [--write] [--cross] [--variants]``.
-Writes ``experiments/results/identify_arch25_refit.csv``; only ``--write`` puts the new scene in the
-place of ``seqopt/data/scenes/arch25.json`` and its numbers in ``identify_arch25.csv``. ``--cross``
-fits one table, scores the states that only the other has, and writes ``identify_arch25_cross.csv``;
-``--variants`` repeats the first stage with other sets of numbers and writes
-``identify_arch25_variants.csv``.
+experiments.calibration.identify_arch25 [--quick] [--full] [--write] [--cross] [--variants]``. Only
+``--write`` puts the new scene in the place of ``seqopt/data/scenes/arch25.json`` and its numbers in
+``identify_arch25.csv``. ``--cross`` fits one table and scores the states that only the other has;
+``--variants`` repeats the first stage with other sets of numbers.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -47,34 +41,15 @@ import pandas as pd
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
-from experiments.calibration.parts.arch_numbers import (
-    BRICKS,
-    FITTED,
-    NUMBERS,
-    OFFSETS,
-    PERCENTILES,
-    PLAN_ANGLES,
-    SHAPE,
-    VARIANTS,
-    Free,
-    beside_shipped,
-    holds,
-    report,
-    scene_of,
-    scores,
-    start_of,
-    starting_guess,
-)
+from experiments.calibration.parts import arch_numbers as arch
+from experiments.calibration.parts.arch_numbers import BRICKS, OFFSETS, SHAPE, Free, scene_of
 from experiments.harness.claim import Claim, Finding, Option, Options
 from experiments.harness.results import HOME, RESULTS
 from experiments.harness.yardstick import VALUES, errors, percentiles
+from seqopt import Scene, analyze, build_network, save_scene
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.network.build import build_network
 from seqopt.responses.quantities import TO_1E_3MM, responses_of, support_forces, support_moments
-from seqopt.responses.table import analyze
-from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import as_printed, printed_steps
 
@@ -114,16 +89,16 @@ def target(tables: Sequence[pd.DataFrame]) -> Target:
 def produced(scene: Scene, wanted: Target) -> Floats:
     """Return the responses of a scene in the steps of a target, in its order and columns."""
     engine = ComplianceEngine(build_network(scene))
-    out = []
+    net, out = engine.network, []
     for bricks, grips, robots in wanted.groups:
         fields = engine.solve(bricks, grips)
-        answer = responses_of(engine.network, fields)
+        answer = responses_of(net, fields)
         force = np.full((len(grips), 3), np.nan)
         force[:, robots] = answer["F_rob"]
-        size = [TO_1E_3MM * answer[name] for name in ("D_max", "D_avg", "D_std")]
-        first = [support_forces(engine.network, fields)[:, 0], support_moments(fields)[:, 0]]
-        rest = [answer[name] for name in ("F_min", "T_max", "F_avg")]
-        out.append(np.column_stack([force, *first, *rest, *size]))
+        columns = [force, support_forces(net, fields)[:, 0], support_moments(fields)[:, 0]]
+        columns += [answer[name] for name in ("F_min", "T_max", "F_avg")]
+        columns += [TO_1E_3MM * answer[name] for name in ("D_max", "D_avg", "D_std")]
+        out.append(np.column_stack(columns))
     return np.vstack(out)
 
 
@@ -168,12 +143,11 @@ def identify(wanted: Target, angles: Sequence[float], most: int) -> tuple[Floats
     """Return the fitted numbers, and what they are, from the documented starting guess."""
     fits = []
     for angle in angles:
-        start = starting_guess()
+        start = arch.starting_guess()
         start[BRICKS] = angle
         fits.append(fit(start, SHAPE, wanted, most))
-        print(
-            f"plan angle from {np.degrees(angle):5.1f}°: robust cost {fits[-1][1]:.4f}", flush=True
-        )
+        cost = f"robust cost {fits[-1][1]:.4f}"
+        print(f"plan angle from {np.degrees(angle):5.1f}°: {cost}", flush=True)
     best = min(fits, key=lambda entry: entry[1])[0]
     groups = (*SHAPE, OFFSETS)
     numbers, remaining = fit(np.concatenate([best, np.zeros(BRICKS)]), groups, wanted, most)
@@ -185,21 +159,21 @@ def cross(most: int) -> pd.DataFrame:
     """Fit one table, score the rows that only the other has."""
     rows = []
     for known, other in (("sequential", "cantilever"), ("cantilever", "sequential")):
-        numbers, groups = identify(target([printed_steps(known)]), PLAN_ANGLES, most)
+        numbers, groups = identify(target([printed_steps(known)]), arch.PLAN_ANGLES, most)
         engine = ComplianceEngine(build_network(scene_of(numbers, groups)))
         found = analyze(engine, METHODS[other](engine.network))
         table = errors(as_printed(engine.network.scene, found), printed_steps(other))
         unseen = printed_steps(other)["same_in_both"].to_numpy() == 0
         rows.append((known, other, *percentiles(table[unseen])))
-    return pd.DataFrame(rows, columns=["fitted", "scored", *PERCENTILES])
+    return pd.DataFrame(rows, columns=["fitted", "scored", *arch.PERCENTILES])
 
 
 def compare_variants(wanted: Target, most: int) -> pd.DataFrame:
     """Fit the first stage with every set of numbers, from the same start."""
     rows = []
-    for name, groups in VARIANTS.items():
-        numbers, remaining = fit(start_of(groups), groups, wanted, most)
-        limits = scores(scene_of(numbers, groups)).loc["both"]
+    for name, groups in arch.VARIANTS.items():
+        numbers, remaining = fit(arch.start_of(groups), groups, wanted, most)
+        limits = arch.scores(scene_of(numbers, groups)).loc["both"]
         rows.append({"variant": name, "numbers": len(numbers), "cost": remaining, **limits})
         print(pd.DataFrame(rows[-1:]).to_string(index=False, header=len(rows) == 1), flush=True)
     return pd.DataFrame(rows).drop(columns="T_pct_within_2_edges_pct")
@@ -212,18 +186,20 @@ def explore(options: Options) -> None:
         print(table.to_string(index=False, float_format="%.2f"))
         table.to_csv(RESULTS / "identify_arch25_cross.csv", index=False, float_format="%.3f")
     if options.variants:
-        table = compare_variants(target([printed_steps(name) for name in FITTED]), 40)
+        table = compare_variants(target([printed_steps(name) for name in arch.FITTED]), 40)
         table.to_csv(RESULTS / "identify_arch25_variants.csv", index=False, float_format="%.4g")
 
 
 def repeat(options: Options) -> tuple[Floats, Sequence[Free]]:
     """Identify anew; what is worse than the shipped fit is fitted on, up to twice."""
-    both = target([printed_steps(name) for name in FITTED])
+    both = target([printed_steps(name) for name in arch.FITTED])
     most = 2 if options.quick else 40 if options.full else 10
-    numbers, groups = identify(both, PLAN_ANGLES if options.full else PLAN_ANGLES[:1], most)
+    numbers, groups = identify(
+        both, arch.PLAN_ANGLES if options.full else arch.PLAN_ANGLES[:1], most
+    )
     for _ in range(0 if options.quick else MORE):
         scene = scene_of(numbers, groups)
-        if holds(beside_shipped(report(numbers, groups), scene), quick=False):
+        if arch.holds(arch.beside_shipped(arch.report(numbers, groups), scene), quick=False):
             break
         numbers, remaining = fit(numbers, groups, both, most)
         print(f"worse than shipped, fitted on: robust cost {remaining:.4f}", flush=True)
@@ -235,14 +211,14 @@ def experiment(options: Options) -> Finding | None:
         explore(options)
         return None
     numbers, groups = repeat(options)
-    scene, fitted = scene_of(numbers, groups), report(numbers, groups)
-    table = beside_shipped(fitted, scene)
+    scene, fitted = scene_of(numbers, groups), arch.report(numbers, groups)
+    table = arch.beside_shipped(fitted, scene)
     print(table.to_string(index=False, float_format="%.4g", na_rep=""))
     if options.write and not options.quick:
         save_scene(scene, SCENE)
-        fitted.to_csv(NUMBERS, index=False, float_format="%.6g", lineterminator="\n")
-    good, count = holds(table, quick=options.quick), f": {len(numbers)} numbers"
-    return Finding(good, count, {"identify_arch25_refit": table})
+        fitted.to_csv(arch.NUMBERS, index=False, float_format="%.6g", lineterminator="\n")
+    good = arch.holds(table, quick=options.quick)
+    return Finding(good, f": {len(numbers)} numbers", {"identify_arch25_refit": table})
 
 
 CLAIM = Claim(

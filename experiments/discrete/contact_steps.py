@@ -9,10 +9,7 @@ stand, or if none that is proven to stand becomes unstable; steps that were not 
 count for neither. One arch and two methods: how many steps differ elsewhere is not said.
 
 Inputs: the shipped scene. Command: ``python -m experiments.discrete.contact_steps [--quick]``.
-Writes ``experiments/results/contact_steps.csv`` and ``docs/figures/contact_steps.png``.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
@@ -24,18 +21,16 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
-from seqopt.contact.mortar import DRY
+from experiments.harness.scenes import arch25
+from seqopt import DRY, Network, Step
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
-from seqopt.report._style import BLUE, GRAY, VERMILION, new_figure, plain, styled
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.steps import Step
+from seqopt.report._style import BLUE, GRAY, VERMILION, plain, styled
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict, assess_steps
 
@@ -68,30 +63,20 @@ def largest(engine: Engine, step: Step) -> float:
 
 
 def rows(net: Network, method: str, steps: Sequence[Step]) -> list[dict[str, object]]:
-    """Return a row per step."""
     discrete, rigid = DiscreteEngine(net, DRY), ComplianceEngine(net)
-    results = assess_steps(net, steps, DRY)
     out: list[dict[str, object]] = []
-    for step, result in zip(steps, results, strict=True):
+    for step, result in zip(steps, assess_steps(net, steps, DRY), strict=True):
         ends, moved = ending(discrete, step)
-        out.append(
-            {
-                "method": method,
-                "step": step.number,
-                "bricks": step.bricks,
-                "certificate": result.verdict.value,
-                "discrete": ends,
-                "D_max_1e-3mm": TO_1E_3MM * moved,
-                "D_max_rigid_1e-3mm": TO_1E_3MM * largest(rigid, step),
-            }
-        )
+        row = {"method": method, "step": step.number, "bricks": step.bricks}
+        row |= {"certificate": result.verdict.value, "discrete": ends}
+        row |= {"D_max_1e-3mm": TO_1E_3MM * moved}
+        out.append(row | {"D_max_rigid_1e-3mm": TO_1E_3MM * largest(rigid, step)})
     return out
 
 
 @styled
 def chart(table: pd.DataFrame) -> Figure:
-    figure = new_figure(4.8)
-    panels = figure.subplots(table["method"].nunique(), 1, sharex=True)
+    figure, panels = subplots(4.8, table["method"].nunique(), 1, sharex=True)
     for axes, (method, part) in zip(panels, table.groupby("method", sort=False), strict=True):
         axes.plot(part["step"], part["D_max_rigid_1e-3mm"], color=GRAY, lw=1.2)
         rests = part[part["discrete"] == RESTS]
@@ -102,47 +87,37 @@ def chart(table: pd.DataFrame) -> Figure:
         for step in part[part["certificate"] == Verdict.FALLS.value]["step"]:
             axes.axvspan(step - 0.5, step + 0.5, color=FALLING, lw=0)
         axes.set(yscale="log", ylim=(1e-3, TOP), xlim=(0, table["step"].max() + 1))
-        axes.set_ylabel("largest displacement\nD_max [1e-3 mm]")
+        axes.set(ylabel="largest displacement\nD_max [1e-3 mm]")
         axes.set_title(f"{method} method, bricks laid dry", pad=9)
         plain(axes.yaxis)
         axes.spines[["top", "right"]].set_visible(False)
     panels[-1].set_xlabel("step")
     words = {RESTS: "comes to rest", GOES: "becomes unstable", NEITHER: "neither was found"}
     keys: list[Artist] = [Line2D([], [], label=words[end], **look) for end, look in SHOWN.items()]
-    keys.append(Patch(color=FALLING, label="proven to fall"))
-    keys.append(Line2D([], [], color=GRAY, label="the same, bricks bonded"))
+    keys += [Patch(color=FALLING, label="proven to fall")]
+    keys += [Line2D([], [], color=GRAY, label="the same, bricks bonded")]
     figure.legend(handles=keys, loc="outside lower center", ncols=3)
     return figure
 
 
 def holds(table: pd.DataFrame) -> bool:
-    """Return whether all that rests stands, and something that stands becomes unstable."""
     stands = table["certificate"] == Verdict.STANDS.value
     rests, goes = (table["discrete"] == ending for ending in (RESTS, GOES))
     return bool(stands[rests].all() and rests.any() and (stands & goes).any())
 
 
 def experiment(options: Options) -> Finding:
-    quick: bool = options.quick
-    net = build_network(load_scene("arch25"))
-    methods = ("sequential",) if quick else ("sequential", "cantilever")
-    table = pd.DataFrame(
-        [
-            row
-            for method in methods
-            for row in rows(net, method, METHODS[method](net)[: 10 if quick else None])
-        ]
-    )
+    net, found = arch25().network, []
+    for method in ("sequential",) if options.quick else ("sequential", "cantilever"):
+        found += rows(net, method, METHODS[method](net)[: 10 if options.quick else None])
+    table = pd.DataFrame(found)
     print(pd.crosstab([table["method"], table["certificate"]], table["discrete"]).to_string())
     stands = table["certificate"] == Verdict.STANDS.value
     rests = table["discrete"] == RESTS
     ratio = (table["D_max_1e-3mm"] / table["D_max_rigid_1e-3mm"])[rests]
-    print(
-        f"at rest the largest displacement is {ratio.median():.3g} times that of bonded bricks in "
-        f"the median ({ratio.min():.3g} to {ratio.max():.3g})"
-    )
-    wrong = table[rests & ~stands]
-    print(f"steps that rest and are not proven to stand: {len(wrong)}")
+    spread = f"in the median ({ratio.min():.3g} to {ratio.max():.3g})"
+    print(f"at rest D_max is {ratio.median():.3g} times that of bonded bricks {spread}")
+    print(f"steps that rest and are not proven to stand: {len(table[rests & ~stands])}")
     return Finding(holds(table), tables={"contact_steps": table})
 
 

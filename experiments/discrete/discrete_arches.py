@@ -18,8 +18,7 @@ is an outside witness for pads of 20 mm (`experiments.discrete.parts.arches_lmgc
 not installed, its stored rows are shown.
 
 Inputs: the shipped scene; LMGC90 (compas_lmgc90) in this or another Python. Command: ``python -m
-experiments.discrete.discrete_arches [--quick] [--lmgc90 PYTHON]``. Writes ``discrete_arches.csv``
-and ``arches_lmgc90.csv`` to ``experiments/results`` and ``docs/figures/discrete_arches.png``.
+experiments.discrete.discrete_arches [--quick] [--lmgc90 PYTHON]``.
 """
 
 from __future__ import annotations
@@ -37,16 +36,13 @@ from experiments.discrete.parts.discrete_chart import chart
 from experiments.harness.claim import Claim, Finding, Option, Options
 from experiments.harness.lmgc90 import python_with_lmgc90
 from experiments.harness.results import RESULTS, stored
+from experiments.harness.scenes import arch25
+from seqopt import EPOXY, Step, sequential
 from seqopt.arrays import Floats
 from seqopt.contact._elastic_limits import find_elastic_limits
-from seqopt.contact.mortar import EPOXY
 from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.network.build import build_network
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.steps import Step
-from seqopt.sequence.two_robots import sequential
 from seqopt.study.published import STUDY_PADS, printed
 
 SIDES = 1e-3 * np.arange(4.0, 51.0)  # m, of the scan
@@ -59,17 +55,11 @@ def row_of(engine: ComplianceEngine, step: Step, reading: Reading) -> dict[str, 
     discrete = reading.engine(engine.network)
     own, ours = moved(engine, step), moved(discrete, step)
     tension, shear = stresses(discrete, step)
-    return {
-        "grip": reading.grip,
-        "side_mm": 0.0 if reading.pinch is None else round(1e3 * reading.pinch.side, 3),
-        "joint": reading.joint,
-        "bricks": step.bricks,
-        "error_pct": error(own, ours),
-        "D_max_1e-3mm": 1e6 * ours.max(),
-        "double_cross_1e-3mm": 1e6 * own.max(),
-        "tension_MPa": tension / 1e6,
-        "shear_used": shear,
-    }
+    row = {"grip": reading.grip}
+    row |= {"side_mm": 0.0 if reading.pinch is None else round(1e3 * reading.pinch.side, 3)}
+    row |= {"joint": reading.joint, "bricks": step.bricks, "error_pct": error(own, ours)}
+    row |= {"D_max_1e-3mm": 1e6 * ours.max(), "double_cross_1e-3mm": 1e6 * own.max()}
+    return row | {"tension_MPa": tension / 1e6, "shear_used": shear}
 
 
 def stresses(engine: DiscreteEngine, step: Step) -> tuple[float, float]:
@@ -89,10 +79,9 @@ def scan(engine: ComplianceEngine, steps: list[Step], sides: Floats) -> pd.DataF
     for across, joint, side in product(Across, JOINTS, sides):
         reading = Reading(joint, Pinch(across, STUDY_PADS, side=float(side)))
         discrete = reading.engine(engine.network)
-        rows.append(
-            {"grip": reading.grip, "side_mm": round(1e3 * float(side), 3), "joint": joint}
-            | {step.bricks: error(own[step.bricks], moved(discrete, step)) for step in steps}
-        )
+        row = {"grip": reading.grip, "side_mm": round(1e3 * float(side), 3), "joint": joint}
+        gaps = {step.bricks: error(own[step.bricks], moved(discrete, step)) for step in steps}
+        rows.append(row | gaps)
     return pd.DataFrame(rows).set_index(KEYS)
 
 
@@ -126,26 +115,16 @@ def arches(engine: ComplianceEngine, *, quick: bool) -> list[Step]:
     return steps[::2] if quick else steps
 
 
-def asked_lmgc90(engine: ComplianceEngine, steps: list[Step], python: str) -> pd.DataFrame | None:
-    """Return the witness's rows on all arches, stored as well, or None without LMGC90."""
-    tables = [witness(engine, step, python) for step in steps]
-    rows = [table for table in tables if table is not None]
-    if not rows:
-        return None
-    table = pd.concat(rows, ignore_index=True)
-    RESULTS.mkdir(exist_ok=True)
-    table.to_csv(RESULTS / "arches_lmgc90.csv", index=False, float_format="%.6g")
-    return table
-
-
 def witness_rows(
     engine: ComplianceEngine, steps: list[Step], python: str | None
 ) -> tuple[pd.DataFrame, str]:
     """Return what LMGC90 says, now or when it was last asked, and which of the two it is."""
     path = RESULTS / "arches_lmgc90.csv"
-    if python is None or asked_lmgc90(engine, steps, python) is None:
-        source = "stored rows: LMGC90 was not asked or is not installed"
-    else:
+    tables = [witness(engine, step, python) for step in steps] if python else []
+    source = "stored rows: LMGC90 was not asked or is not installed"
+    if rows := [table for table in tables if table is not None]:
+        RESULTS.mkdir(exist_ok=True)
+        pd.concat(rows, ignore_index=True).to_csv(path, index=False, float_format="%.6g")
         source = "asked now"
     if path.exists():
         return pd.read_csv(path), source
@@ -163,7 +142,6 @@ def missing(table: pd.DataFrame, steps: list[Step]) -> list[str]:
 
 
 def report(errors: pd.DataFrame, study: pd.Series[float]) -> None:
-    """Print the table of errors with the worst distance, and the printed ones."""
     shown = errors.assign(farthest=farthest(errors, study))
     print("mean error of the double-cross model [%], and points off at worst:")
     print(shown.to_string(float_format="%+.1f"))
@@ -200,7 +178,7 @@ def holds(table: pd.DataFrame, study: pd.Series[float]) -> bool:
 
 
 def experiment(options: Options) -> Finding:
-    engine = ComplianceEngine(build_network(load_scene("arch25")))
+    engine = arch25()
     steps = arches(engine, quick=options.quick)
     study = printed("de_validation").set_index("bricks")["error_percent"]
     study = study.loc[[step.bricks for step in steps]]
@@ -208,11 +186,9 @@ def experiment(options: Options) -> Finding:
     best = best_sides(scanned, study)
     every = {"stated": readings(), "best of 4 to 50 mm": [Reading.of(*key) for key in best.index]}
     table = pd.DataFrame(
-        [
-            {"pads": pads, **row_of(engine, step, reading)}
-            for pads, some in every.items()
-            for reading, step in product(some, steps)
-        ]
+        {"pads": pads, **row_of(engine, step, reading)}
+        for pads, some in every.items()
+        for reading, step in product(some, steps)
     )
     stated = table[table["pads"] == "stated"]
     errors = stated.pivot_table(index=KEYS, columns="bricks", values="error_pct", sort=False)
@@ -227,14 +203,11 @@ def experiment(options: Options) -> Finding:
 
 
 def picture() -> Figure:
-    """Return the figure from stored rows."""
     study = printed("de_validation").set_index("bricks")["error_percent"]
-    table = stored("discrete_arches")
-    tables = [
+    errors, best = (
         rows.pivot_table(index=KEYS, columns="bricks", values="error_pct", sort=False)
-        for _, rows in table.groupby("pads", sort=False)
-    ]
-    errors, best = tables[0], tables[1]
+        for _, rows in stored("discrete_arches").groupby("pads", sort=False)
+    )
     nearest = farthest(best, study).sort_values().index
     return chart(errors, best.loc[nearest], study, stored("arches_lmgc90"), NEAR)
 

@@ -4,11 +4,10 @@ That is the frame that checks it. The lowest ratio of a round is stored beside t
 be 100 at least: a round in which the machine was busy elsewhere was seen at 541.
 
 Method, ``speed``: on `arch25` with 17 bricks, random sets of three grips, every edge force and
-every node displacement evaluated; fast and reference engine take turns in one process on one core;
-the best round and the median of the rounds' ratios are printed. Then what a call costs for one set,
-and what a further set in a batch of hundreds; the time to prepare the operators of all 25 brick
-counts; and the growth with brick count of a chain: operator, one set of grips solved once, and on
-average, as some sets are solved again.
+every node displacement; both engines take turns in one process on one core. Then what a call costs
+for one set and for a further one in a batch of hundreds; the time to prepare the operators of all
+25 brick counts; and the growth with brick count of a chain: operator, one set of grips solved once,
+and on average, as some sets are solved again.
 
 Claim: memory grows at most as the square of the brick count, and answers stay exact to 1e-9.
 
@@ -19,29 +18,22 @@ Edge forces of the steps of every plan err by at most 1e-9 of the largest of eac
 1e-6 where candidates are only compared.
 
 Method, ``growth``: `analyze` of all steps of the sequential method, and the three-robot loop
-without proof (criterion `equations-2-3`, cascade; also with two processes), with proof (the same
-criterion, overlap_dp) and with a lazy proof (`worst-ratio`, minimax), on chains of 25 to 1,000
-bricks in the shape of `arch25` and on `vault338`. Every run has a process of its own; seconds of
-the core are counted, since other processes may want it too, by the clock where two processes work,
-and the largest memory of the process that asked. Errors are those against the refined mixed system
-at up to forty steps of the plan, and at random sets of three grips as they are screened. Exponents
-are fitted over 100 bricks and more; of memory what the smallest run takes is taken off, libraries
-above all. An older version, checked out in a folder, is run in turns with this one; its runs end
-after two minutes, or with 6 GB.
+without proof (criterion `equations-2-3`, cascade; also with two processes), with proof (overlap_dp)
+and with a lazy proof (`worst-ratio`, minimax), on chains of 25 to 1,000 bricks in the shape of
+`arch25` and on `vault338`. Every run has a process of its own; seconds of the core are counted, by
+the clock where two processes work. Errors are those against the refined mixed system at up to forty
+steps of the plan, and at random sets of three grips as they are screened. Exponents are fitted over
+100 bricks and more; of memory what the smallest run takes is taken off, libraries above all. An
+older version, checked out in a folder, is run in turns; its runs end after two minutes, or with
+6 GB.
 
 Inputs: the shipped scenes; seed 0. Command: ``python -m experiments.engines.engine_speed [--quick]
-[--only PART] [--older FOLDER]``. Writes ``engine_speed.csv``, ``engine_growth.csv`` and
-``engine_growth_runs.csv`` to ``experiments/results`` and ``engine_growth.png`` and ``growth.png``
-to ``docs/figures``.
+[--only PART] [--older FOLDER]``.
 """
 
-from __future__ import annotations
-
-import json
 import os
 import resource
 import subprocess
-import sys
 from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
@@ -51,29 +43,18 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from experiments.engines.parts import growth_runs
-from experiments.harness.claim import (
-    ONLY,
-    Claim,
-    Finding,
-    Option,
-    Options,
-    Times,
-    on_this_run,
-    together,
-)
-from experiments.harness.results import HOME, drawn
-from experiments.harness.scenes import grip_sets
+from experiments.harness.charts import note, subplots
+from experiments.harness.claim import Claim, Finding, Option, Options, Times, on_this_run
+from experiments.harness.results import HOME, ONE_CORE, apart, drawn, exponents_by
+from experiments.harness.scenes import arch25, grip_sets
 from experiments.harness.timing import best
+from seqopt import ArchShape, Network, arch_scene, build_network, load_scene
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.rigid._growth import SpanningTree, grow_tree
+from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid.compliance import ComplianceEngine, _solve_batch
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
-from seqopt.report._style import GRAY, SMALL, dress, looks, new_figure, plain, styled
-from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.scene_file import load_scene
+from seqopt.report._style import GRAY, dress, looks, plain, styled
 
 ASKED = Want.EDGES | Want.DISPLACEMENTS
 MEDIAN, LOWEST = 1000.0, 100.0  # ratios that are claimed
@@ -86,31 +67,22 @@ def chain(count: int) -> Network:
 
 def engines_side_by_side(sets: int, models: int, rounds: int) -> dict[str, float]:
     """Return seconds per grip set of both engines and their ratio, in turns."""
-    net = build_network(load_scene("arch25"))
-    fast, frame = ComplianceEngine(net), FrameEngine(net)
+    fast = arch25()
+    frame, net, ours, theirs = FrameEngine(fast.network), fast.network, [], []
     many, few = grip_sets(net, 17, sets), grip_sets(net, 17, models)
     fast.solve(17, few)
-    pairs = [
-        (
-            best(lambda: fast.solve(17, many, ASKED), 1) / sets,
-            best(lambda: frame.solve(17, few), 1) / models,
-        )
-        for _ in range(rounds)
-    ]
-    ratios = [b / a for a, b in pairs]
-    return {
-        "fast_s_per_set": min(a for a, _ in pairs),
-        "frame_s_per_set": min(b for _, b in pairs),
-        "ratio_median": float(np.median(ratios)),
-        "ratio_lowest": min(ratios),
-    }
+    for _ in range(rounds):
+        ours.append(best(lambda: fast.solve(17, many, ASKED), 1) / sets)
+        theirs.append(best(lambda: frame.solve(17, few), 1) / models)
+    ratios = np.divide(theirs, ours)
+    row = {"fast_s_per_set": min(ours), "frame_s_per_set": min(theirs)}
+    return row | {"ratio_median": float(np.median(ratios)), "ratio_lowest": float(ratios.min())}
 
 
 def calls(few: int, many: int) -> dict[str, float]:
     """Return the time of a call with one set, and of a further set in a large batch, s."""
-    net = build_network(load_scene("arch25"))
-    engine = ComplianceEngine(net)
-    sets = grip_sets(net, 17, many)
+    engine = arch25()
+    sets = grip_sets(engine.network, 17, many)
     one, some, all_of = (
         best(partial(engine.solve, 17, sets[:size], ASKED), 100) for size in (1, few, many)
     )
@@ -129,46 +101,30 @@ def preparation(rounds: int) -> float:
     return best(prepare, rounds)
 
 
-def build_operator(net: Network, tree: SpanningTree, bricks: int) -> None:
-    OperatorBuilder(net, tree).operator(bricks)
-
-
 def growth(counts: list[int], rounds: int) -> pd.DataFrame:
     """Return times of operator and batch of a chain by brick count, and what is solved again."""
     rows = []
     for count in counts:
         net = chain(count)
         tree = grow_tree(net)
-        repeat = rounds if count <= 200 else 1
+        repeat, size = (rounds, 2000) if count <= 200 else (1, 200)
         build = best(
             lambda net=net, tree=tree, n=count: OperatorBuilder(net, tree).operator(n), repeat
         )
-        engine = ComplianceEngine(net)
-        sets = grip_sets(net, count, 2000 if count <= 200 else 200)
+        engine, sets = ComplianceEngine(net), grip_sets(net, count, size)
         engine.solve(count, sets[:2], ASKED)
-        batch = best(partial(engine.solve, count, sets, ASKED), repeat) / len(sets)
-        operator, columns = (
-            OperatorBuilder(net, tree).operator(count),
-            grip_columns(net, count, sets),
-        )
-        once = best(partial(_solve_batch, operator, columns, ASKED), 3) / len(sets)
-        _, trusted = _solve_batch(operator, columns, ASKED)
-        rows.append(
-            {
-                "bricks": count,
-                "operator_s": build,
-                "set_s": batch,
-                "set_once_s": once,
-                "again": 1 - trusted.mean(),
-            }
-        )
+        batch = best(partial(engine.solve, count, sets, ASKED), repeat) / size
+        asked = OperatorBuilder(net, tree).operator(count), grip_columns(net, count, sets), ASKED
+        once = best(partial(_solve_batch, *asked), 3) / size
+        _, trusted = _solve_batch(*asked)
+        row = {"bricks": count, "operator_s": build, "set_s": batch, "set_once_s": once}
+        rows.append(row | {"again": 1 - trusted.mean()})
     return pd.DataFrame(rows)
 
 
 @styled
 def chart(table: pd.DataFrame) -> Figure:
-    figure = new_figure(3.3)
-    axes = figure.subplots()
+    figure, axes = subplots(3.3)
     bricks = table["bricks"].to_numpy(float)
     lines = {
         "operator_s": "preparing one number of bricks",
@@ -181,8 +137,7 @@ def chart(table: pd.DataFrame) -> Figure:
     for power, column, word, shift in guides:
         guide = table[column].iloc[-1] * (bricks / bricks[-1]) ** power
         axes.plot(bricks, guide, color=GRAY, lw=0.8)
-        axes.annotate(word, (bricks[1], guide[1]), (-24, shift), textcoords="offset points",
-                      fontsize=SMALL, color=GRAY)  # fmt: skip
+        note(axes, word, (bricks[1], guide[1]), (-24, shift), color=GRAY)
     axes.set(xscale="log", yscale="log", xlabel="bricks in the chain", ylabel="time [s]")
     plain(axes.xaxis)
     dress(axes)
@@ -192,21 +147,18 @@ def chart(table: pd.DataFrame) -> Figure:
 
 def speed(options: Options) -> Finding:
     quick: bool = options.quick
-    size = (2000, 3, 2) if quick else (50_000, 100, 5)
-    figures = engines_side_by_side(*size)
-    figures |= calls(400, 800)
+    figures = engines_side_by_side(*((2000, 3, 2) if quick else (50_000, 100, 5))) | calls(400, 800)
     figures["prepare_all_counts_s"] = preparation(2 if quick else 10)
     for name, value in figures.items():
         print(f"{name:24}{value:12.3g}")
     print(f"{'fast_sets_per_s':24}{1 / figures['fast_s_per_set']:12.3g}")
     table = growth([2, 10, 25] if quick else [2, 5, 10, 25, 50, 100, 200, 500, 1000], 3)
     print(table.to_string(index=False, float_format="%.3g"))
-    speed = pd.Series(figures, name="value").rename_axis("").reset_index()
-    return on_this_run(holds=holds(figures), engine_growth=table, engine_speed=speed)
+    named = pd.Series(figures, name="value").rename_axis("").reset_index()
+    return on_this_run(holds=holds(figures), engine_growth=table, engine_speed=named)
 
 
 def holds(figures: Mapping[str, float]) -> bool:
-    """Return whether ratios, sets per second and preparation are as claimed."""
     ratios = figures["ratio_median"] >= MEDIAN and figures["ratio_lowest"] >= LOWEST
     often = 1 / figures["fast_s_per_set"] >= 3e5
     return bool(ratios and often and figures["prepare_all_counts_s"] <= 0.05)
@@ -239,29 +191,14 @@ STYLES = {
 
 def run_apart(task: str, name: str, home: Path, patience: float | None = None) -> growth_runs.Row:
     """Return the row of a run by the version in a folder; without numbers if it takes too long."""
-    threads = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MKL")}
-    environment = os.environ | threads | {"PYTHONPATH": str(home)}
-    command = [sys.executable, growth_runs.__file__, task, name]
-    command += ["--no-errors"] if patience else []
+    words = [growth_runs.__file__, task, name, *(["--no-errors"] if patience else [])]
+    environment = os.environ | ONE_CORE | {"PYTHONPATH": str(home)}
+    most = partial(resource.setrlimit, resource.RLIMIT_AS, (ROOM, ROOM)) if patience else None
     try:
-        done = subprocess.run(
-            command,
-            env=environment,
-            timeout=patience,
-            preexec_fn=_limit if patience else None,
-            capture_output=True,
-            check=True,
-            text=True,
-        )
-    except (subprocess.TimeoutExpired, subprocess.CalledProcessError):
+        row: growth_runs.Row = apart(*words, limit=patience, env=environment, preexec_fn=most)
+    except subprocess.SubprocessError:
         return {"task": task, "scene": name}
-    row: growth_runs.Row = json.loads(done.stdout.splitlines()[-1])
     return row
-
-
-def _limit() -> None:
-    """Let a process take little more memory than an older version can use to its end."""
-    resource.setrlimit(resource.RLIMIT_AS, (ROOM, ROOM))
 
 
 def runs(scenes: dict[str, list[str]], older: str) -> Iterator[growth_runs.Row]:
@@ -275,13 +212,9 @@ def runs(scenes: dict[str, list[str]], older: str) -> Iterator[growth_runs.Row]:
 
 def exponents(table: pd.DataFrame, column: str, least: float = 0.0) -> dict[str, float]:
     """Return the slopes over the brick counts of chains, by task; what is least is taken off."""
-    out = {}
     mine = table[(table["version"] == "this") & table["scene"].str.startswith("chain")]
-    for task, rows in mine[mine["bricks"] >= FROM].groupby("task"):
-        if len(rows) > 1:
-            values = np.log(rows[column] - least)
-            out[str(task)] = float(np.polyfit(np.log(rows["bricks"]), values, 1)[0])
-    return out
+    mine = mine[mine["bricks"] >= FROM]
+    return exponents_by("task", mine, mine[column] - least)
 
 
 def taken(rows: pd.DataFrame) -> pd.Series:
@@ -291,9 +224,7 @@ def taken(rows: pd.DataFrame) -> pd.Series:
 
 @styled
 def growth_chart(table: pd.DataFrame) -> Figure:
-    """Draw time and memory over the size; stars are the vault, hollow marks an older version."""
-    figure = new_figure(4.2)
-    panels = figure.subplots(1, 2)
+    figure, panels = subplots(4.2, 1, 2)
     columns = {"time of a processor [s]": taken(table), "peak memory [MB]": table["memory_MB"]}
     for axes, (label, values) in zip(panels, columns.items(), strict=True):
         for task, style in looks(STYLES).items():
@@ -301,10 +232,9 @@ def growth_chart(table: pd.DataFrame) -> Figure:
                 mine = (table["task"] == task) & (table["version"] == version)
                 own = mine & table["scene"].str.startswith("chain") & values.notna()
                 if own.any():
-                    line = style.line()
+                    line, name = style.line(), STYLES[task]
                     if version == "older":
-                        line |= {"mfc": "white", "lw": 0.8}
-                    name = STYLES[task] + (", an older version" if version == "older" else "")
+                        line, name = line | {"mfc": "white", "lw": 0.8}, f"{name}, an older version"
                     axes.plot(table["bricks"][own], values[own], label=name, **line)
                 vault = mine & table["scene"].str.startswith("vault")
                 axes.plot(table["bricks"][vault], values[vault], "*", color=style.color, ms=9)
@@ -312,14 +242,12 @@ def growth_chart(table: pd.DataFrame) -> Figure:
         plain(axes.xaxis, axes.yaxis)
         dress(axes)
     panels[0].plot([], [], "*", color=GRAY, ms=9, label="the vault of 338 bricks, by color")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, ncols=2, loc="outside lower center")
+    figure.legend(*panels[0].get_legend_handles_labels(), ncols=2, loc="outside lower center")
     return figure
 
 
 def grown(options: Options) -> Finding:
-    quick: bool = options.quick
-    table = pd.DataFrame(runs(QUICK if quick else SCENES, options.older))
+    table = pd.DataFrame(runs(QUICK if options.quick else SCENES, options.older))
     print(table.to_string(index=False, float_format="%.3g"))
     print("exponents of time", exponents(table, "seconds"))
     print("of memory", exponents(table, "memory_MB", table["memory_MB"].min()))
@@ -327,7 +255,6 @@ def grown(options: Options) -> Finding:
 
 
 def growth_holds(table: pd.DataFrame) -> bool:
-    """Return whether every run of this version ended and grows no faster than is claimed."""
     mine = table[table["version"] == "this"]
     memory = exponents(table, "memory_MB", float(mine["memory_MB"].min()))
     time = exponents(table, "seconds")
@@ -337,16 +264,12 @@ def growth_holds(table: pd.DataFrame) -> bool:
     return bool(mine["seconds"].notna().all() and small and fast and exact)
 
 
-def experiment(options: Options) -> Finding:
-    return together(options, speed=speed, growth=grown)
-
-
 CLAIM = Claim(
-    experiment,
+    {"speed": speed, "growth": grown},
     digits=4,
     quick="small sizes, nothing written",
     times=Times.JUDGED,
-    options=(ONLY, Option("--older", "the folder of an older version to run in turns", "")),
+    options=(Option("--older", "the folder of an older version to run in turns", ""),),
     pictures={
         "engine_growth.png": drawn(chart, "engine_growth"),
         "growth.png": drawn(growth_chart, "engine_growth_runs"),

@@ -15,11 +15,8 @@ difference of the inner nodes' displacements over the largest displacement, in t
 are medians of rounds in one process on one core, ratios those within rounds.
 
 Inputs: the shipped scene; seed 0. Command: ``OPENBLAS_NUM_THREADS=1 python -m
-experiments.engines.fidelity_ladder [--quick]``. Writes ``experiments/results/fidelity_ladder.csv``
-and ``docs/figures/fidelity_ladder.png``.
+experiments.engines.fidelity_ladder [--quick]``.
 """
-
-from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
@@ -30,37 +27,22 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
+from experiments.harness.charts import note, subplots
 from experiments.harness.claim import Claim, Finding, Options, Times
 from experiments.harness.results import drawn, two
-from experiments.harness.scenes import grip_sets
+from experiments.harness.scenes import arch25, grip_sets
 from experiments.harness.timing import best
+from seqopt import DRY, ArchShape, Scene, arch_scene, build_network, sequential
 from seqopt.arrays import Floats, Ints, Vector
-from seqopt.contact.mortar import DRY
 from seqopt.engines._auto import AutoEngine
 from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.network.build import build_network
-from seqopt.report._style import (
-    BLUE,
-    GRAY,
-    GREEN,
-    SMALL,
-    VERMILION,
-    dress,
-    new_figure,
-    plain,
-    styled,
-)
-from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.report._style import BLUE, GRAY, GREEN, VERMILION, dress, plain, styled
 from seqopt.scene.parts import Brick, Ground, Joint
-from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.two_robots import sequential
 
 S = TypeVar("S", Joint, Ground)
 SPAN = 6.0  # m along the line of a flat arch
@@ -78,13 +60,10 @@ def flattened(scene: Scene) -> Scene:
 
     Nodes keep their numbers and all lie in the plane.
     """
-    return replace(
-        scene,
-        name=f"{scene.name} flattened",
-        bricks=tuple(_brick(brick) for brick in scene.bricks),
-        joints=tuple(_spring(joint) for joint in scene.joints),
-        grounds=tuple(replace(_spring(end), anchor=_pressed(end.anchor)) for end in scene.grounds),
-    )
+    ends = tuple(replace(_spring(end), anchor=_pressed(end.anchor)) for end in scene.grounds)
+    bricks, joints = tuple(map(_brick, scene.bricks)), tuple(map(_spring, scene.joints))
+    name = f"{scene.name} flattened"
+    return replace(scene, name=name, bricks=bricks, joints=joints, grounds=ends)
 
 
 def _pressed(point: Sequence[float]) -> Vector:
@@ -97,15 +76,12 @@ def _unit(axis: Sequence[float]) -> Vector:
 
 
 def _brick(brick: Brick) -> Brick:
-    length, width, height = brick.dimensions
-    across = abs(brick.length_axis[1]) > abs(brick.width_axis[1])
-    return replace(
-        brick,
-        position=_pressed(brick.position),
-        length_axis=_unit(brick.width_axis if across else brick.length_axis),
-        width_axis=(0.0, 1.0, 0.0),
-        dimensions=(width, length, height) if across else brick.dimensions,
-    )
+    (length, width, height), axis = brick.dimensions, brick.length_axis
+    if abs(axis[1]) > abs(brick.width_axis[1]):  # it lies across
+        length, width, axis = width, length, brick.width_axis
+    axes = {"length_axis": _unit(axis), "width_axis": (0.0, 1.0, 0.0)}
+    place = _pressed(brick.position)
+    return replace(brick, position=place, dimensions=(length, width, height), **axes)
 
 
 def _spring(spring: S) -> S:
@@ -122,11 +98,8 @@ RESTING = (3, 7, 13, 24, 40)  # steps of the sequential method that rest unbonde
 LOOKS = {"planar": (GREEN, "s"), "rigid": (BLUE, "o"), "auto": (VERMILION, "D")}
 
 
-class Question(NamedTuple):
-    """Grip sets (S, r) of one partial structure."""
-
-    bricks: int
-    grips: Ints
+Question = tuple[int, Ints]
+"""Brick count and grip sets (S, r) of one partial structure."""
 
 
 class Pair(NamedTuple):
@@ -143,23 +116,19 @@ class Pair(NamedTuple):
 
 def steps_of(scene: Scene, numbers: tuple[int, ...] | None = None) -> list[Question]:
     """Return the steps of the sequential method, or some of them."""
-    return [
-        Question(step.bricks, np.array([step.held], dtype=np.int64).reshape(1, -1))
-        for step in sequential(build_network(scene))
-        if numbers is None or step.number in numbers
-    ]
+    steps = sequential(build_network(scene))
+    chosen = [step for step in steps if numbers is None or step.number in numbers]
+    return [(s.bricks, np.array([s.held], dtype=np.int64).reshape(1, -1)) for s in chosen]
 
 
 def pairs(*, quick: bool) -> Iterator[Pair]:
-    """Yield what is compared."""
     for count in SIZES[: 1 if quick else None]:
         net = build_network(flat_arch(count))
-        asked = [Question(count, grip_sets(net, count, SETS))]
-        case = f"flat arch, {count} bricks"
+        asked, case = [(count, grip_sets(net, count, SETS))], f"flat arch, {count} bricks"
         yield Pair("planar", "rigid", case, MET, PlanarEngine(net), ComplianceEngine(net), asked)
-    scene = load_scene("arch25")
-    net, all_steps = build_network(scene), steps_of(scene)[: 12 if quick else None]
-    rigid = ComplianceEngine(net)
+    rigid = arch25()
+    net, scene = rigid.network, rigid.network.scene
+    all_steps = steps_of(scene)[: 12 if quick else None]
     flat = PlanarEngine(build_network(flattened(scene)))
     yield Pair("planar", "rigid", "arch25 pressed flat", NOT_MET, flat, rigid, all_steps)
     yield Pair("rigid", "frame", "arch25", MET, rigid, FrameEngine(net), all_steps)
@@ -173,47 +142,38 @@ def pairs(*, quick: bool) -> Iterator[Pair]:
 
 def answer(engine: Engine, questions: list[Question]) -> list[Floats]:
     """Return the displacements (S, N, 3) of the inner nodes, per question."""
-    return [
-        engine.solve(q.bricks, q.grips, Want.DISPLACEMENTS).displacement[
-            :, engine.network.inner[: q.bricks].ravel()
-        ]
-        for q in questions
-    ]
+    out = []
+    for bricks, grips in questions:
+        moved = engine.solve(bricks, grips, Want.DISPLACEMENTS).displacement
+        out.append(moved[:, engine.network.inner[:bricks].ravel()])
+    return out
+
+
+def _largest(values: Floats) -> Floats:
+    return np.abs(values).max(axis=(1, 2))
 
 
 def compare(pair: Pair, rounds: int) -> dict[str, object]:
-    """Return the error of a level and the times of both, a row."""
-    found, true = (answer(engine, pair.questions) for engine in (pair.first, pair.second))
+    answers = (answer(engine, pair.questions) for engine in (pair.first, pair.second))
     errors = np.concatenate(
-        [
-            np.abs(a - b).max(axis=(1, 2)) / np.abs(b).max(axis=(1, 2))
-            for a, b in zip(found, true, strict=True)
-        ]
+        [_largest(own - true) / _largest(true) for own, true in zip(*answers, strict=True)]
     )
-    sets = sum(len(q.grips) for q in pair.questions)
+    sets = sum(len(grips) for _, grips in pair.questions)
     times = []
     for _ in range(rounds):
         first = best(lambda: answer(pair.first, pair.questions), 3)
         start = time.perf_counter()
         answer(pair.second, pair.questions)
         times.append((first / sets, (time.perf_counter() - start) / sets))
-    return {
-        "level": pair.level,
-        "against": pair.against,
-        "case": pair.case,
-        "condition": pair.condition,
-        "sets": sets,
-        "error": errors.max(),
-        "error_median": np.median(errors),
-        "set_us": 1e6 * median(a for a, _ in times),
-        "against_us": 1e6 * median(b for _, b in times),
-        "ratio": median(b / a for a, b in times),
-        "ratio_lowest": min(b / a for a, b in times),
-    }
+    row = {"level": pair.level, "against": pair.against, "case": pair.case}
+    row |= {"condition": pair.condition, "sets": sets, "error": errors.max()}
+    row |= {"error_median": np.median(errors), "set_us": 1e6 * median(a for a, _ in times)}
+    row |= {"against_us": 1e6 * median(b for _, b in times)}
+    row |= {"ratio": median(b / a for a, b in times)}
+    return row | {"ratio_lowest": min(b / a for a, b in times)}
 
 
 def judge(table: pd.DataFrame) -> bool:
-    """Return whether levels are right where they may be used and wrong where not."""
     met = table[table["condition"] == MET]
     limit = np.where(met["against"] == "frame", FRAME, EXACT)
     other = table[table["condition"] == NOT_MET]
@@ -221,32 +181,23 @@ def judge(table: pd.DataFrame) -> bool:
 
 
 def cheaper(table: pd.DataFrame) -> bool:
-    """Return whether levels that may be used take less time than what they stand for."""
     met = table[table["condition"] == MET]
-    least = np.where(met["level"] == "auto", SAME, 1.0)
-    return bool((met["ratio"] > least).all())
+    return bool((met["ratio"] > np.where(met["level"] == "auto", SAME, 1.0)).all())
 
 
 @styled
 def chart(table: pd.DataFrame) -> Figure:
-    figure = new_figure(4.0)
-    left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1, 1.3))
+    figure, (left, right) = subplots(4.0, 1, 2, sharey=True, width_ratios=(1, 1.3))
     at = -np.arange(len(table))
     for y, (_, row) in zip(at, table.iterrows(), strict=True):
         color, marker = LOOKS[str(row["level"])]
         look = {"color": color, "ms": 7, "mfc": color if row["condition"] == MET else "white"}
         left.plot(max(float(row["error"]), 1e-16), y, marker, **look)
-        right.plot([row["set_us"], row["against_us"]], [y, y], color="#cccccc", lw=1, zorder=1)
-        right.plot(row["against_us"], y, "X", ms=6, color=GRAY)
-        right.plot(row["set_us"], y, marker, **look)
-        right.annotate(
-            f"{two(float(row['ratio']))} times",
-            (max(row["set_us"], row["against_us"]), y),
-            xytext=(7, 0),
-            textcoords="offset points",
-            va="center",
-            fontsize=SMALL,
-        )
+        times = [row["set_us"], row["against_us"]]
+        right.plot(times, [y, y], color="#cccccc", lw=1, zorder=1)
+        right.plot(times[1], y, "X", ms=6, color=GRAY)
+        right.plot(times[0], y, marker, **look)
+        note(right, f"{two(float(row['ratio']))} times", (max(times), y), (7, 0), va="center")
     left.set_yticks(at, table["level"] + " for " + table["against"] + ": " + table["case"])
     left.set(xscale="log", xlabel="error against the other model", xlim=(1e-17, 30))
     left.set_xticks([1e-16, 1e-12, 1e-8, 1e-4, 1], ["none", "1e-12", "1e-8", "1e-4", "1"])
@@ -256,27 +207,22 @@ def chart(table: pd.DataFrame) -> Figure:
         dress(axes)
         axes.minorticks_off()
         axes.grid(visible=False, axis="y")
-    keys = [
-        Line2D([], [], marker=marker, color=color, ls="none", ms=7, label=f"{name} bricks")
-        for name, (color, marker) in LOOKS.items()
-    ]
-    keys[-1].set_label("automatic choice")
-    look = {"color": GRAY, "ls": "none"}
-    keys += [
-        Line2D([], [], marker="o", ms=7, mfc="white", label="its condition is not met", **look),
-        Line2D([], [], marker="X", ms=6, label="the model that it stands for", **look),
-    ]
-    figure.legend(handles=keys, loc="outside lower center", ncols=5, columnspacing=1.2)
+    names = {f"{name} bricks": look for name, look in LOOKS.items() if name != "auto"}
+    names |= {"automatic choice": LOOKS["auto"], "its condition is not met": (GRAY, "o")}
+    names |= {"the model that it stands for": (GRAY, "X")}
+    for text, (color, marker) in names.items():
+        face = "white" if "not met" in text else color
+        left.plot([], [], marker, color=color, mfc=face, ms=6 if marker == "X" else 7, label=text)
+    keys = left.get_legend_handles_labels()
+    figure.legend(*keys, loc="outside lower center", ncols=5, columnspacing=1.2)
     return figure
 
 
 def experiment(options: Options) -> Finding:
     quick: bool = options.quick
-    rows = [compare(pair, 1 if quick else 3) for pair in pairs(quick=quick)]
-    table = pd.DataFrame(rows)
+    table = pd.DataFrame(compare(pair, 1 if quick else 3) for pair in pairs(quick=quick))
     print(table.to_string(index=False, float_format="%.3g"))
-    good = judge(table) and (quick or cheaper(table))
-    return Finding(good, tables={"fidelity_ladder": table})
+    return Finding(judge(table) and (quick or cheaper(table)), tables={"fidelity_ladder": table})
 
 
 CLAIM = Claim(

@@ -9,27 +9,23 @@ smaller, if it is not ten times as large at either end of the sweep (a refusal c
 if the two solutions of rigid bricks differ by more than 1e-9.
 
 Inputs: the shipped scene. Command: ``python -m experiments.engines.frame_contrast [--quick]``.
-Writes ``experiments/results/frame_contrast.csv`` and ``docs/figures/frame_contrast.png``.
 """
-
-from __future__ import annotations
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from experiments.harness.charts import note, subplots
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
+from experiments.harness.scenes import arch25
+from seqopt import Step
 from seqopt.engines.frame import CONTRAST, FrameEngine
 from seqopt.engines.interface import Engine, Fields, grip_columns
 from seqopt.engines.rigid._mixed import solve_dense
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SolverError
-from seqopt.network.build import build_network
-from seqopt.report._style import GRAY, SMALL, dress, looks, new_figure, styled
+from seqopt.report._style import GRAY, dress, looks, styled
 from seqopt.responses.table import step_fields
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import published_plan
 
@@ -71,29 +67,23 @@ def sweep(steps: list[Step], fast: Engine, contrasts: list[float]) -> pd.DataFra
     return pd.DataFrame(rows)
 
 
-def direct_gap(steps: list[Step], fast: Engine) -> float:
-    """Return the worst difference of the direct rigid solve over all steps and fields."""
-    worst = 0.0
-    for step in steps:
-        grips = np.array([step.held], dtype=np.int64).reshape(1, -1)
-        columns = grip_columns(fast.network, step.bricks, grips)
-        direct = solve_dense(fast.network, step.bricks, columns)
-        worst = max(worst, *difference(direct, step_fields(fast, step)).values())
-    return worst
+def direct_gap(step: Step, fast: Engine) -> float:
+    """Return the worst difference of the direct rigid solve over all fields of a step."""
+    grips = np.array([step.held], dtype=np.int64).reshape(1, -1)
+    direct = solve_dense(fast.network, step.bricks, grip_columns(fast.network, step.bricks, grips))
+    return max(difference(direct, step_fields(fast, step)).values())
 
 
 @styled
 def chart(table: pd.DataFrame) -> Figure:
-    figure = new_figure(3.2)
-    axes = figure.subplots()
+    figure, axes = subplots(3.2)
     for name, style in looks(FIELDS).items():
         label = LABELS.get(name, name.replace("_", " "))
         axes.plot(table["contrast"], table[name], label=label, **style.line())
     axes.axvline(CONTRAST, color=GRAY, lw=0.8)
     axes.set(xscale="log", yscale="log", ylabel="largest relative difference\nfrom rigid bricks")
     axes.set_xlabel("stiffness of the bars over that of the joints")
-    axes.annotate("the default", (CONTRAST, 0.05), (4, 0), textcoords="offset points",
-                  fontsize=SMALL)  # fmt: skip
+    note(axes, "the default", (CONTRAST, 0.05), (4, 0))
     axes.locator_params(axis="y", numticks=6)
     dress(axes)
     axes.legend()
@@ -101,19 +91,17 @@ def chart(table: pd.DataFrame) -> Figure:
 
 
 def experiment(options: Options) -> Finding:
-    quick: bool = options.quick
-    fast = ComplianceEngine(build_network(load_scene("arch25")))
-    steps = published_steps(fast)[:: 25 if quick else 1]
-    powers = [2, 6, 10] if quick else np.arange(2, 11.5, 0.5).tolist()
+    fast = arch25()
+    steps = published_steps(fast)[:: 25 if options.quick else 1]
+    powers = [2, 6, 10] if options.quick else np.arange(2, 11.5, 0.5).tolist()
     table = sweep(steps, fast, sorted({CONTRAST, *(10.0**p for p in powers)}))
     print(table.to_string(index=False, float_format="%.2g"))
-    gap = direct_gap(steps, fast)
+    gap = max(direct_gap(step, fast) for step in steps)
     print(f"direct solve of the same rigid bricks: {gap:.2g}")
     return Finding(holds(table, gap), tables={"frame_contrast": table})
 
 
 def holds(table: pd.DataFrame, gap: float) -> bool:
-    """Return whether the default contrast is the good one, and rigid bricks agree to 1e-9."""
     worst = table.set_index("contrast")[list(FIELDS)].max(axis=1)
     ends = table.sort_values("contrast").iloc[[0, -1]].set_index("contrast")
     best = float(worst[CONTRAST])

@@ -7,16 +7,12 @@ Method: the states of the three-robot loop's steps with one open grip, those tha
 proof needs, of the vault of 338 bricks (``--scene`` takes another: ``chain100``, ``wall``, or a
 name of `seqopt.load_scene`; ``--pairs`` takes all steps). One process and two take turns, then
 comes Dask's local cluster of two, in one run and each from a new engine; starting the processes
-counts, the cluster is started before. Per way the medians of: seconds by the clock, time that all
-processes computed (CPU), how many times as fast as one process that is by the clock, and by that
-time with a core each; and what sending a call that does nothing takes. Load is what waited for the
-cores of the machine when the run began.
+counts, the cluster is started before. Load is what waited for the cores of the machine when the run
+began.
 
 Inputs: none. Command: ``python -m experiments.engines.parallel [--quick] [--scene NAME]
-[--pairs]``. Writes ``experiments/results/parallel.csv``; rows of other scenes stay.
+[--pairs]``; stored rows of other scenes stay.
 """
-
-from __future__ import annotations
 
 import os
 import resource
@@ -32,15 +28,10 @@ import pandas as pd
 from experiments.harness.claim import Claim, Finding, Option, Options, Times, on_this_run
 from experiments.harness.results import RESULTS
 from experiments.harness.scenes import half_circle, running_bond
-from seqopt.engines.registry import make_engine
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
+from seqopt import Network, Schedule, build_network, load_scene, make_engine, three_robot_loop
 from seqopt.responses._blocks import StepChoices
 from seqopt.responses._choices import Evaluation
 from seqopt.responses.resources import Resources
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.work._workers import hire, map_ordered
 
 TWO = 1.6  # times as fast as one process that two have to be
@@ -66,13 +57,6 @@ def network_of(name: str) -> Network:
     return build_network(running_bond(12, 8) if name == "wall" else load_scene(name))
 
 
-def schedule_of(network: Network, *, single: bool) -> Schedule:
-    """Return the three-robot loop, or its steps in which one grip is open."""
-    schedule = three_robot_loop(network)
-    most = 1 if single else 2
-    return replace(schedule, steps=tuple(s for s in schedule.steps if len(s.moves) <= most))
-
-
 def cpu() -> float:
     """Return the time that this process and its ended children computed, s."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
@@ -80,10 +64,8 @@ def cpu() -> float:
 
 
 def run(network: Network, schedule: Schedule, resources: Resources) -> Run:
-    """Return the answers of a new engine and what they took."""
     start, before = time.perf_counter(), cpu()
-    engine = make_engine("compliance", network)
-    found = Evaluation(engine, schedule, lambda _: WANTED, resources)
+    found = Evaluation(make_engine("compliance", network), schedule, lambda _: WANTED, resources)
     return Run(found.steps, found.models, time.perf_counter() - start, cpu() - before)
 
 
@@ -123,7 +105,9 @@ def overhead(resources: Resources, calls: int = 64) -> float:
 def measured(name: str, rounds: int, *, single: bool) -> pd.DataFrame:
     """Return a row per way, the ways having taken turns."""
     network, load = network_of(name), os.getloadavg()[0]
-    schedule = schedule_of(network, single=single)
+    schedule, most = three_robot_loop(network), 1 if single else 2  # grips that are open
+    steps = tuple(step for step in schedule.steps if len(step.moves) <= most)
+    schedule = replace(schedule, steps=steps)
     runs: dict[str, list[Run]] = {}
     sent: dict[str, float] = {}
 
@@ -139,40 +123,23 @@ def measured(name: str, rounds: int, *, single: bool) -> pd.DataFrame:
     alone = runs["one process"]
     rows = []
     for way, mine in runs.items():
-        pairs = list(zip(alone, mine, strict=True))
-        rows.append(
-            {
-                "scene": name,
-                "states": "single moves" if single else "all",
-                "way": way,
-                "models": mine[0].models,
-                "seconds": np.median([each.seconds for each in mine]),
-                "cpu_s": np.median([each.cpu for each in mine]) if "dask" not in way else np.nan,
-                "times_as_fast_by_clock": np.median(
-                    [one.seconds / own.seconds for one, own in pairs]
-                ),
-                "times_as_fast_by_cpu": np.median([core_each(way, *pair) for pair in pairs]),
-                "call_s": sent[way],
-                "same": all(own.steps == alone[0].steps for own in mine),
-                "load": load,
-                "cores": os.cpu_count(),
-            }
+        took, base = (
+            np.array([[each.seconds, each.cpu] for each in some]) for some in (mine, alone)
         )
+        if "dask" in way:
+            took[:, 1] = np.nan  # its processes go on: what they computed is not known
+        clock, computed = np.median(base / took, axis=0)
+        row = {"scene": name, "states": "single moves" if single else "all", "way": way}
+        row |= {"models": mine[0].models}
+        row |= dict(zip(("seconds", "cpu_s"), np.median(took, axis=0), strict=True))
+        row |= {"times_as_fast_by_clock": clock}
+        row |= {"times_as_fast_by_cpu": (1 if way == "one process" else 2) * computed}
+        row |= {"call_s": sent[way], "same": all(own.steps == alone[0].steps for own in mine)}
+        rows.append(row | {"load": load, "cores": os.cpu_count()})
     return pd.DataFrame(rows)
 
 
-def core_each(way: str, one: Run, own: Run) -> float:
-    """Return how many times as fast as one process a way is by the time computed, a core each.
-
-    Dask's processes go on, so that what they computed is not known.
-    """
-    if "dask" in way:
-        return np.nan
-    return (2 if way == "two processes" else 1) * one.cpu / own.cpu
-
-
 def holds(table: pd.DataFrame) -> bool:
-    """Return whether the claim holds on the rows of every scene."""
     two = table[table["way"] == "two processes"]
     return bool(table["same"].all() and len(two) and (two["times_as_fast_by_cpu"] >= TWO).all())
 

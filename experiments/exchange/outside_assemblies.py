@@ -1,6 +1,6 @@
 """Claim: files of other programs lead to a proven plan, or one line says what they lack.
 
-Method: every file of a list that the project did not make, 21 that ship with compas_cra and 30 of
+Method: every file of a list that the project did not make, 21 that ship with compas_cra and 27 of
 public repositories, is put through the command line: ``seqopt import`` with a unit, a density
 and supports where the file has none; ``seqopt optimize``, the loop of three robots with
 `overlap_dp`, or the free schedule where there are fewer than four blocks; ``seqopt export`` in
@@ -14,12 +14,9 @@ that goes out in every format, or in one line; at least eight have such a plan; 
 is left open; and no step falls of those with faces.
 
 Inputs: the samples in the wheel of compas_cra, and with ``--files DIR`` clones of the repositories
-named in `experiments.exchange.parts.outside_files`; rows of files that are not there stay as they
-are stored. Command: ``python -m experiments.exchange.outside_assemblies [--quick] [--files DIR]``.
-Writes ``experiments/results/outside_assemblies.csv`` and ``docs/figures/outside_assemblies.png``.
+named in `COMMITS`; rows of files that are not there stay as they are stored. Command: ``python -m
+experiments.exchange.outside_assemblies [--quick] [--files DIR]``.
 """
-
-from __future__ import annotations
 
 import contextlib
 import hashlib
@@ -28,34 +25,33 @@ import json
 import tempfile
 import warnings
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Extra, Finding, Option, Options
 from experiments.harness.results import RESULTS
 from formulations.contact.limit_analysis import compile_equilibrium
+from seqopt import EPOXY, Scene, Step, build_network, load_scene
 from seqopt._cli.main import main
 from seqopt.contact.faces import step_assembly
-from seqopt.contact.mortar import EPOXY
 from seqopt.errors import SceneWarning
-from seqopt.network.build import build_network
-from seqopt.report._style import new_figure, styled
+from seqopt.report._style import styled
 from seqopt.report.draw import View, draw_bricks
 from seqopt.scene.imports._content import Given
 from seqopt.scene.imports.formats import import_scene, read_content, sniffed
-from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.exports.formats import EXPORTS, read_folder
-from seqopt.sequence.steps import Step
 from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 
+Read = TypeVar("Read")
 WHEEL = "compas_cra 0.8.0"
 COMMITS = {
     "compas_assembly": "53f8969d",
@@ -87,20 +83,18 @@ def _sample(name: str, supports: str = "", *words: str) -> Outside:
 
 
 SAMPLES = (
-    *(
-        _sample(name, "0,1")
-        for name in ("A", "H", "bridge", "type-a", "type-b", "type-c", "type-d")
-    ),
+    *(_sample(name, "0,1") for name in ("A", "H", "bridge")),
+    *(_sample(f"type-{kind}", "0,1") for kind in "abcd"),
     *(_sample(f"shelf{part}", "0") for part in ("", "-s1", "-s2", "-s3", "-stable")),
-    *(_sample(f"{kind}", "0") for kind in ("concave-short", "concave-long", "curve-3-blocks")),
-    *(_sample(f"cube-curve-{kind}", "0") for kind in ("short", "tall")),
-    _sample("cubes", "0"),
+    *(_sample(kind, "0") for kind in ("concave-short", "concave-long", "curve-3-blocks")),
+    *(_sample(kind, "0") for kind in ("cube-curve-short", "cube-curve-tall", "cubes")),
     _sample("snake", "0", "--gap", "0.01"),
     _sample("armadillo"),  # it marks no supports, and nothing in it stands level
     _sample("armadillo_cra"),  # it marks them
 )
 LARGE = ("--unit", "m")  # with a density of its own
-TIMBER = ("--unit", "mm", "--density", "450")
+TIMBER = ("--density", "450")
+BARREL = "scripts/DEM_Analysis_References/Barrel_Vault"
 ELSEWHERE = (
     *(
         Outside("compas_assembly", f"docs/examples/{name}_assembly.json")
@@ -112,18 +106,11 @@ ELSEWHERE = (
     ),
     Outside("compas_assembly", "data/__temp/amiens_internet.json"),
     Outside("compas_dem", "data/dem_crossvault.json"),
-    Outside("compas_dem", "scripts/DEM_Analysis_References/Barrel_Vault/DEM_model.json", LARGE),
-    Outside("compas_dem", "scripts/DEM_Analysis_References/Barrel_Vault/DEM_problem.json", LARGE),
-    Outside("compas_dem", "data/wall.obj"),
-    Outside("compas_dem", "data/dome.obj"),
-    Outside("compas_dem", "data/ursula.obj"),
+    *(Outside("compas_dem", f"{BARREL}/DEM_{name}.json", LARGE) for name in ("model", "problem")),
+    *(Outside("compas_dem", f"data/{name}.obj") for name in ("wall", "dome", "ursula")),
     Outside("compas_dem", "data/pavillionvault/blocks.json"),
-    Outside("compas_timber", "data/model_test.json", TIMBER),
-    Outside(
-        "compas_timber",
-        "examples/structural/reciprocal_2_dev0.json",
-        ("--unit", "m", "--density", "450"),
-    ),
+    Outside("compas_timber", "data/model_test.json", ("--unit", "mm", *TIMBER)),
+    Outside("compas_timber", "examples/structural/reciprocal_2_dev0.json", (*LARGE, *TIMBER)),
     *(
         Outside("conmech", f"tests/test_data/{name}.json", ())
         for name in ("four-frame", "tower_3D", "topopt-100", "mgz_flat_beam")
@@ -146,11 +133,9 @@ SHOWN = (("bridge", "0,1", 14), ("shelf", "0", 10), ("snake", "0", 3), ("armadil
 
 @styled
 def chart() -> Figure:
-    """Return four assemblies, the last one after three quarters of its blocks."""
     folder = Path(import_module("compas_cra").SAMPLE)
-    figure = new_figure(4.6)
-    panels = figure.subplots(2, 2).ravel()
-    for panel, (name, supports, bricks) in zip(panels, SHOWN, strict=True):
+    figure, panels = subplots(4.6, 2, 2)
+    for panel, (name, supports, bricks) in zip(panels.ravel(), SHOWN, strict=True):
         keys = supports.split(",") if supports else None
         gap = 0.01 if name == "snake" else None
         given = Given(unit="m", density=2400.0, supports=keys, gap=gap)
@@ -177,7 +162,6 @@ def run(*words: str) -> tuple[int, str]:
 
 
 def row_of(outside: Outside, path: Path, folder: Path) -> dict[str, object]:
-    """Return what becomes of a file."""
     digest = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
     row: dict[str, object] = {"source": outside.source, "file": outside.path, "sha256": digest}
     scene_file, plan = folder / "scene.json", folder / "plan"
@@ -185,43 +169,28 @@ def row_of(outside: Outside, path: Path, folder: Path) -> dict[str, object]:
     if status:
         said = said.replace(str(path), path.name)
         return row | {"outcome": LACKS if not scene_file.exists() else "half", "said": said}
-    scene = _loaded(scene_file)
-    row |= {
-        "format": _format(path),
-        "bricks": len(scene.bricks),
-        "faces": sum(spring.face is not None for spring in (*scene.joints, *scene.grounds)),
-        "found": found_again(outside, path, scene, folder),
-    }
+    scene = silently(load_scene, scene_file)
+    kind, springs = path.suffix[1:], (*scene.joints, *scene.grounds)
+    kind = sniffed(json.loads(path.read_text("utf-8")), path.name) if kind == "json" else kind
+    row |= {"format": kind, "bricks": len(scene.bricks)}
+    row |= {"faces": sum(spring.face is not None for spring in springs)}
+    row |= {"found": found_again(outside, path, scene, folder)}
     status, said = run("optimize", str(scene_file), *_how(scene), "--out", str(plan))
     if status:
         return row | {"outcome": "no plan", "said": said}
     summary = json.loads((plan / "summary.json").read_text(encoding="utf-8"))
+    again, steps = silently(read_folder, plan)
+    outs = {form: ("--format", form, "--out", str(folder / form)) for form in EXPORTS}
+    exported = [run("export", str(plan), *words)[0] for words in outs.values()]
+    row |= {"outcome": PLAN if not any(exported) else "not exported", "said": summary["status"]}
+    return row | {"steps": len(steps), **verdicts(again, steps)}
+
+
+def silently(read: Callable[[Path], Read], path: Path) -> Read:
+    """Return what is read; what seems odd in a scene has been said when it was imported."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SceneWarning)
-        again, steps = read_folder(plan)
-    exported = [
-        run("export", str(plan), "--format", form, "--out", str(folder / form))[0]
-        for form in EXPORTS
-    ]
-    return row | {
-        "outcome": PLAN if not any(exported) else "not exported",
-        "said": summary["status"],
-        "steps": len(steps),
-        **verdicts(again, steps),
-    }
-
-
-def _loaded(path: Path) -> Scene:
-    """Return a scene; what seems odd in it has been said when it was imported."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SceneWarning)
-        return load_scene(path)
-
-
-def _format(path: Path) -> str:
-    if path.suffix != ".json":
-        return path.suffix[1:]
-    return sniffed(json.loads(path.read_text(encoding="utf-8")), path.name)
+        return read(path)
 
 
 def _how(scene: Scene) -> tuple[str, ...]:
@@ -242,7 +211,7 @@ def found_again(outside: Outside, path: Path, scene: Scene, folder: Path) -> flo
         return 0.0
     stiff = [
         sum(spring.translational_stiffness[0] for spring in (*held.joints, *held.grounds))
-        for held in (_loaded(other), scene)
+        for held in (silently(load_scene, other), scene)
     ]
     return stiff[0] / stiff[1]
 
@@ -257,12 +226,10 @@ def verdicts(scene: Scene, steps: Sequence[Step]) -> dict[str, int]:
     for place in places.tolist():
         assembly = step_assembly(network, steps[place].bricks, steps[place].grips)
         count[_verdict_of(Prover(assembly, compile_equilibrium)(bonded(assembly, EPOXY)))] += 1
-    kinds = (Verdict.STANDS, Verdict.FALLS, Verdict.UNDECIDED)
-    return dict(zip(("stands", "falls", "open"), (count[kind] for kind in kinds), strict=True))
+    return dict(zip(("stands", "falls", "open"), (count[kind] for kind in Verdict), strict=True))
 
 
 def holds(table: pd.DataFrame, least: int = LEAST) -> bool:
-    """Return whether every file ends in a proven plan or in one line, and enough in a plan."""
     plans = table[table["outcome"] == PLAN]
     lines = table["said"].fillna("").str.strip()
     return bool(
@@ -278,10 +245,8 @@ def holds(table: pd.DataFrame, least: int = LEAST) -> bool:
 def store(table: pd.DataFrame) -> None:
     """Store rows of files that were read beside those of the others, in the order of the list."""
     if STORE.exists():
-        before = pd.read_csv(STORE)
-        new = set(zip(table["source"], table["file"], strict=True))
-        kept = [pair not in new for pair in zip(before["source"], before["file"], strict=True)]
-        table = pd.concat([table, before[kept]], ignore_index=True)
+        both = pd.concat([table, pd.read_csv(STORE)], ignore_index=True)
+        table = both.drop_duplicates(["source", "file"])  # the new row comes first
     listed = [(one.source, one.path) for one in (*SAMPLES, *ELSEWHERE)]
     places = [listed.index(pair) for pair in zip(table["source"], table["file"], strict=True)]
     table = table.iloc[np.argsort(places)]
@@ -289,7 +254,6 @@ def store(table: pd.DataFrame) -> None:
 
 
 def experiment(options: Options) -> Finding:
-    """Put files through the command line; store what becomes of each."""
     listed = [one for one in (*SAMPLES, *ELSEWHERE) if not options.quick or one.path in QUICK]
     rows = []
     for outside in listed:

@@ -88,10 +88,11 @@ class Option:
     default: str | None = None
 
 
+Part = Callable[[argparse.Namespace], Finding]
 ONLY = Option("--only", "one part of the claim alone, by its name in the method", "")
 
 
-def together(options: Options, **parts: Callable[[Options], Finding]) -> Finding:
+def together(options: Options, parts: Mapping[str, Part]) -> Finding:
     """Run the parts of a claim, or the one that is asked for; return what they find together."""
     if options.only and options.only not in parts:
         raise SystemExit(f"--only: there is no part {options.only!r}; give one of {[*parts]}")
@@ -113,7 +114,8 @@ class Extra:
 class Claim:
     """What an experiment declares.
 
-    ``experiment`` runs it: a finding, or None where an option asks for something else. Unless
+    ``experiment`` runs it, or each of its parts by name, of which ``--only`` runs one alone: a
+    finding, or None where an option asks for something else. Unless
     ``quick``, which is what ``--quick`` leaves out, the tables of the finding are stored, floats
     with so many ``digits``. ``pictures`` are what draws the figures of the documentation from
     stored results alone, by file name: they are drawn anew after a run, and ``--redraw`` draws them
@@ -121,7 +123,7 @@ class Claim:
     are a result runs alone.
     """
 
-    experiment: Callable[[Options], Finding | None]
+    experiment: Callable[[Options], Finding | None] | Mapping[str, Part]
     quick: str
     times: Times = Times.NONE
     options: tuple[Option, ...] = ()
@@ -132,7 +134,12 @@ class Claim:
     @property
     def module(self) -> str:
         """The module that makes the claim, dotted."""
-        return self.experiment.__module__
+        return next(iter(self.parts.values()), self.experiment).__module__
+
+    @property
+    def parts(self) -> Mapping[str, Part]:
+        """The parts of the experiment by name, if it has some."""
+        return self.experiment if isinstance(self.experiment, Mapping) else {}
 
     @property
     def takes_time(self) -> bool:
@@ -155,11 +162,10 @@ class Claim:
         if self.pictures:
             text = "draw the figures anew from stored results, run nothing"
             parser.add_argument("--redraw", action="store_true", help=text)
-        for option in self.options:
-            if option.default is None:
-                parser.add_argument(option.flag, action="store_true", help=option.help)
-            else:
-                parser.add_argument(option.flag, default=option.default, help=option.help)
+        for option in (*self.options, *([ONLY] if self.parts else [])):
+            text = option.default is not None
+            kind = {"default": option.default} if text else {"action": "store_true"}
+            parser.add_argument(option.flag, help=option.help, **kind)
         return parser.parse_args(arguments)
 
     def main(self, arguments: Sequence[str] | None = None) -> None:
@@ -172,7 +178,7 @@ class Claim:
             if find_spec(extra.module) is None:
                 print(f"{extra.module} is not installed: {extra.install}")
                 sys.exit(MISSING)
-        finding = self.experiment(options)
+        finding = together(options, self.parts) if self.parts else self.experiment(options)
         if finding is None:
             return
         if not options.quick and finding.tables:
@@ -193,10 +199,7 @@ class Claim:
 def modules(home: Path = HOME) -> dict[str, str]:
     """Return the modules that make claims, dotted, by their plain names in alphabetical order.
 
-    Raises
-    ------
-    ClaimError
-        If there are none, or if two have one name.
+    It is an error if there are none, or if two have one name.
     """
     found: dict[str, str] = {}
     for path in (*home.glob("*.py"), *home.glob("*/*.py")):
@@ -212,13 +215,7 @@ def modules(home: Path = HOME) -> dict[str, str]:
 
 
 def claims() -> dict[str, Claim]:
-    """Return what every experiment declares, by its plain name.
-
-    Raises
-    ------
-    ClaimError
-        If one declares nothing, or as `modules` does.
-    """
+    """Return what every experiment declares, by its plain name; it is an error if one does not."""
     out = {}
     for name, module in modules().items():
         claim = getattr(import_module(module), "CLAIM", None)

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
 
 if TYPE_CHECKING:
@@ -23,7 +24,6 @@ ONE_CORE = {f"{library}_NUM_THREADS": "1" for library in ("OPENBLAS", "OMP", "MK
 
 
 def save_figure(figure: Figure, name: str) -> None:
-    """Write a figure of the documentation."""
     from seqopt.report._style import DPI  # noqa: PLC0415  # an extra
 
     FIGURES.mkdir(exist_ok=True)
@@ -47,20 +47,22 @@ def drawn(chart: Callable[..., Figure], *names: str) -> Callable[[], Figure]:
     return lambda: chart(*map(stored, names))
 
 
-def apart(module: str, *words: object, limit: float | None = None) -> Any:
-    """Return what a module prints last as JSON, run in a process of its own on one core.
+def apart(module: str, *words: object, limit: float | None = None, **more: Any) -> Any:
+    """Return what a module or file prints last as JSON, run in a process of its own on one core.
 
-    Raises
-    ------
-    subprocess.CalledProcessError
-        If it ends otherwise than well.
-    subprocess.TimeoutExpired
-        If it takes longer than the limit, s.
+    It raises what `subprocess.run` does where that ends badly or takes longer than the limit, s.
     """
-    command = [sys.executable, "-m", module, *map(str, words)]
-    run: dict[str, Any] = {"env": os.environ | ONE_CORE, "capture_output": True, "text": True}
+    program = [module] if module.endswith(".py") else ["-m", module]
+    run = {"env": os.environ | ONE_CORE, "capture_output": True, "text": True, **more}
+    command = [sys.executable, *program, *map(str, words)]
     done = subprocess.run(command, check=True, timeout=limit, **run)
     return json.loads(done.stdout.splitlines()[-1])
+
+
+def exponents_by(name: str, table: pd.DataFrame, values: pd.Series) -> dict[Any, float]:
+    """Return the slopes of values over ``bricks``, both logarithmic, by a column of the table."""
+    logs = np.log(pd.DataFrame({"x": table["bricks"], "y": values})).groupby(table[name])
+    return {key: np.polyfit(own["x"], own["y"], 1)[0] for key, own in logs if len(own) > 1}
 
 
 def two(value: float) -> str:
@@ -74,5 +76,4 @@ def two(value: float) -> str:
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table in Markdown."""
     return "\n".join(f"| {' | '.join(cells)} |" for cells in [head, ["---"] * len(head), *rows])

@@ -1,17 +1,14 @@
 """One scene, engine and criterion: a row per formulation, with time by stage and what it is worth.
 
 A choice is judged by the reference: the responses of exactly rigid bricks, and dynamic programming
-over them. ``gap`` is how far the choice lies above the reference's optimum of the same aim,
-whatever engine it was made with; ``error`` is the largest difference of the engine's responses from
-the reference's, over the largest of each kind in its state. Times are medians of repeats; where
-there are several, one run before them does not count. Stages before the choice are shared by all
-formulations. One more row is the search that solves only the models it meets and proves nothing
-(`seqopt.plan.search._window_search`).
+over them. ``gap`` is how far the choice lies above the reference's optimum of the same aim;
+``error`` is the largest difference of the engine's responses from the reference's, over the largest
+of each kind in its state. Times are medians of repeats, one run before several does not count.
+Stages before the choice are shared by all formulations. One more row is the search that solves only
+the models it meets and proves nothing (`seqopt.plan.search._window_search`).
 
 Command: ``python -m experiments.harness.runs SCENE ENGINE CRITERION REPEATS`` prints rows as JSON.
 """
-
-from __future__ import annotations
 
 import json
 import resource
@@ -24,25 +21,19 @@ from typing import TypeVar
 import numpy as np
 
 from experiments.harness.scenes import longer
+from seqopt import CRITERIA, Engine, Network, Plan, Scene, build_network, load_scene, solve
 from seqopt.engines._auto import AutoEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
-from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import Formulation, On, formulations
 from seqopt.plan.judge.certificate import least
-from seqopt.plan.plan import Plan
-from seqopt.plan.solving import solve
 from seqopt.problem.problem import Aim
-from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.published import CRITERIA
 
 Row = dict[str, object]
+Times = dict[str, float]
 Result = TypeVar("Result")
 ENGINES: dict[str, Callable[[Network], Engine]] = {
     "rigid bricks": ComplianceEngine,
@@ -64,7 +55,6 @@ def scene_named(name: str) -> Scene:
 
 
 def rows(scene: str, engine: str, criterion: str, repeats: int) -> list[Row]:
-    """Return a row per formulation."""
     built = scene_named(scene)
     reference, _ = _pose(built, REFERENCE, criterion)
     ready = _repeated(repeats, lambda: _responded(*_pose(built, engine, criterion)))
@@ -72,21 +62,13 @@ def rows(scene: str, engine: str, criterion: str, repeats: int) -> list[Row]:
     shared = {
         stage: statistics.median(seconds[stage] for _, seconds in ready) for stage in ready[-1][1]
     }
-    base: Row = {
-        "scene": scene,
-        "bricks": len(problem.schedule.scene.bricks),
-        "moves": len(problem.schedule.moves),
-        "engine": engine,
-        "criterion": criterion,
-        "error": error(problem, reference),
-    }
-    return [
-        *(
-            base | _row(problem, formulation, reference, shared, repeats)
-            for formulation in formulations(On.LAYERS).values()
-        ),
-        base | _search_row(built, engine, criterion, reference, repeats),
-    ]
+    base: Row = {"scene": scene, "bricks": len(problem.schedule.scene.bricks)}
+    base |= {"moves": len(problem.schedule.moves), "engine": engine, "criterion": criterion}
+    base |= {"error": error(problem, reference)}
+    every = formulations(On.LAYERS).values()
+    found = [_row(problem, formulation, reference, shared, repeats) for formulation in every]
+    found.append(_search_row(built, engine, criterion, reference, repeats))
+    return [base | row for row in found]
 
 
 def _repeated(repeats: int, call: Callable[[], Result]) -> list[Result]:
@@ -100,7 +82,7 @@ def contenders() -> dict[str, Aim]:
     return {f.name: f.aim for f in formulations(On.LAYERS).values()} | {NO_PROOF: Aim.SUM}
 
 
-def _pose(scene: Scene, engine: str, criterion: str) -> tuple[Layers, dict[str, float]]:
+def _pose(scene: Scene, engine: str, criterion: str) -> tuple[Layers, Times]:
     """Return the loop's problem, nothing of it computed, and the time that took."""
     start = time.perf_counter()
     net = build_network(scene)
@@ -108,7 +90,7 @@ def _pose(scene: Scene, engine: str, criterion: str) -> tuple[Layers, dict[str, 
     return problem, {"assemble": time.perf_counter() - start}
 
 
-def _responded(problem: Layers, seconds: dict[str, float]) -> tuple[Layers, dict[str, float]]:
+def _responded(problem: Layers, seconds: Times) -> tuple[Layers, Times]:
     """Compute the costs of both aims; add the time that took."""
     stages = [problem.seconds(aim) for aim in Aim]
     ranked = sum(stage["rank"] for stage in stages)
@@ -116,11 +98,7 @@ def _responded(problem: Layers, seconds: dict[str, float]) -> tuple[Layers, dict
 
 
 def _row(
-    problem: Layers,
-    formulation: Formulation,
-    reference: Layers,
-    shared: dict[str, float],
-    repeats: int,
+    problem: Layers, formulation: Formulation, reference: Layers, shared: Times, repeats: int
 ) -> Row:
     plans = _repeated(repeats, lambda: solve(problem, formulation))
     seconds = shared | _medians(plans, ("compile", "solve", "verify"))
@@ -129,7 +107,11 @@ def _row(
 
 
 def _search_row(scene: Scene, engine: str, criterion: str, reference: Layers, repeats: int) -> Row:
-    found = _repeated(repeats, lambda: _search(scene, engine, criterion))
+    def search() -> tuple[Plan, Times]:
+        problem, seconds = _pose(scene, engine, criterion)
+        return solve(problem, "rank_search", proof=False), seconds
+
+    found = _repeated(repeats, search)
     stages = {"assemble": statistics.median(seconds["assemble"] for _, seconds in found)}
     stages |= {"compile": 0.0, "solve": 0.0}  # choosing is part of the search
     plans = [plan for plan, _ in found]
@@ -138,26 +120,15 @@ def _search_row(scene: Scene, engine: str, criterion: str, reference: Layers, re
     return {"formulation": NO_PROOF, **judged, "models": plans[-1].models}
 
 
-def _search(scene: Scene, engine: str, criterion: str) -> tuple[Plan, dict[str, float]]:
-    problem, seconds = _pose(scene, engine, criterion)
-    return solve(problem, "rank_search", proof=False), seconds
-
-
-def _medians(plans: Sequence[Plan], stages: Sequence[str]) -> dict[str, float]:
+def _medians(plans: Sequence[Plan], stages: Sequence[str]) -> Times:
     return {stage: statistics.median(plan.seconds[stage] for plan in plans) for stage in stages}
 
 
-def _judged(reference: Layers, aim: Aim, choice: tuple[int, ...], seconds: dict[str, float]) -> Row:
+def _judged(reference: Layers, aim: Aim, choice: tuple[int, ...], seconds: Times) -> Row:
     objective, gap = worth(reference, aim, choice)
-    return {
-        "aim": aim.value,
-        "status": "optimal" if gap <= 1e-6 else "feasible",
-        **seconds,
-        "total": sum(seconds.values()),
-        "objective": objective,
-        "gap": gap,
-        "memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
-    }
+    row = {"aim": aim.value, "status": "optimal" if gap <= 1e-6 else "feasible", **seconds}
+    row |= {"total": sum(seconds.values()), "objective": objective, "gap": gap}
+    return row | {"memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024}
 
 
 def worth(reference: Layers, aim: Aim, choice: tuple[int, ...]) -> tuple[float, float]:

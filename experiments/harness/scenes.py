@@ -1,20 +1,42 @@
 """Arches of any number of bricks, and walls in running bond, open between bricks."""
 
-from __future__ import annotations
-
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from seqopt import ArchShape, Network, Robot, Scene, arch_scene, build_network, load_scene
 from seqopt.arrays import Ints
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
-from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.plan.solving import pose, solve
 from seqopt.scene.library.arch_form import chain
 from seqopt.scene.library.wall import WallShape, wall
-from seqopt.scene.parts import Robot
-from seqopt.scene.scene import Scene
-from seqopt.study.published import ROBOTS
+from seqopt.sequence.steps import Step
+from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
+from seqopt.sequence.two_robots import METHODS
+from seqopt.study.published import EQUATIONS, ROBOTS, published_plan
+
+
+def arch25() -> ComplianceEngine:
+    """Return the fast engine of the paper's arch."""
+    return ComplianceEngine(build_network(load_scene("arch25")))
+
+
+def method_steps(engine: ComplianceEngine, names: Iterable[str]) -> dict[str, tuple[Step, ...]]:
+    """Return the steps of methods of the reference arch: fixed, published and chosen ones."""
+    net = engine.network
+    modified, loop = (
+        pose(engine, rules(net), EQUATIONS) for rules in (modified_sequential, three_robot_loop)
+    )
+    ways: dict[str, Callable[[], Sequence[Step]]] = {
+        **{name: partial(method, net) for name, method in METHODS.items()},
+        "modified sequential": lambda: solve(modified, "cascade").steps,
+        "three-robot, published": lambda: published_plan(net.scene),
+        "three-robot, optimized": lambda: solve(loop, "overlap_dp").steps,
+        "three-robot, minimax": lambda: solve(loop, "minimax").steps,
+    }
+    return {name: tuple(ways[name]()) for name in names}
 
 
 def half_circle(count: int) -> Network:
@@ -29,8 +51,7 @@ def longer(scene: Scene, times: float) -> Scene:
     that lies along.
     """
     joints = [scene.grounds[0].position, *(j.position for j in scene.joints)]
-    line = np.array([*joints, scene.grounds[1].position])
-    chord = np.diff(line, axis=0)
+    chord = np.diff(np.array([*joints, scene.grounds[1].position]), axis=0)
     angle = np.unwrap(np.arctan2(chord[:, 2], chord[:, 0]))
     count = round(24 * times) + 1
     pitch = np.interp(np.linspace(0, 1, count), np.linspace(0, 1, len(angle)), angle)

@@ -4,27 +4,20 @@ The site is built with them: ``{{ name }}`` in a page stands for the entry of th
 holds the README, which is read as it is, to the same rows.
 """
 
-from __future__ import annotations
-
-from collections.abc import Hashable
-from typing import Any
-
 import numpy as np
 import pandas as pd
 
-from experiments.harness.results import RESULTS, markdown, two
+from experiments.harness.results import markdown, stored, two
 from seqopt.plan.calling.formulation import On, formulations
 
+UNNEEDED = "not needed without budgets"
 FREE = {
     "overlap_dp": "the least sum (the default)",
     "minimax": "the least worst step",
     "cascade": "the paper's scheme; without the proof it needs few models",
     "rank_search": "comparison: looking at the next moves",
     "beam": "comparison: keeping several choices",
-    "lagrangian": "not needed without budgets",
-    "labels": "not needed without budgets",
-    "overlap_lp": "not needed without budgets",
-    "overlap_mip": "not needed without budgets",
+    **dict.fromkeys(("lagrangian", "labels", "overlap_lp", "overlap_mip"), UNNEEDED),
 }
 CAPPED = {
     "labels": "the best choice, proven (the default with budgets)",
@@ -32,16 +25,6 @@ CAPPED = {
     "overlap_lp": "to check the prices; its choice need not keep the budgets",
     "overlap_mip": "to check `labels` by a program that shares nothing with it",
 }
-
-
-def free_table(table: pd.DataFrame) -> str:
-    """Return a row per formulation on problems without budgets."""
-    return _contest(table[table["budgets"] == 0], FREE)
-
-
-def budget_table(table: pd.DataFrame) -> str:
-    """Return a row per formulation on problems with budgets."""
-    return _contest(table[table["budgets"] > 0], CAPPED)
 
 
 def shapes_table(table: pd.DataFrame) -> str:
@@ -68,15 +51,11 @@ def _contest(table: pd.DataFrame, when: dict[str, str]) -> str:
     for name, use in when.items():
         own = table[table["formulation"] == name]
         by = [own[own["bricks"] == count] for count in counts]
-        cells = [f"[`{name}`]({name}.md)", use, kinds[name], _proven_gap(own)]
+        most = 100 * own["proven_gap"].max()  # as the certificate proves it
+        gap = "none" if most < 1e-4 else f"{two(most)} %"
+        cells = [f"[`{name}`]({name}.md)", use, kinds[name], gap]
         rows.append([*cells, *map(_choosing, by), f"{two(own['memory_MB'].max())} MB"])
     return markdown(head, rows)
-
-
-def _proven_gap(own: pd.DataFrame) -> str:
-    """Return the largest gap of a choice, as the certificate proves it."""
-    most = 100 * own["proven_gap"].max()
-    return "none" if most < 1e-4 else f"{two(most)} %"
 
 
 def _choosing(own: pd.DataFrame) -> str:
@@ -98,19 +77,18 @@ PROVEN, UNPROVEN = "overlap_dp", "rank_search, no proof"
 
 def stated() -> dict[str, str]:
     """Return every figure and table by the name that stands for it."""
-    contest = pd.read_csv(RESULTS / "budget_proofs.csv")
-    runs = pd.read_csv(RESULTS / "runs.csv")
-    gaps = pd.read_csv(RESULTS / "heuristic_gaps.csv")
+    contest, runs = stored("budget_proofs"), stored("runs")
     return (
-        {"free_table": free_table(contest), "budget_table": budget_table(contest)}
+        {"free_table": _contest(contest[contest["budgets"] == 0], FREE)}
+        | {"budget_table": _contest(contest[contest["budgets"] > 0], CAPPED)}
         | _solvers(contest)
         | _budgets(contest)
         | _engines(runs)
-        | _heuristics(runs, gaps)
-        | _shapes(pd.read_csv(RESULTS / "program_shapes.csv"))
-        | _outside(pd.read_csv(RESULTS / "outside_assemblies.csv"))
-        | _composing(pd.read_csv(RESULTS / "composing.csv"))
-        | {"free_formulations_table": _free_formulations()}
+        | _heuristics(runs, stored("heuristic_gaps"))
+        | _shapes(stored("program_shapes"))
+        | _outside(stored("outside_assemblies"))
+        | _composing(stored("composing"))
+        | {"free_formulations_table": _free_formulations(stored("free_formulations"))}
     )
 
 
@@ -118,7 +96,6 @@ PLAIN = r"^(?:[a-z ]+ )?[^ ]+: |^[^ ]+ (?=finds|is )"  # what a reason is about
 
 
 def _composing(table: pd.DataFrame) -> dict[str, str]:
-    """Return which schedule goes with what, and the reasons where one does not."""
     plain = table["reason"].str.replace(PLAIN, "", regex=True).str.partition(";")[0]
     plain = plain.str.partition(" (did")[0]
     reasons = [*dict.fromkeys(plain.dropna())]
@@ -135,30 +112,21 @@ def _composing(table: pd.DataFrame) -> dict[str, str]:
     }
 
 
-def _free_formulations() -> str:
+def _free_formulations(table: pd.DataFrame) -> str:
     """Return a row per formulation of the free schedule: times, or gaps where a minute ended."""
-    table = pd.read_csv(RESULTS / "free_formulations.csv")
+    counts = sorted(table["bricks"].unique())
+    gap = (100 * table["gap"]).map(two).radd(", gap ").add(" %").where(table["gap"] >= 1e-6, "")
+    gap = gap.where(np.isfinite(table["gap"]), ", no bound")
+    table = table.assign(cell=table["seconds"].map(two) + " s" + gap)
     rows = []
     for name, own in table.groupby("formulation", sort=False):
         for aim, part in own.groupby("aim", sort=False):
-            by = part.set_index("bricks").to_dict("index")
-            cells = [_minute(by.get(count)) for count in sorted(table["bricks"].unique())]
+            cells = part.set_index("bricks")["cell"].reindex(counts, fill_value="not asked")
             rows.append([f"`{name}`", part["kind"].iloc[0], str(aim), *cells])
-    counts = (f"{n} bricks" for n in sorted(table["bricks"].unique()))
-    return markdown(["formulation", "kind", "aim", *counts], rows)
-
-
-def _minute(row: dict[Hashable, Any] | None) -> str:
-    """Return how long a plan took, and how far from the best it may be."""
-    if row is None:
-        return "not asked"
-    gap = "" if row["gap"] < 1e-6 else f", gap {two(100 * row['gap'])} %"
-    gap = gap if np.isfinite(row["gap"]) else ", no bound"
-    return f"{two(row['seconds'])} s{gap}"
+    return markdown(["formulation", "kind", "aim", *(f"{n} bricks" for n in counts)], rows)
 
 
 def _outside(table: pd.DataFrame) -> dict[str, str]:
-    """Return how many assemblies of others end in a plan, and how well faces are found."""
     counts = table["outcome"].value_counts()
     elsewhere = ~table["source"].str.startswith("compas_cra")
     return {
@@ -170,7 +138,6 @@ def _outside(table: pd.DataFrame) -> dict[str, str]:
 
 
 def _shapes(table: pd.DataFrame) -> dict[str, str]:
-    """Return how integer programs of one problem differ, and how long the weak ones take."""
     seconds = table.set_index("formulation")["seconds"]
     return {
         "shapes_table": shapes_table(table),
@@ -180,35 +147,27 @@ def _shapes(table: pd.DataFrame) -> dict[str, str]:
 
 
 def _solvers(contest: pd.DataFrame) -> dict[str, str]:
-    """Return how many times as long as dynamic programming the general programs take."""
     free = contest[contest["budgets"] == 0].set_index(["formulation", *KEY])["solve"].sort_index()
     out = {}
     for name in ("lp", "mip"):
-        times = (free[f"overlap_{name}"] / free["overlap_dp"]).groupby(level="bricks")
-        out |= {
-            f"{name}_times_{bricks}": two(value)
-            for bricks, value in times.median().iloc[[0, -1]].items()
-        }
+        times = (free[f"overlap_{name}"] / free["overlap_dp"]).groupby(level="bricks").median()
+        out |= {f"{name}_times_{n}": two(value) for n, value in times.iloc[[0, -1]].items()}
     return out
 
 
 def _budgets(contest: pd.DataFrame) -> dict[str, str]:
     """Return how labels do, and how long HiGHS takes where it finishes, over them."""
     capped = contest[contest["budgets"] > 0]
-    own, other, priced = (
-        capped[capped["formulation"] == name].set_index(KEY)
-        for name in ("labels", "overlap_mip", "lagrangian")
-    )
+    by = {name: rows.set_index(KEY) for name, rows in capped.groupby("formulation")}
+    own, other, priced = (by[name] for name in ("labels", "overlap_mip", "lagrangian"))
     every = (other["solve"] / own["solve"]).dropna()  # at least, where it was stopped
     finished = other[other["end"] == "done"]
     times, large = every[finished.index], every.xs(LARGE, level="bricks")
-    stopped = own[own["end"] == "stopped"]
-    left = 100 * own["proven_gap"].max()
     bound = 100 * (1 - priced["bound"] / own["objective"])
     return {
         "capped_problems": str(len(own)),
-        "labels_stopped": str(len(stopped)) if len(stopped) else "none",
-        "labels_left": two(left),
+        "labels_stopped": str(int((own["end"] == "stopped").sum()) or "none"),
+        "labels_left": two(100 * own["proven_gap"].max()),
         "highs_problems": str(len(other)),
         "highs_finished": str(len(finished)),
         "highs_least": two(times.min()),
@@ -224,12 +183,10 @@ def _budgets(contest: pd.DataFrame) -> dict[str, str]:
 
 
 def _engines(runs: pd.DataFrame) -> dict[str, str]:
-    """Return what the frame, `auto` and a proof cost, from the chart of speed and accuracy."""
-    chosen = runs[runs["criterion"] == "equations-2-3"]
-    total = chosen.set_index(["engine", "formulation", "scene"])["total"].sort_index()
+    every = runs.set_index(["engine", "formulation", "scene", "criterion"])["total"].sort_index()
+    total = every.xs("equations-2-3", level="criterion")
     rigid, frame, auto = (total[name] for name in ("rigid bricks", "frame 1e7", "auto"))
     share = rigid[UNPROVEN] / rigid[PROVEN]
-    every = runs.set_index(["engine", "formulation", "scene", "criterion"])["total"].sort_index()
     ratios = every["frame 1e7", PROVEN] / every["rigid bricks", PROVEN]
     return {
         "frame_times": two(frame[PROVEN, "arch25"] / rigid[PROVEN, "arch25"]),
@@ -248,7 +205,6 @@ def _engines(runs: pd.DataFrame) -> dict[str, str]:
 
 
 def _heuristics(runs: pd.DataFrame, gaps: pd.DataFrame) -> dict[str, str]:
-    """Return what heuristics lose: on the scenes of the chart, and on random arches."""
     own = runs[(runs["engine"] == "rigid bricks") & (runs["formulation"] == "cascade")]
     by = (100 * gaps.set_index(["criterion", "formulation"])["gap"]).groupby(level=[0, 1])
     median, high, most = by.median(), by.quantile(0.9), by.max()

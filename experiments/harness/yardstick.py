@@ -1,22 +1,11 @@
 """How far a table of responses is from a printed one, beyond the rounding of print."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 
 VALUES = (
-    "F_rob1_N",
-    "F_rob2_N",
-    "F_rob3_N",
-    "F_sup_N",
-    "M_sup_Nm",
-    "F_min_N",
-    "F_max_N",
-    "F_avg_N",
-    "D_max_1e-3mm",
-    "D_avg_1e-3mm",
-    "D_std_1e-3mm",
+    *("F_rob1_N", "F_rob2_N", "F_rob3_N", "F_sup_N", "M_sup_Nm", "F_min_N", "F_max_N", "F_avg_N"),
+    *("D_max_1e-3mm", "D_avg_1e-3mm", "D_std_1e-3mm"),
 )
 ROUNDING = 0.0501  # the tables print one digit; a little more for binary fractions
 
@@ -24,26 +13,21 @@ ROUNDING = 0.0501  # the tables print one digit; a little more for binary fracti
 def errors(produced: pd.DataFrame, printed: pd.DataFrame) -> pd.DataFrame:
     """Return errors in percent, a row per step and a column per response.
 
-    The error is what exceeds the rounding, over the printed size or 1, whichever is larger. Signed
-    sizes (F_rob, F_sup) are compared without sign. NaN where the table prints nothing. Produced
-    tables must be as printed: with the first end's support (`seqopt.study.published.as_printed`).
+    It is what exceeds the rounding, over the printed size or 1, whichever is larger; NaN where the
+    table prints nothing. F_rob and F_sup are compared without sign. Produced tables must be as
+    printed (`seqopt.study.published.as_printed`).
     """
-    out = {}
-    by_step = produced.set_index("step").loc[printed["step"]]
-    for column in VALUES:
-        want = printed[column].to_numpy(float)
-        got = by_step[column].to_numpy(float)
-        if column.startswith("F_rob") or column == "F_sup_N":
-            want, got = np.abs(want), np.abs(got)
-        excess = np.maximum(0.0, np.abs(got - want) - ROUNDING)
-        out[column] = 100 * excess / np.maximum(np.abs(want), 1.0)
-    return pd.DataFrame(out, index=printed["step"].to_numpy())
+    unsigned = [name for name in VALUES if name.startswith("F_rob") or name == "F_sup_N"]
+    want = printed.set_index("step")[[*VALUES]].astype(float)
+    got = produced.set_index("step").loc[want.index, [*VALUES]].astype(float)
+    want[unsigned], got[unsigned] = want[unsigned].abs(), got[unsigned].abs()
+    excess = ((got - want).abs() - ROUNDING).clip(lower=0)
+    return (100 * excess / want.abs().clip(lower=1)).rename_axis(None)
 
 
 def percentiles(table: pd.DataFrame) -> tuple[float, float, float]:
     """Return the median, 90th and 95th percentile of all errors of a table."""
-    values = table.to_numpy()
-    a, b, c = np.nanpercentile(values, [50, 90, 95])
+    a, b, c = np.nanpercentile(table.to_numpy(), [50, 90, 95])
     return float(a), float(b), float(c)
 
 

@@ -13,53 +13,39 @@ time is extended to all. Models kept by a peer and operators of the engine are t
 Medians of rounds. Bounds are the products alone, same shapes, dense in ready memory and sparse.
 Then one placement problem by general tools.
 
-Inputs: the shipped scene; seed 0; PyNiteFEA, openseespy and pyconmech if installed. Command:
-``OPENBLAS_NUM_THREADS=1 python -m experiments.peers.peers [--quick]``. Writes
-``experiments/results/peers.csv`` and ``docs/figures/peers.png`` if all are there.
+Inputs: the shipped scene; seed 0; PyNiteFEA, openseespy and pyconmech: nothing is stored if one is
+missing. Command: ``OPENBLAS_NUM_THREADS=1 python -m experiments.peers.peers [--quick]``.
 """
-
-from __future__ import annotations
 
 import time
 from functools import partial
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from experiments.harness.charts import note, subplots
 from experiments.harness.claim import Claim, Finding, Options, Times
 from experiments.harness.results import stored
+from experiments.harness.scenes import arch25
 from experiments.harness.timing import best
 from experiments.peers.parts.chain import Answer, Peer, chain_of
 from experiments.peers.parts.frames import PACKAGES, missing_packages
 from experiments.peers.parts.loops import LOOPS, loop
 from experiments.peers.parts.workload import PATHS, SETTINGS, SLOW, Case, products, workload
-from seqopt.arrays import Floats
+from seqopt import Network
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import Layers
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
-from seqopt.report._style import (
-    BLUE,
-    GRAY,
-    SMALL,
-    VERMILION,
-    name_panels,
-    new_figure,
-    plain,
-    styled,
-)
-from seqopt.scene.scene_file import load_scene
+from seqopt.report._style import BLUE, GRAY, VERMILION, name_panels, plain, styled
 from seqopt.study.published import paper_models
 
 OURS, BOUND, SPARSE = "seqopt", "dense products", "sparse products"
 LABELS = {
     OURS: "seqopt, fast engine",
-    "OpenSeesPy": "OpenSeesPy, stiff bars",
-    "PyNite": "PyNite, stiff bars",
-    "pyconmech": "pyconmech, stiff bars",
+    **{package: f"{package}, stiff bars" for package in PACKAGES},
     "SciPy bars, SuperLU": "SciPy loop, stiff bars, SuperLU",
     "SciPy bars, banded": "SciPy loop, stiff bars, banded Cholesky",
     "SciPy bricks, SuperLU": "SciPy loop, rigid bricks, SuperLU",
@@ -73,27 +59,22 @@ TITLES = {
 
 @styled
 def chart(table: pd.DataFrame) -> Figure:
-    figure = new_figure(5.6)
     whole = table[table["setting"] == "all fields"].sort_values("model_us", ascending=False)
     order = [tool for tool in whole["tool"] if tool not in (BOUND, SPARSE)]
-    panels = figure.subplots(2, 1, sharex=True)
+    figure, panels = subplots(5.6, 2, 1, sharex=True)
     for axes, (setting, title) in zip(panels, TITLES.items(), strict=True):
         part = table[table["setting"] == setting].set_index("tool")
         least = float(part["model_us"][BOUND])
         axes.axvline(least, color=GRAY, lw=0.8)
-        axes.annotate(
-            f"dense matrix products alone: {least:.1f} µs", (least, -0.75), (4, 0),
-            textcoords="offset points", va="center", fontsize=SMALL,
-        )  # fmt: skip
+        words = f"dense matrix products alone: {least:.1f} µs"
+        note(axes, words, (least, -0.75), (4, 0), va="center")
         for row, tool in enumerate(order):
             value, ratio = float(part["model_us"][tool]), float(part["ratio"][tool])
             color, marker = (VERMILION, "D") if tool == OURS else (BLUE, "o")
             axes.plot([0.5, value], [row, row], color=color, lw=1, zorder=1)
             axes.plot(value, row, marker, color=color, ms=6)
             text = f"{value:.1f} µs" if tool == OURS else f"{short(value)} µs, {short(ratio)} times"
-            axes.annotate(
-                text, (value, row), (8, 0), textcoords="offset points", va="center", fontsize=SMALL
-            )
+            note(axes, text, (value, row), (8, 0), va="center")
         axes.set(xscale="log", xlim=(0.5, 1e6), ylim=(len(order) - 0.4, -1.3), title=title)
         axes.set_yticks(range(len(order)), [LABELS[tool] for tool in order])
         axes.tick_params(axis="y", length=0)
@@ -117,13 +98,7 @@ LIKE_RIGID, LIKE_BARS = 1e-9, 1e-4  # largest difference of peers with rigid bri
 SLOWEST = ("PyNite", "pyconmech")  # answer one model of a kind in a round
 
 
-def answer_all(engine: ComplianceEngine, cases: list[Case], setting: str) -> None:
-    for case in cases:
-        engine.solve(case.bricks, case.grips, case.asked(setting))
-
-
 def operators(net: Network, cases: list[Case]) -> ComplianceEngine:
-    """Return an engine that has prepared all its operators."""
     engine = ComplianceEngine(net)
     for case in cases:
         engine.solve(case.bricks, case.grips[:1], Want(0))
@@ -139,7 +114,6 @@ class Round(NamedTuple):
 
 
 def make(net: Network, name: str, bricks: int) -> Peer:
-    """Return a peer's kept model of one brick count."""
     return loop(net, bricks, name) if name in LOOPS else PACKAGES[name](chain_of(net, bricks))
 
 
@@ -174,31 +148,27 @@ def difference(engine: ComplianceEngine, answers: list[tuple[Case, int, Answer]]
         exact = engine.solve(case.bricks, case.grips[i : i + 1])
         pairs = {n: (x, getattr(exact, n)[0]) for n, x in answer._asdict().items()}
         found, true = pairs.pop("support")
-        for kind, part in (("force", slice(3)), ("moment", slice(3, 6))):
-            pairs[f"support_{kind}"] = (found[:, part], true[:, part])
-        worst = max(worst, *(_gap(*pair) for pair in pairs.values()))
+        for part in (slice(3), slice(3, 6)):
+            pairs[part.stop] = (found[:, part], true[:, part])
+        gaps = (np.abs(a - b).max() / np.abs(b).max() for a, b in pairs.values())
+        worst = max(worst, *map(float, gaps))
     return worst
-
-
-def _gap(found: Floats, true: Floats) -> float:
-    return float(np.abs(found - true).max() / np.abs(true).max())
 
 
 def compete(
     net: Network, cases: list[Case], names: list[str], rounds: int, few: int
 ) -> pd.DataFrame:
     """Return a row per round, setting and tool; tools take turns."""
-    rng, rows = np.random.default_rng(0), []
-    engine = operators(net, cases)
+    rng, rows, engine = np.random.default_rng(0), [], operators(net, cases)
     bounds = {
         (s, name): products(net, cases, s, sparsely=name == SPARSE)
-        for s in SETTINGS
-        for name in (BOUND, SPARSE)
+        for s, name in product(SETTINGS, (BOUND, SPARSE))
     }
     for number in range(rounds):
         prepare = best(partial(operators, net, cases), 1)
         for s in SETTINGS:
-            ours = best(partial(answer_all, engine, cases, s), 3)
+            asked = [(case.bricks, case.grips, case.asked(s)) for case in cases]
+            ours = best(lambda asked=asked: [engine.solve(*each) for each in asked], 3)
             rows.append((number, s, OURS, prepare, ours, np.nan, np.nan))
         for (s, bound), (call, flops) in bounds.items():
             rows.append((number, s, bound, 0.0, best(call, 3), np.nan, flops))
@@ -211,7 +181,6 @@ def compete(
 
 
 def summarize(rounds: pd.DataFrame, models: int) -> pd.DataFrame:
-    """Return a row per setting and tool: medians of times and of ratios within rounds."""
     keys = ["setting", "tool"]
     ours = rounds[rounds["tool"] == OURS].set_index(["round", "setting"])
     index = pd.MultiIndex.from_frame(rounds[["round", "setting"]])
@@ -229,7 +198,6 @@ def summarize(rounds: pd.DataFrame, models: int) -> pd.DataFrame:
 
 
 def paths(problem: Layers, names: list[str], rounds: int) -> pd.DataFrame:
-    """Return time and least cost of every tool on one placement problem; costs are ready."""
     rows = []
     for name in names:
         solve = PATHS[name]
@@ -244,20 +212,16 @@ def paths(problem: Layers, names: list[str], rounds: int) -> pd.DataFrame:
 
 
 def judge(table: pd.DataFrame, ways: pd.DataFrame) -> bool:
-    """Print what is claimed against what was measured; return whether all of it holds."""
     holds = [bool(ways["gap"].max() <= 1e-6)]
     for setting in SETTINGS:
         part = table[table["setting"] == setting].set_index("tool")
         near = 1 / float(part["ratio"][BOUND])
         peers = part.drop(index=[OURS, BOUND, SPARSE])
         packaged = peers.index.isin(list(PACKAGES))
-        for label, those, target in (
-            ("package", peers[packaged], PACKAGE),
-            ("loop", peers[~packaged], LOOP),
-        ):
+        for those, target in ((peers[packaged], PACKAGE), (peers[~packaged], LOOP)):
             for name, row in those.nsmallest(1, "ratio_lowest").iterrows():
                 print(
-                    f"{setting}: best {label} {name}: {row['ratio']:.0f} times (lowest "
+                    f"{setting}: best is {name}: {row['ratio']:.0f} times (lowest "
                     f"{row['ratio_lowest']:.0f}; preparation counted {row['ratio_whole']:.0f}); "
                     f"claimed {target:.0f}"
                 )
@@ -274,14 +238,14 @@ def judge(table: pd.DataFrame, ways: pd.DataFrame) -> bool:
 
 def experiment(options: Options) -> Finding:
     quick: bool = options.quick
-    net = build_network(load_scene("arch25"))
+    net = arch25().network
     problem, cases = workload(net)
     counted = paper_models(problem.schedule)[1]
     print(f"{problem.evaluation.models} distinct models; the paper counts {counted}")
     lacking = list(PACKAGES) if quick else missing_packages()
     if lacking:
         print(f"not measured: {', '.join(lacking)}" + ("" if quick else f"; {EXTRA}"))
-    names = [*(n for n in PACKAGES if n not in lacking), *LOOPS]
+    names = [name for name in (*PACKAGES, *LOOPS) if name not in lacking]
     cases = [c for c in cases if not quick or c.bricks % 8 == 1]
     rounds = compete(net, cases, names, *((1, 3) if quick else (9, 10)))
     table = summarize(rounds, sum(len(c.grips) for c in cases))
@@ -295,7 +259,6 @@ def experiment(options: Options) -> Finding:
 
 
 def picture() -> Figure:
-    """Return the figure from stored rows."""
     both = stored("peers")
     return chart(both[both["part"] == "models"])
 

@@ -9,22 +9,19 @@ an error of one line, which is stored too. What is expected to be refused is lis
 or one less, and the claim does not hold. Whether values are right is tested elsewhere, against
 every plan of small builds.
 
-Inputs: none. Command: ``python -m experiments.placement.composing [--quick]``. Writes
-``experiments/results/composing.csv``.
+Inputs: none. Command: ``python -m experiments.placement.composing [--quick]``.
 """
-
-from __future__ import annotations
 
 import io
 import json
 import tempfile
 from contextlib import redirect_stderr, redirect_stdout
+from itertools import product
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 
-from experiments.harness.claim import Claim, Finding, Options, Times
+from experiments.harness.claim import Claim, Finding, Options
 from seqopt._cli.main import main
 
 SCENE = "chain:bricks=7"
@@ -51,15 +48,14 @@ SCHEDULES = {
 WORTH = ["--criteria", "worst-ratio-published"]
 STATES = ["--aim", "minmax"]
 SCENARIOS = ["--scenarios", "2", "--unseen", "1"]
+OVER_STATES = ("path_dp", "path_labels", "path_beam", "best_first", "flow_lp", "flow_mip")
 GOES = {
     "as it is": [],
     "sum": [*WORTH, "--aim", "sum"],
     "minmax": [*WORTH, "--aim", "minmax"],
     "minmax, then steps": [*WORTH, "--aim", "minmax,steps"],
     "a response": ["--aim", "T_max"],
-    "steps": ["--aim", "steps"],
-    "regrips": ["--aim", "regrips"],
-    "travel": ["--aim", "travel"],
+    **{aim: ["--aim", aim] for aim in ("steps", "regrips", "travel")},
     "friction": ["--stands", "bond=3e4", "--aim", "friction"],
     "a limit": [*WORTH, *STATES, "--limit", "F_largest=500"],
     "a budget": [*WORTH, *STATES, "--budget", "travel=20m"],
@@ -72,16 +68,12 @@ GOES = {
     "lazily": [*WORTH, *STATES, "--lazy"],
     "workers": [*WORTH, *STATES, "--workers", "2"],
     "a folder of answers": [*WORTH, *STATES, "--cache", "answers"],
-    "path_dp": [*WORTH, *STATES, "--formulation", "path_dp"],
-    "path_labels": [*WORTH, *STATES, "--formulation", "path_labels"],
-    "path_beam": [*WORTH, *STATES, "--formulation", "path_beam"],
-    "best_first": [*WORTH, *STATES, "--formulation", "best_first"],
-    "flow_lp": [*WORTH, *STATES, "--formulation", "flow_lp"],
-    "flow_mip": [*WORTH, *STATES, "--formulation", "flow_mip"],
+    **{name: [*WORTH, *STATES, "--formulation", name] for name in OVER_STATES},
     "overlap_dp": [*WORTH, "--formulation", "overlap_dp"],
     "rank_search": ["--formulation", "rank_search"],
     "Pareto": ["pareto", "--aim", "T_max,F_largest"],
 }
+FILES = ("own.csv", "answers", "front")  # words that stand for files in a folder
 OWN, FREE, ORDERS = [*SCHEDULES][2:]
 REFUSED = {
     (OWN, FREE, ORDERS): [
@@ -92,17 +84,18 @@ REFUSED = {
 
 
 def refused() -> set[tuple[str, str]]:
-    """Return the pairs that are expected to be refused."""
     return {(one, word) for some, words in REFUSED.items() for one in some for word in words}
 
 
 def cell(folder: Path, schedule: list[str], words: list[str]) -> tuple[float | None, str]:
-    """Return the first value of a plan, or the line that says why there is none."""
-    command = "pareto" if words[:1] == ["pareto"] else "optimize"
-    rest = [word.replace("answers", str(folder / "answers")) for word in words]
-    place = [word.replace("own.csv", str(folder / "own.csv")) for word in schedule]
-    out = ["--out", str(folder / "front")] if command == "pareto" else []
-    given = [command, SCENE, *place, *rest[command == "pareto" :], *out]
+    """Return the first value of a plan, or the line that says why there is none.
+
+    Of a Pareto set it is the number of plans.
+    """
+    front = words[:1] == ["pareto"]
+    given = ["pareto" if front else "optimize", SCENE, *schedule, *words[front:]]
+    given += ["--out", "front"] if front else []
+    given = [str(folder / word) if word in FILES else word for word in given]
     printed, said = io.StringIO(), io.StringIO()
     with redirect_stdout(printed), redirect_stderr(said):
         try:
@@ -111,15 +104,11 @@ def cell(folder: Path, schedule: list[str], words: list[str]) -> tuple[float | N
             code = int(end.code or 0)
     if code:
         return None, " ".join(said.getvalue().rpartition("error: ")[2].split())
-    return _value(json.loads(printed.getvalue())), ""
-
-
-def _value(answer: dict[str, Any]) -> float:
-    """Return the first value that an answer names; of a Pareto set the number of its plans."""
-    if "points" in answer:
-        return float(len(answer["points"]))
+    answer = json.loads(printed.getvalue())
+    if front:
+        return float(len(answer["points"])), ""
     found = answer["summary"].get("objective")
-    return float(next(iter(found.values())) if isinstance(found, dict) else found)
+    return float(next(iter(found.values())) if isinstance(found, dict) else found), ""
 
 
 def experiment(options: Options) -> Finding:
@@ -128,25 +117,23 @@ def experiment(options: Options) -> Finding:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "own.csv").write_text(OPEN, encoding="utf-8")
-        for schedule, place in SCHEDULES.items():
-            for word, words in goes.items():
-                value, why = cell(folder, place, words)
-                rows.append({"schedule": schedule, "with": word, "value": value, "reason": why})
+        for (schedule, place), (word, words) in product(SCHEDULES.items(), goes.items()):
+            value, why = cell(folder, place, words)
+            rows.append({"schedule": schedule, "with": word, "value": value, "reason": why})
     table = pd.DataFrame(rows)
     print(table.to_string(index=False, float_format="%.6g"))
     return Finding(holds(table), tables={"composing": table})
 
 
 def holds(table: pd.DataFrame) -> bool:
-    """Return whether what is refused is what is expected, each in a line that says something."""
-    no = table[table["value"].isna() & table["reason"].fillna("").ne("")]
-    asked = {*zip(table["schedule"], table["with"], strict=True)}
-    pairs = {*zip(no["schedule"], no["with"], strict=True)}
-    whole = (table["value"].notna() | table["reason"].fillna("").ne("")).all()
-    return bool(whole) and pairs == refused() & asked
+    said = table["reason"].fillna("").ne("")
+    no = table["value"].isna() & said
+    asked = pd.Series([*zip(table["schedule"], table["with"], strict=True)], table.index)
+    whole = (table["value"].notna() | said).all()
+    return bool(whole) and set(asked[no]) == refused() & set(asked)
 
 
-CLAIM = Claim(experiment, quick="three columns, nothing written", times=Times.NONE)
+CLAIM = Claim(experiment, quick="three columns, nothing written")
 
 if __name__ == "__main__":
     CLAIM.main()

@@ -15,42 +15,33 @@ the moves changed. Stiffness of every joint within a factor of 3: regret at leas
 third of the moves changed, yet at most an eighth of the average choice's regret. And the nominal
 scenario must change nothing. These bounds were set after a first look at six of the seeds.
 
-The claim rests on how uncertain each is taken to be: a factor of 3, 10 % and 2 mm. At the same
-relative size weights change as many grips as stiffness does or more: within 10 % weights move 15 %
-of them under equations 2 and 3, stiffness 9 %. Single draws spread widely about the means: the
-smallest and largest share of moves is printed too. And one arch is one arch.
+The claim rests on how uncertain each is taken to be: at the same relative size weights change as
+many grips as stiffness does or more (within 10 % weights move 15 % of them under equations 2 and 3,
+stiffness 9 %). Single draws spread widely about the means. And one arch is one arch.
 
 Inputs: the shipped scene. Command: ``python -m experiments.placement.decision_sensitivity
-[--quick]``. Writes ``experiments/results/decision_sensitivity.csv`` and
-``docs/figures/decision_sensitivity.png``.
+[--quick]``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
+from seqopt import Scene, Schedule, build_network, load_scene, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import move_costs, rank_of
-from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import find_formulation
-from seqopt.plan.solving import solve
 from seqopt.problem.requirements import Criterion, SceneFacts
-from seqopt.report._style import dress, looks, new_figure, styled
+from seqopt.report._style import dress, looks, styled
 from seqopt.report.text import in_words
 from seqopt.scene.scenarios import _stiffened, shifted, weighed
-from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
 
 Grids = dict[str, tuple[float, ...]]
@@ -76,7 +67,6 @@ ALIKE = {  # powers of the factor: translational, rotational
 
 
 def perturbed(scene: Scene, kind: str, size: float, seed: int) -> Scene:
-    """Return the scene of one scenario."""
     rng = np.random.default_rng(seed)
     springs, bricks = len(scene.joints) + len(scene.grounds), len(scene.bricks)
     if kind.startswith("stiffness"):
@@ -119,6 +109,10 @@ ROWS = {
 }
 
 
+WIDE = {"1/3": 1 / 3, "1/2": 1 / 2, "1": 1.0, "2": 2.0, "3": 3.0}  # ticks of factors
+NARROW = {"1": 1.0, "1.5": 1.5, "2": 2.0, "3": 3.0}
+
+
 def curve(table: pd.DataFrame, kind: str, change: Callable[[float], float]) -> pd.DataFrame:
     """Return the means of a kind of scenario over the abscissa, in %, the nominal one included."""
     rows = table[table["kind"] == kind]
@@ -129,9 +123,7 @@ def curve(table: pd.DataFrame, kind: str, change: Callable[[float], float]) -> p
 
 @styled
 def chart(table: pd.DataFrame) -> Figure:
-    """Draw a row of panels per kind of change, and a column per measure of a decision."""
-    figure = new_figure(9.4)
-    axes = figure.subplots(len(PANELS), len(ROWS), sharex="row", sharey="col")
+    figure, axes = subplots(9.4, len(PANELS), len(ROWS), sharex="row", sharey="col")
     for line, (title, kinds) in zip(axes, PANELS.items(), strict=True):
         for criterion, look in looks(table["criterion"].unique()).items():
             mine = table[table["criterion"] == criterion]
@@ -145,7 +137,10 @@ def chart(table: pd.DataFrame) -> Figure:
         line[0].set_ylabel(words)
         line[1].set_xlabel(abscissa)
         if "factor" in abscissa:
-            _factors(line[0], wide="all joints" in words)
+            line[0].set_xscale("log")
+            shown = WIDE if "all joints" in words else NARROW
+            line[0].set_xticks([*shown.values()], [*shown])
+            line[0].set_xticks([], minor=True)
     for panel, name in zip(axes[0], ROWS.values(), strict=True):
         panel.set_title(name)
         panel.set_ylim(bottom=-0.04 * panel.get_ylim()[1])  # a line of zeros stays in sight
@@ -155,27 +150,14 @@ def chart(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def _factors(panel: Axes, *, wide: bool) -> None:
-    """Give a logarithmic axis of factors its ticks."""
-    panel.set_xscale("log")
-    ticks = {1 / 3: "1/3", 1 / 2: "1/2", 1.0: "1", 2.0: "2", 3.0: "3"}
-    shown = ticks if wide else {1.0: "1", 1.5: "1.5", 2.0: "2", 3.0: "3"}
-    panel.set_xticks([*shown], [*shown.values()])
-    panel.set_xticks([], minor=True)
-
-
 TESTED: tuple[Criterion, ...] = (EQUATIONS, CLOSEST, WEIGHTED, WORST_RATIO)
 ALSO = ("T_max", "M_sup", "D_max", "F_move", "F_largest", "F_rob1", "F_rob2", "F_rob3")
 SEEDS = 30
 MEASURES = ("changed", "changed_in_window", "out_of_three", "relative_regret", "average_regret")
 
 
-@dataclass(frozen=True)
-class Decision:
-    """Both answers to the nominal problem of a criterion, which scenarios are held against."""
-
-    best: tuple[int, ...]
-    searched: tuple[int, ...]
+Decision = tuple[tuple[int, ...], tuple[int, ...]]
+"""Both answers to the nominal problem of a criterion: the best, and the one that is searched."""
 
 
 def problems(scene: Scene, schedule: Schedule) -> dict[str, Layers]:
@@ -186,52 +168,40 @@ def problems(scene: Scene, schedule: Schedule) -> dict[str, Layers]:
 
 
 def judge(problem: Layers, nominal: Decision) -> dict[str, float]:
-    """Return how far a scenario's decisions are from the nominal ones."""
+    chosen, searched = nominal
     plan = solve(problem, "overlap_dp")
     best = plan.certificate.objective
-    regret = max(0.0, problem.sums.cost(nominal.best) - best)
+    regret = max(0.0, problem.sums.cost(chosen) - best)
     first, three = [], []
-    for k, chosen in enumerate(nominal.searched):
-        costs = move_costs(problem, k, nominal.searched[k - 1] if k else 0)
-        first.append(int(np.argmin(costs)) == chosen)
-        three.append(rank_of(costs, chosen) <= 3)
+    for k, node in enumerate(searched):
+        costs = move_costs(problem, k, searched[k - 1] if k else 0)
+        first.append(int(np.argmin(costs)) == node)
+        three.append(rank_of(costs, node) <= 3)
     average = sum(
         float(costs[np.isfinite(costs)].mean())
         for costs in (*problem.sums.single, *problem.sums.shared)
     )
-    return {
-        "changed": float(np.mean(np.not_equal(plan.selection.choice, nominal.best))),
-        "changed_in_window": 1 - float(np.mean(first)),
-        "out_of_three": 1 - float(np.mean(three)),
-        "best": best,
-        "regret": regret,
-        "relative_regret": regret / best,
-        "average_regret": (average - best) / best,
-    }
+    row = {"changed": float(np.mean(np.not_equal(plan.selection.choice, chosen)))}
+    row |= {"changed_in_window": 1 - float(np.mean(first))}
+    row |= {"out_of_three": 1 - float(np.mean(three)), "best": best, "regret": regret}
+    return row | {"relative_regret": regret / best, "average_regret": (average - best) / best}
 
 
 def measure(scene: Scene, wanted: Iterator[tuple[str, float, int]]) -> pd.DataFrame:
-    """Return a row per scenario and criterion."""
-    schedule = three_robot_loop(build_network(scene))
+    schedule, rows = three_robot_loop(build_network(scene)), []
+    ways = [find_formulation(name) for name in ("overlap_dp", "cascade")]
     nominal = {
-        name: Decision(
-            find_formulation("overlap_dp").solve(problem).choice,
-            find_formulation("cascade").solve(problem).choice,
-        )
+        name: [way.solve(problem).choice for way in ways]
         for name, problem in problems(scene, schedule).items()
     }
-    rows = []
     for kind, size, seed in wanted:
-        posed = problems(perturbed(scene, kind, size, seed), schedule)
-        for name, problem in posed.items():
+        for name, problem in problems(perturbed(scene, kind, size, seed), schedule).items():
             row = {"kind": kind, "size": size, "seed": seed, "criterion": name}
             rows.append(row | judge(problem, nominal[name]))
     return pd.DataFrame(rows)
 
 
 def holds(table: pd.DataFrame) -> bool:
-    """Return whether the claim holds; see the module's text for the bounds."""
-
     def of(kind: str) -> pd.DataFrame:
         rows = table[(table["kind"] == kind) & (table["size"] == GRIDS[kind][-1])]
         return rows.groupby("criterion").mean(numeric_only=True)
@@ -245,9 +215,8 @@ def holds(table: pd.DataFrame) -> bool:
 
 
 def experiment(options: Options) -> Finding:
-    quick: bool = options.quick
-    grids = {kind: sizes[-1:] for kind, sizes in GRIDS.items()} if quick else GRIDS
-    table = measure(load_scene("arch25"), scenarios(grids, 3 if quick else SEEDS))
+    grids = {kind: sizes[-1:] for kind, sizes in GRIDS.items()} if options.quick else GRIDS
+    table = measure(load_scene("arch25"), scenarios(grids, 3 if options.quick else SEEDS))
     groups = table.groupby(["criterion", "kind", "size"], sort=False)
     mean = groups[list(MEASURES)].mean()
     mean["regret_error"] = groups["relative_regret"].sem()  # of the mean

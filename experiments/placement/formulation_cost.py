@@ -26,24 +26,18 @@ beside them.
 ``proofs``: the reference arch and longer ones of its shape, two criteria, no budget and five sets
 of them on robot travel and on the numbers of steps over a force and over a moment, as shares of
 what the optimum without budgets takes. Every formulation that takes the problem solves it, each in
-a process of its own on one core, one after the other; its peak memory is that of the process, from
-the scene to the proof. Seconds are of the processor, since machines are shared; the limit, 60 s, is
-of the clock. At 100 bricks the linear and the integer program meet one criterion and four of the
-sets: they take a minute each.
+a process of its own on one core; its peak memory is that of the process. Seconds are of the
+processor; the limit, 60 s, is of the clock. At 100 bricks the linear and the integer program meet
+one criterion and four of the sets: they take a minute each.
 
 ``shapes``: six programs of two problems, the loop on `arch25` under ``equations-2-3`` (sum) and
-``worst-ratio-published`` (worst), all exact, each written down for HiGHS as its module displays it.
-Size is counted as it is handed over, before presolve; the bound is that of the linear relaxation,
-solved on its own; then the integer program is solved on one core up to a time limit, and what it
-had found and proven at which time is stored.
+``worst-ratio-published`` (worst), all exact. Size is counted before presolve; the bound is that of
+the linear relaxation, solved on its own; then the integer program is solved on one core up to a
+time limit, and what it had found and proven at which time is stored.
 
 Inputs: chains on a half circle, and `arch25`. Command: ``python -m
-experiments.placement.formulation_cost [--quick] [--only PART]``. Writes ``formulation_cost.csv``,
-``budget_proofs.csv``, ``program_shapes.csv`` and ``program_traces.csv`` to ``experiments/results``
-and ``formulation_cost.png``, ``contest.png`` and ``program_shapes.png`` to ``docs/figures``.
+experiments.placement.formulation_cost [--quick] [--only PART]``.
 """
-
-from __future__ import annotations
 
 import subprocess
 import time
@@ -54,24 +48,20 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from experiments.harness.claim import ONLY, Claim, Finding, Options, Times, on_this_run, together
+from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
 from experiments.harness.results import apart, drawn, stored
-from experiments.harness.scenes import half_circle
+from experiments.harness.scenes import arch25, half_circle
 from experiments.harness.timing import best
 from experiments.placement.parts.budget_cases import CASES, COMPARED, NO_BUDGET
 from experiments.placement.parts.formulation_charts import contest_chart, cost_chart, shape_chart
 from formulations.solvers import anatomy, minimize_whole
+from seqopt import Network, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import On, Watch, find_formulation, formulations, trace_rows
 from seqopt.plan.judge.certificate import least
-from seqopt.plan.solving import solve
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO
 
 GENERAL = ("overlap_lp", "overlap_mip")
@@ -88,35 +78,28 @@ def problem_of(net: Network, criterion: Criterion) -> Layers:
 
 def compared(net: Network, criterion: Criterion, rounds: int) -> dict[str, float]:
     """Return seconds to pose the problem and to solve it by every formulation of the sum."""
-    row = {
-        "bricks": float(len(net.scene.bricks)),
-        "pose": best(partial(problem_of, net, criterion), rounds),
-    }
-    problem = problem_of(net, criterion)
+    pose, problem = best(partial(problem_of, net, criterion), rounds), problem_of(net, criterion)
+    row = {"bricks": float(len(net.scene.bricks)), "pose": pose}
     row["models"] = float(problem.evaluation.models)
     for name, formulation in formulations(On.LAYERS).items():
-        if formulation.aim is not Aim.SUM:
-            continue
-        row[name] = best(partial(formulation.solve, problem), rounds)
-        row[f"gap_{name}"] = solve(problem, formulation).certificate.gap
+        if formulation.aim is Aim.SUM:
+            row[name] = best(partial(formulation.solve, problem), rounds)
+            row[f"gap_{name}"] = solve(problem, formulation).certificate.gap
     return row
 
 
 def costs(options: Options) -> Finding:
-    quick: bool = options.quick
-    rounds = 1 if quick else 3
-    counts = [6, 9] if quick else [6, 9, 13, 18, 25, 36, 50]
+    rounds = 1 if options.quick else 3
+    counts = [6, 9] if options.quick else [6, 9, 13, 18, 25, 36, 50]
     table = pd.DataFrame([compared(half_circle(n), WEIGHTED, rounds) for n in counts])
     print(table.to_string(index=False, float_format="%.3g"))
-    reference = compared(build_network(load_scene("arch25")), EQUATIONS, rounds)
+    reference = compared(arch25().network, EQUATIONS, rounds)
     whole = reference["pose"] + reference["overlap_dp"]
     print(f"arch25, equations 2 and 3: posed and solved exactly in {whole:.3f} s")
     for name, value in over_dp(table).items():
         own = reference[str(name)] / reference["overlap_dp"]
-        print(
-            f"{name} over overlap_dp on arch25: {own:.0f}; on chains {value.min():.0f} to "
-            f"{value.max():.0f}"
-        )
+        chains = f"{value.min():.0f} to {value.max():.0f}"
+        print(f"{name} over overlap_dp on arch25: {own:.0f}; on chains {chains}")
     frame = pd.concat([table, pd.DataFrame([reference])], ignore_index=True)
     return on_this_run(holds=costs_hold(table, reference), formulation_cost=frame)
 
@@ -127,7 +110,6 @@ def over_dp(table: pd.DataFrame) -> pd.DataFrame:
 
 
 def costs_hold(table: pd.DataFrame, reference: Mapping[str, float]) -> bool:
-    """Return whether solvers are slower on every size and on the arch, and the answers exact."""
     arch = over_dp(pd.DataFrame([reference])).to_numpy().min()
     exact = max(table["gap_overlap_dp"].max(), table["gap_overlap_mip"].max())
     posed = reference["pose"] + reference["overlap_dp"] <= 0.5
@@ -138,7 +120,6 @@ def costs_hold(table: pd.DataFrame, reference: Mapping[str, float]) -> bool:
 PROVEN_IN = {25: 1.0, 49: 3.0, 100: 20.0}
 GAP, TIMES, MEMORY = 1e-3, 10.0, 1024.0
 SAME = 1e-6  # of objectives
-SOLVERS = ("overlap_lp", "overlap_mip")
 RARE, FEW = 100, (NO_BUDGET, "travel 0.8", "travel 0.5", "travel and force 0.8")
 KEY = ["bricks", "criterion", "case"]
 COLUMNS = [
@@ -156,7 +137,7 @@ def specs() -> Iterator[Spec]:
                 rare = bricks >= RARE and (criterion != COMPARED[0] or case not in FEW)
                 for name, formulation in formulations(On.LAYERS).items():
                     able = formulation.takes_budgets or case == NO_BUDGET
-                    if able and not (rare and name in SOLVERS):
+                    if able and not (rare and name in GENERAL):
                         yield bricks, criterion, case, name
 
 
@@ -171,7 +152,6 @@ def raced(spec: Spec, limit: float) -> dict[str, object]:
 
 
 def budgeted(table: pd.DataFrame, name: str) -> pd.DataFrame:
-    """Return the rows of a formulation with budgets, by problem."""
     return table[(table["formulation"] == name) & (table["budgets"] > 0)].set_index(KEY)
 
 
@@ -181,7 +161,6 @@ def over_labels(table: pd.DataFrame) -> pd.Series:
 
 
 def proofs_hold(table: pd.DataFrame) -> bool:
-    """Return whether the claim proofs_hold on rows of `raced`."""
     own, other, priced = (budgeted(table, n) for n in ("labels", "overlap_mip", "lagrangian"))
     whole, counts = own["solve"] + own["verify"], own.index.get_level_values("bricks")
     best = own["objective"]
@@ -200,17 +179,11 @@ def proofs_hold(table: pd.DataFrame) -> bool:
 
 def proof_summary(table: pd.DataFrame) -> pd.DataFrame:
     """Return a row per brick count and formulation: problems with budgets."""
-    capped = table[table["budgets"] > 0]
+    capped = table[table["budgets"] > 0].assign(done=table["end"] == "done")
     by = capped.groupby(["bricks", "formulation"])
-    return by.agg(
-        problems=("case", "size"),
-        done=("end", lambda ends: int((ends == "done").sum())),
-        proven_gap=("proven_gap", "max"),
-        solve_median=("solve", "median"),
-        solve_most=("solve", "max"),
-        verify_most=("verify", "max"),
-        memory_MB=("memory_MB", "max"),
-    )
+    most = by[["proven_gap", "solve", "verify", "memory_MB"]].max()
+    counts = pd.DataFrame({"problems": by.size(), "done": by["done"].sum()})
+    return counts.assign(solve_median=by["solve"].median()).join(most)
 
 
 def proofs(options: Options) -> Finding:
@@ -248,24 +221,14 @@ def written(problem: Layers, name: str, limit: float) -> tuple[dict[str, object]
     watch, start = Watch(limit), time.perf_counter()
     found = minimize_whole(written.program, feasible=True, watch=watch, told=written.bound)
     seconds = time.perf_counter() - start
-    row = {
-        "formulation": name,
-        "aim": formulation.aim.value,
-        **asdict(size),
-        "optimum": least(costs, formulation.aim),
-        "relaxed": written.bound(relaxed),
-        "value": written.bound(found.value),
-        "bound": written.bound(found.bound),
-        "nodes": found.nodes,
-        "proven": not found.stopped,
-        "seconds": seconds,
-        "limit": limit,
-    }
+    row = {"formulation": name, "aim": formulation.aim.value, **asdict(size)}
+    row |= {"optimum": least(costs, formulation.aim), "relaxed": written.bound(relaxed)}
+    row |= {"value": written.bound(found.value), "bound": written.bound(found.bound)}
+    row |= {"nodes": found.nodes, "proven": not found.stopped, "seconds": seconds, "limit": limit}
     return row, pd.DataFrame(trace_rows(watch.trace)).assign(formulation=name)
 
 
 def programs(network: Network, limit: float) -> Iterator[tuple[dict[str, object], pd.DataFrame]]:
-    """Yield what is measured of every program."""
     engine, schedule = ComplianceEngine(network), three_robot_loop(network)
     for aim, criterion in ((Aim.SUM, EQUATIONS), (Aim.PEAK, WORST_RATIO)):
         problem = candidate_layers(engine, schedule, criterion)
@@ -274,7 +237,6 @@ def programs(network: Network, limit: float) -> Iterator[tuple[dict[str, object]
 
 
 def shapes_hold(table: pd.DataFrame) -> bool:
-    """Return whether the claim shapes_hold on programs of `written`."""
     by = table.set_index("formulation")
     share = by["relaxed"] / by["optimum"]
     loose = by.drop(index=list(TIGHT))
@@ -292,26 +254,20 @@ def shapes_hold(table: pd.DataFrame) -> bool:
 
 
 def shapes(options: Options) -> Finding:
-    quick: bool = options.quick
-    network = half_circle(6) if quick else build_network(load_scene("arch25"))
-    found = list(programs(network, 5.0 if quick else LIMIT))
+    network = half_circle(6) if options.quick else arch25().network
+    found = list(programs(network, 5.0 if options.quick else LIMIT))
     table = pd.DataFrame([row for row, _ in found])
     print(table.to_string(index=False, float_format="%.4g"))
-    if quick:  # on six bricks everything is proven at once: the stored rows are judged
+    if options.quick:  # on six bricks everything is proven at once: the stored rows are judged
         return Finding(shapes_hold(stored("program_shapes")), ": stored rows")
     traces = pd.concat([trace for _, trace in found], ignore_index=True)
     return on_this_run(holds=shapes_hold(table), program_shapes=table, program_traces=traces)
 
 
-def experiment(options: Options) -> Finding:
-    return together(options, costs=costs, proofs=proofs, shapes=shapes)
-
-
 CLAIM = Claim(
-    experiment,
+    {"costs": costs, "proofs": proofs, "shapes": shapes},
     quick="small chains, stored rows judged where these say nothing, nothing written",
     times=Times.JUDGED,
-    options=(ONLY,),
     digits={"formulation_cost": 4, "budget_proofs": 10, "program_shapes": 6, "program_traces": 6},
     pictures={
         "formulation_cost.png": drawn(cost_chart, "formulation_cost"),

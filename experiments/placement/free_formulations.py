@@ -11,27 +11,21 @@ those that take less than five seconds the best of three rounds counts. What a m
 the gap that a formulation claims itself; of others the gap is proven.
 
 Inputs: the shipped scenes. Command: ``python -m experiments.placement.free_formulations
-[--quick]``. Writes ``experiments/results/free_formulations.csv``.
+[--quick]``.
 """
-
-from __future__ import annotations
 
 import time
 from dataclasses import replace
+from itertools import product
 
 import pandas as pd
 
 from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
-from experiments.harness.results import RESULTS
 from experiments.harness.runs import scene_named
+from seqopt import CRITERIA, FreeRules, Plan, build_network, solve
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.states.states import build_states
-from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation, formulation_names
-from seqopt.plan.plan import Plan
-from seqopt.plan.solving import solve
-from seqopt.sequence.rules import FreeRules
-from seqopt.study.published import CRITERIA
 
 SIZES = ("chain7", "chain11", "chain15", "arch25", "chain49", "chain97")
 AIMS = ("minmax,steps", "sum")
@@ -53,43 +47,29 @@ def run(scene: str, aim: str, name: str) -> tuple[Plan, float]:
 
 
 def row(scene: str, aim: str, name: str, rounds: int) -> dict[str, object]:
-    """Return how a formulation does."""
     plan, first = run(scene, aim, name)
     times = [first, *(run(scene, aim, name)[1] for _ in range(1, rounds if first < SHORT else 1))]
     chosen, proof = plan.selection, plan.certificate
     value, bound = chosen.objective[0], chosen.bound[0]
-    if proof is not None and not chosen.stopped:
-        bound = proof.bound
-    return {
-        "bricks": len(plan.engine.network.scene.bricks),
-        "aim": aim,
-        "formulation": name,
-        "kind": plan.formulation.kind.value,
-        "status": plan.status,
-        "seconds": min(times),
-        "value": value,
-        "steps": len(plan.steps),
-        "bound": bound,
-        "gap": (value - bound) / value,
-        "models": plan.models,
-        "states": sum(map(len, chosen.visited)),
-    }
+    bound = bound if proof is None or chosen.stopped else proof.bound
+    out = {"bricks": len(plan.engine.network.scene.bricks), "aim": aim, "formulation": name}
+    out |= {"kind": plan.formulation.kind.value, "status": plan.status, "seconds": min(times)}
+    out |= {"value": value, "steps": len(plan.steps), "bound": bound}
+    out |= {"gap": (value - bound) / value, "models": plan.models}
+    return out | {"states": sum(map(len, chosen.visited))}
 
 
 def agree(table: pd.DataFrame) -> bool:
-    """Return whether exact ones that ended have the same values, and no plan is better."""
     ended = (table["kind"] == FormulationKind.EXACT.value) & (table["status"] == "optimal")
     exact = table[ended].groupby(["bricks", "aim"])
     values, steps = exact["value"], exact["steps"]
     same = (values.max() <= values.min() * (1 + CLOSE)) & (steps.max() == steps.min())
-    worst = values.max().rename("worst").reset_index()
-    both = table.merge(worst, on=["bricks", "aim"])
-    return bool(same.all() and (both["value"] >= both["worst"] * (1 - CLOSE)).all())
+    worst = table.merge(values.max().rename("worst").reset_index(), on=["bricks", "aim"])
+    return bool(same.all() and (worst["value"] >= worst["worst"] * (1 - CLOSE)).all())
 
 
 def slower(table: pd.DataFrame) -> bool:
-    """Return whether programs are as much slower than the search as is claimed, or do not end."""
-    on = table[(table["bricks"] == ON)]
+    on = table[table["bricks"] == ON]
     times = on.pivot_table("seconds", "aim", "formulation")
     ended = on[on["status"] == "optimal"].groupby(["aim", "formulation"]).size()
     return all(
@@ -100,14 +80,12 @@ def slower(table: pd.DataFrame) -> bool:
 
 
 def fewest(table: pd.DataFrame) -> bool:
-    """Return whether the search computes the fewest responses of exact ones, where peaks count."""
     mine = table[(table["aim"] != "sum") & (table["kind"] == FormulationKind.EXACT.value)]
     models = mine.pivot_table("models", "bricks", "formulation")
     return bool((models.min(axis=1) == models[SEARCH]).all())
 
 
 def holds(table: pd.DataFrame) -> bool:
-    """Return whether all that is claimed is so."""
     return agree(table) and slower(table) and fewest(table)
 
 
@@ -116,20 +94,16 @@ def experiment(options: Options) -> Finding:
     sizes, rounds = (SIZES[:1], 1) if options.quick else (SIZES, 3)
     rows: list[dict[str, object]] = []
     late = set[tuple[str, str]]()
-    for scene in sizes:
-        for aim in AIMS:
-            for name in names:
-                if (aim, name) not in late:
-                    rows.append(row(scene, aim, name, rounds))
-                    late |= {(aim, name)} if rows[-1]["seconds"] > 0.9 * PATIENCE else set()
+    for scene, *way in product(sizes, AIMS, names):
+        if tuple(way) not in late:
+            rows.append(row(scene, *way, rounds))
+            late |= {tuple(way)} if rows[-1]["seconds"] > 0.9 * PATIENCE else set()
     table = pd.DataFrame(rows)
     print(table.to_string(index=False, float_format="%.4g"))
-    if not options.quick:
-        table.to_csv(RESULTS / "free_formulations.csv", index=False, float_format="%.9g")
-    return on_this_run(holds=holds(table))
+    return on_this_run(holds=holds(table), free_formulations=table)
 
 
-CLAIM = Claim(experiment, quick="seven bricks, nothing written", times=Times.SHOWN)
+CLAIM = Claim(experiment, quick="seven bricks, nothing written", times=Times.SHOWN, digits=9)
 
 if __name__ == "__main__":
     CLAIM.main()

@@ -12,18 +12,15 @@ core are counted, and the largest memory of the process. Exponents are fitted ov
 more, where a plan is proven.
 
 Inputs: the shipped scenes. Command: ``python -m experiments.placement.free_growth [--quick]``.
-Writes ``experiments/results/free_growth.csv`` and ``docs/figures/free_growth.png``.
 """
 
-from __future__ import annotations
-
-import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from experiments.harness.charts import note, subplots, ticks
 from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
-from experiments.harness.results import apart, drawn
-from seqopt.report._style import GRAY, SMALL, dress, look, new_figure, plain, styled
+from experiments.harness.results import apart, drawn, exponents_by
+from seqopt.report._style import GRAY, dress, look, plain, styled
 
 SOME = (7, 13, 25, 37, 49, 73)
 SIZES = {3: (7, 13, 25, 49, 73, 97, 145), 4: SOME, 5: (7, 13, 19, *SOME[2:])}
@@ -36,17 +33,11 @@ MOST = 2048.0  # MB
 
 def exponents(table: pd.DataFrame, column: str) -> dict[int, float]:
     """Return the slopes over the brick count, by how many robots there are."""
-    out = {}
     mine = table[(table["status"] == "optimal") & (table["bricks"] >= FROM)]
-    for robots, rows in mine.groupby("robots"):
-        if len(rows) > 1:
-            slope = np.polyfit(np.log(rows["bricks"]), np.log(rows[column]), 1)[0]
-            out[int(robots)] = float(slope)  # type: ignore[call-overload]
-    return out
+    return exponents_by("robots", mine, mine[column])
 
 
 def holds(table: pd.DataFrame) -> bool:
-    """Return whether what is claimed to be solved is, within memory, and the rest has bounds."""
     small = table[table["bricks"] <= table["robots"].map(SOLVED)]
     solved = bool((small["status"] == "optimal").all())
     ended = table[table["status"] != "optimal"]
@@ -56,14 +47,18 @@ def holds(table: pd.DataFrame) -> bool:
     return solved and bounded and not slow and bool((table["memory_MB"] <= MOST).all())
 
 
+LABELS = {
+    "states": "states in the proof",
+    "seconds": "time of one core [s]",
+    "memory_MB": "peak memory [MB]",
+}
+
+
 @styled
 def chart(table: pd.DataFrame) -> Figure:
-    figure = new_figure(3.0)
-    parts = figure.subplots(1, 3)
-    columns = ("states", "seconds", "memory_MB")
-    labels = ("states in the proof", "time of one core [s]", "peak memory [MB]")
+    figure, parts = subplots(3.0, 1, 3)
     table = table.assign(states=table["states"].where(table["status"] == "optimal"))
-    for axes, column, label in zip(parts, columns, labels, strict=True):
+    for axes, (column, label) in zip(parts, LABELS.items(), strict=True):
         for number, (robots, rows) in enumerate(table.groupby("robots")):
             style = look(number)
             axes.plot(rows["bricks"], rows[column], label=f"{robots} robots", **style.line())
@@ -71,22 +66,20 @@ def chart(table: pd.DataFrame) -> Figure:
             axes.plot(ended["bricks"], ended[column], zorder=3, **style.mark(filled=False))
         axes.set(xscale="log", yscale="log", xlabel="bricks", ylabel=label)
         plain(axes.yaxis)
-        axes.set_xticks([7, 13, 25, 49, 145], ["7", "13", "25", "49", "145"])
-        axes.minorticks_off()
+        ticks([7, 13, 25, 49, 145], axes.xaxis)
         dress(axes)
     parts[2].axhline(MOST, color=GRAY, lw=0.8)
-    parts[2].annotate("2 GB", (7, MOST), (0, -9), textcoords="offset points", fontsize=SMALL)
+    note(parts[2], "2 GB", (7, MOST), (0, -9))
     parts[0].plot([], [], "^", color=GRAY, mfc="white", label="memory ended before the proof")
-    handles, names = parts[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside lower center", ncols=4)
+    figure.legend(*parts[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
 
 def experiment(options: Options) -> Finding:
     sizes = QUICK if options.quick else SIZES
     module = "experiments.placement.parts.free_growth_run"
-    rows = [apart(module, bricks, robots) for robots, counts in sizes.items() for bricks in counts]
-    table = pd.DataFrame(rows)
+    runs = ((bricks, robots) for robots, counts in sizes.items() for bricks in counts)
+    table = pd.DataFrame(apart(module, *run) for run in runs)
     print(table.to_string(index=False, float_format="%.4g"))
     for column in ("states", "models", "seconds"):
         print("exponents of", column, exponents(table, column))

@@ -14,45 +14,34 @@ more the worst peak over unseen scenarios is at most nine tenths of the nominal 
 seed, at a price of at most a quarter in the nominal scene; totals over unseen scenarios are within
 3 % of the nominal plan's; no plan beats the one that knows each scenario; the integer programs find
 the same values, and cuts with search take at most a tenth of their time. These bounds were set
-after a first look at two of the seeds and 60 unseen scenarios.
-
-One arch is one arch, and how far scenarios spread is taken, not measured.
+after a first look at two of the seeds and 60 unseen scenarios. One arch is one arch, and how far
+scenarios spread is taken, not measured.
 
 Inputs: the shipped scene. Command: ``python -m experiments.placement.robust_placement [--quick]``.
-Writes ``experiments/results/robust_placement.csv``, ``robust_programs.csv``, ``robust_judged.csv``
-and ``docs/figures/robust_placement.png``.
 """
-
-from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from experiments.harness.charts import subplots, ticks
 from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
 from experiments.harness.results import drawn, stored
 from experiments.harness.scenes import half_circle
 from formulations.scenarios.scenario_program import _solve_program
-from seqopt.engines.registry import make_engine
+from seqopt import Plan, Scene, build_network, load_scene, make_engine, scenarios, solve
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.scenarios import Choice, ScenarioLayers, in_scenarios
-from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import Watch
 from seqopt.plan.out_of_sample import judge_unseen
-from seqopt.plan.plan import Plan
 from seqopt.plan.search.in_order import least_quantile, solve_in_order
-from seqopt.plan.solving import solve
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
 from seqopt.problem.requirements import Criterion
-from seqopt.report._style import BLUE, GRAY, VERMILION, dress, new_figure, styled
-from seqopt.scene.scenarios import scenarios
-from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import load_scene
+from seqopt.report._style import BLUE, GRAY, VERMILION, dress, styled
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO
 
@@ -66,8 +55,7 @@ UNSEEN_SEED = 1000  # no plan is made with it
 TAIL = cvar(0.9)
 
 
-@dataclass(frozen=True)
-class Effort:
+class Effort(NamedTuple):
     """How many scenarios there are, how often, and how long a program may take."""
 
     counts: tuple[int, ...]
@@ -77,10 +65,8 @@ class Effort:
 
 
 def posed(scene: Scene, criterion: Criterion) -> Layers:
-    network = build_network(scene)
-    return candidate_layers(
-        make_engine("compliance", network), three_robot_loop(network), criterion
-    )
+    engine = make_engine("compliance", build_network(scene))
+    return candidate_layers(engine, three_robot_loop(engine.network), criterion)
 
 
 def over_draws(problem: Layers, count: int, seed: int) -> ScenarioLayers:
@@ -92,7 +78,6 @@ def over_draws(problem: Layers, count: int, seed: int) -> ScenarioLayers:
 
 
 def made(scene: Scene, effort: Effort) -> Iterator[dict[str, object]]:
-    """Yield a row for every aim, seed and count of scenarios."""
     for criterion in (WORST_RATIO, WEIGHTED):
         problem = posed(scene, criterion)
         unseen = over_draws(problem, effort.unseen, UNSEEN_SEED)
@@ -109,19 +94,14 @@ def measured(plan: Plan, unseen: ScenarioLayers) -> dict[str, object]:
     """Return what a plan is worth where it was made and elsewhere."""
     trial, proof = judge_unseen(plan, unseen).summary(), plan.certificate
     assert proof is not None
-    return {
-        "objective": proof.objective,
-        "gap": proof.claimed_gap,
-        "gap_by_weights": proof.gap,
-        "solve_s": plan.seconds["solve"],
-        **{f"{name}_{who}": trial[name][who] for name in trial for who in trial[name]},
-    }
+    row = {"objective": proof.objective, "gap": proof.claimed_gap, "gap_by_weights": proof.gap}
+    row |= {"solve_s": plan.seconds["solve"]}
+    return row | {**{f"{name}_{who}": trial[name][who] for name in trial for who in trial[name]}}
 
 
 def references(scene: Scene, count: int, limit: float) -> pd.DataFrame:
     """Return the integer programs beside the cuts: values, bounds and times."""
-    found = []
-    most = over_draws(posed(scene, WEIGHTED), count, 0)
+    found, most = [], over_draws(posed(scene, WEIGHTED), count, 0)
     for aim in (WORST_TOTAL, TAIL):
         plan = solve(most.under(aim))
         start = time.perf_counter()
@@ -136,7 +116,6 @@ def references(scene: Scene, count: int, limit: float) -> pd.DataFrame:
 
 
 def plans(scene: Scene, count: int) -> dict[str, Choice]:
-    """Return a choice for every way to say what is good."""
     ranks, total, worst = (posed(scene, c) for c in (EQUATIONS, WEIGHTED, WORST_RATIO))
     peaks, totals = (over_draws(problem, count, 0) for problem in (worst, total))
     return {
@@ -152,7 +131,6 @@ def plans(scene: Scene, count: int) -> dict[str, Choice]:
 
 
 def judged(scene: Scene, count: int, unseen: int) -> pd.DataFrame:
-    """Return every plan judged by every measure."""
     ranks, total, worst = (posed(scene, c) for c in (EQUATIONS, WEIGHTED, WORST_RATIO))
     peaks, totals = (over_draws(problem, unseen, UNSEEN_SEED) for problem in (worst, total))
     steps = [(c.moves, worst.step_costs(c)) for c in worst.evaluation.steps]
@@ -161,20 +139,15 @@ def judged(scene: Scene, count: int, unseen: int) -> pd.DataFrame:
         costs = np.sort([costs[tuple(choice[m] for m in moves)] for moves, costs in steps])
         return float(costs[::-1][int(0.1 * len(costs) + 1e-9)])
 
-    return pd.DataFrame(
-        {
-            "plan": name,
-            "ranks": ranks.sums.cost(choice),
-            "sum": total.sums.cost(choice),
-            "worst": worst.peaks.worst(choice),
-            "tenth": tenth(choice),
-            "unseen_peak": WORST_PEAK.value(peaks.values(choice, Aim.PEAK)),
-            "unseen_peak_median": float(np.median(peaks.values(choice, Aim.PEAK))),
-            "unseen_total": WORST_TOTAL.value(totals.values(choice, Aim.SUM)),
-            "unseen_tail": TAIL.value(totals.values(choice, Aim.SUM)),
-        }
-        for name, choice in plans(scene, count).items()
-    )
+    rows = []
+    for name, choice in plans(scene, count).items():
+        high, sums = peaks.values(choice, Aim.PEAK), totals.values(choice, Aim.SUM)
+        row = {"plan": name, "ranks": ranks.sums.cost(choice), "sum": total.sums.cost(choice)}
+        row |= {"worst": worst.peaks.worst(choice), "tenth": tenth(choice)}
+        row |= {"unseen_peak": WORST_PEAK.value(high), "unseen_peak_median": float(np.median(high))}
+        row |= {"unseen_total": WORST_TOTAL.value(sums), "unseen_tail": TAIL.value(sums)}
+        rows.append(row)
+    return pd.DataFrame(rows)
 
 
 TITLES = {
@@ -186,32 +159,24 @@ TITLES = {
 
 @styled
 def chart(table: pd.DataFrame) -> Figure:
-    """Draw what plans are worth in unseen scenarios, over how many they were made for."""
-    figure = new_figure(3.4)
-    panels = figure.subplots(1, len(TITLES))
+    figure, panels = subplots(3.4, 1, len(TITLES))
     for panel, (aim, title) in zip(panels, TITLES.items(), strict=True):
-        draw(panel, table[table["aim"] == aim])
+        rows = table[table["aim"] == aim]
+        mean, first = rows.groupby("scenarios")["unseen_robust"].mean(), rows.iloc[0]
+        look = {"color": BLUE, "mfc": "white", "label": "robust plan, each draw"}
+        panel.plot(rows["scenarios"], rows["unseen_robust"], "o", **look)
+        panel.plot(mean.index, mean, "-", color=BLUE, label="its mean")
+        panel.axhline(first["unseen_nominal"], color=VERMILION, ls="--", label="nominal plan")
+        look = {"color": GRAY, "ls": ":", "lw": 2, "label": "plan that knows each scenario"}
+        panel.axhline(first["unseen_knows_it"], **look)
         panel.set(title=title, xlabel="scenarios the plan is made for", xscale="log")
         counts = sorted(table["scenarios"].unique())
-        panel.set_xticks(counts, [str(count) for count in counts])
-        panel.set_xticks([], minor=True)
+        ticks(counts, panel.xaxis)
         panel.set_xlim(counts[0] / 1.4, counts[-1] * 1.4)
         dress(panel)
     panels[0].set_ylabel("cost in unseen scenarios")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
-
-
-def draw(panel: Axes, rows: pd.DataFrame) -> None:
-    """Draw one aim: every seed as a point, their mean, and what it is measured by."""
-    panel.plot(rows["scenarios"], rows["unseen_robust"], "o", color=BLUE, mfc="white",
-               label="robust plan, each draw")  # fmt: skip
-    mean = rows.groupby("scenarios")["unseen_robust"].mean()
-    panel.plot(mean.index, mean, "-", color=BLUE, label="its mean")
-    nominal, known = rows["unseen_nominal"].iloc[0], rows["unseen_knows_it"].iloc[0]
-    panel.axhline(nominal, color=VERMILION, ls="--", label="nominal plan")
-    panel.axhline(known, color=GRAY, ls=":", lw=2, label="plan that knows each scenario")
 
 
 FULL = Effort(counts=(10, 30, 100), seeds=3, unseen=100, limit=60.0)
@@ -222,11 +187,9 @@ PROVEN, SAME, FASTER = 1e-6, 1e-5, 10
 
 
 def holds(table: pd.DataFrame, programs: pd.DataFrame) -> bool:
-    """Return whether the claim holds on rows of `made` and `references`."""
     enough = table[table["scenarios"] >= ENOUGH]
-    peaks, totals = (
-        enough[(enough["aim"] == "worst-peak") == is_peak] for is_peak in (True, False)
-    )
+    peak = enough["aim"] == "worst-peak"
+    peaks, totals = enough[peak], enough[~peak]
     unseen = totals["unseen_robust"] / totals["unseen_nominal"]
     known = table["unseen_knows_it"] * (1 - PROVEN)
     return bool(
@@ -243,15 +206,14 @@ def holds(table: pd.DataFrame, programs: pd.DataFrame) -> bool:
 
 
 def experiment(options: Options) -> Finding:
-    quick: bool = options.quick
-    scene = half_circle(6).scene if quick else load_scene("arch25")
-    effort = QUICK if quick else FULL
+    scene = half_circle(6).scene if options.quick else load_scene("arch25")
+    effort = QUICK if options.quick else FULL
     table = pd.DataFrame(made(scene, effort))
     programs = references(scene, min(ENOUGH, max(effort.counts)), effort.limit)
     beside = judged(scene, min(ENOUGH, max(effort.counts)), effort.unseen)
     print(table.groupby(["aim", "scenarios"], sort=False).mean(numeric_only=True).T.to_string())
     print(programs.to_string(index=False), beside.to_string(index=False), sep="\n")
-    if quick:  # six bricks say little: the stored rows are judged
+    if options.quick:  # six bricks say little: the stored rows are judged
         known = (stored(f"robust_{name}") for name in ("placement", "programs"))
         return Finding(holds(*known), ": stored rows")
     tables = {"robust_placement": table, "robust_programs": programs, "robust_judged": beside}

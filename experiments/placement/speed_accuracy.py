@@ -16,16 +16,11 @@ steps than the loop; beside it every way is judged by its worst step over the be
 (`experiments.placement.parts.worst_ratios`). There is no randomness.
 
 Inputs: `arch25`, and arches of its shape with 7 to 49 bricks. Command: ``python -m
-experiments.placement.speed_accuracy [--quick] [--fresh]``. Writes ``experiments/results/runs.csv``,
-``worst_ratios.csv``, ``speed_accuracy.csv``, and in ``docs/figures`` ``speed_accuracy.png``,
-``worst_step.png`` and ``profiles.png``.
+experiments.placement.speed_accuracy [--quick] [--fresh]``.
 """
-
-from __future__ import annotations
 
 import platform
 import subprocess
-from collections.abc import Iterable
 from importlib.metadata import version
 from itertools import product
 from pathlib import Path
@@ -36,12 +31,7 @@ import pandas as pd
 from experiments.harness.claim import Claim, Finding, Option, Options, Times, on_this_run, told
 from experiments.harness.results import RESULTS, apart, drawn
 from experiments.harness.runs import NO_PROOF, REFERENCE, contenders
-from experiments.placement.parts.speed_charts import (
-    headline,
-    profile_charts,
-    shifted_mean,
-    worst_step_chart,
-)
+from experiments.placement.parts import speed_charts as charts
 from experiments.placement.parts.worst_ratios import WAYS
 from seqopt.study.published import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
 
@@ -56,7 +46,6 @@ Spec = tuple[str, str, str, int]  # scene, engine, criterion, repeats
 
 
 def specs(*, quick: bool) -> list[Spec]:
-    """Return what is run."""
     if quick:
         return [("chain7", engine, "weighted-published", 1) for engine in (REFERENCE, "frame 1e7")]
     small, large = ("chain7", "chain13", "chain19", "arch25"), ("chain37", "chain49")
@@ -71,7 +60,6 @@ def specs(*, quick: bool) -> list[Spec]:
 
 
 def machine() -> str:
-    """Return what the times were measured on."""
     info = Path("/proc/cpuinfo")
     lines = info.read_text(encoding="utf-8").splitlines() if info.exists() else []
     model = next((line.split(": ")[1] for line in lines if line.startswith("model name")), "")
@@ -79,46 +67,31 @@ def machine() -> str:
 
 
 def measure(spec: Spec, limit: float = LIMIT) -> list[dict[str, object]]:
-    """Return the rows of one process, or rows that are charged its limit."""
     scene, engine, criterion, repeats = spec
     try:
         rows = apart("experiments.harness.runs", *spec, limit=limit)
     except subprocess.SubprocessError as error:
         status = "time limit" if isinstance(error, subprocess.TimeoutExpired) else "failed"
-        charged = {"status": status, "total": limit, "gap": 1.0}
         base = {"scene": scene, "engine": engine, "criterion": criterion}
-        rows = [
-            base | charged | {"formulation": name, "aim": aim.value}
-            for name, aim in contenders().items()
-        ]
+        base |= {"status": status, "total": limit, "gap": 1.0}
+        rows = [base | {"formulation": n, "aim": aim.value} for n, aim in contenders().items()]
     packages = {name: version(name) for name in ("numpy", "cvxpy", "clarabel", "highspy")}
     about = {"version": version("seqopt"), "machine": machine(), "repeats": repeats} | packages
     return [row | about for row in rows]
 
 
-def ratios_of(ways: Iterable[str]) -> pd.DataFrame:
-    """Return a row for every way to a plan of the reference arch, loop and free schedule."""
-    module = "experiments.placement.parts.worst_ratios"
-    rows = [apart(module, way, limit=LIMIT) for way in ways]
-    return pd.DataFrame(rows).assign(version=version("seqopt"))
-
-
 def free_pays(ratios: pd.DataFrame) -> dict[str, bool]:
-    """Return what is claimed of the free schedule, and whether the rows bear it out."""
     table = ratios.set_index("way")
     free, loop = table.loc["free, 3 robots"], table.loc["loop, worst ratio"]
+    soon = bool(free["seconds"] <= 20 * loop["seconds"])
+    better = bool(free["worst_ratio"] <= 0.75 * loop["worst_ratio"])
     return {
-        "the free schedule takes at most twenty times as long as the loop": bool(
-            free["seconds"] <= 20 * loop["seconds"]
-        ),
-        "its worst step lies at least a quarter below the loop's": bool(
-            free["worst_ratio"] <= 0.75 * loop["worst_ratio"]
-        ),
+        "the free schedule takes at most twenty times as long as the loop": soon,
+        "its worst step lies at least a quarter below the loop's": better,
     }
 
 
 def collect(wanted: list[Spec], stored: pd.DataFrame, store: Path | None = None) -> pd.DataFrame:
-    """Return the stored rows with those of the runs that are missing, stored as they come."""
     have = {tuple(key) for key in stored[KEY].to_numpy()} if len(stored) else set()
     for spec in wanted:
         if (*spec[:3], version("seqopt")) in have:
@@ -136,41 +109,36 @@ def summarize(runs: pd.DataFrame) -> pd.DataFrame:
     own = runs[runs["engine"] == REFERENCE]
     rows = []
     for name, table in own.groupby("formulation", sort=False):
+        optimal = int((table["status"] == "optimal").sum())
         choose = table[["compile", "solve"]].sum(axis=1)
-        rows.append(
-            {
-                "formulation": name,
-                "runs": len(table),
-                "optimal": int((table["status"] == "optimal").sum()),
-                "total_s": shifted_mean(table["total"].to_numpy(), SHIFT),
-                "choose_s": shifted_mean(choose.to_numpy(), SHIFT),
-                "models": shifted_mean(table["models"].to_numpy(), 1.0),
-                "mean_gap_pct": 100 * table["gap"].mean(),
-                "largest_gap_pct": 100 * table["gap"].max(),
-            }
-        )
+        row = {"formulation": name, "runs": len(table), "optimal": optimal}
+        row |= {"total_s": charts.shifted_mean(table["total"].to_numpy(), SHIFT)}
+        row |= {"choose_s": charts.shifted_mean(choose.to_numpy(), SHIFT)}
+        row |= {"models": charts.shifted_mean(table["models"].to_numpy(), 1.0)}
+        row |= {"mean_gap_pct": 100 * table["gap"].mean()}
+        rows.append(row | {"largest_gap_pct": 100 * table["gap"].max()})
     return pd.DataFrame(rows)
 
 
 def holds(runs: pd.DataFrame) -> dict[str, bool]:
-    """Return the parts of the claim and whether the rows bear them out."""
-    sums = runs[runs["aim"] == "sum"]
     keys = ["scene", "criterion"]
-    proven = sums[(sums["engine"] == REFERENCE) & (sums["formulation"] != NO_PROOF)]
-    soonest = proven.groupby(keys)["total"].min()
-    anywhere = sums[sums["formulation"] != NO_PROOF].groupby(keys)["total"].min()
-    gap = _of(sums, REFERENCE, "overlap_dp", "gap")
-    corner, unproven = (_of(sums, REFERENCE, name) for name in ("overlap_dp", NO_PROOF))
-    frame, frame_unproven = (_of(sums, "frame 1e7", name) for name in ("overlap_dp", NO_PROOF))
+    sums = runs[runs["aim"] == "sum"].set_index(["engine", "formulation", *keys]).sort_index()
+    proven = sums[sums.index.get_level_values("formulation") != NO_PROOF]["total"]
+    soonest = proven[REFERENCE].groupby(level=keys).min()
+    anywhere = proven.groupby(level=keys).min()
+    ways = product((REFERENCE, "frame 1e7"), ("overlap_dp", NO_PROOF))
+    corner, unproven, frame, frame_unproven = (sums.loc[way, "total"] for way in ways)
     parts = {
-        "dynamic programming has no gap": (gap <= 1e-9).all(),
+        "dynamic programming has no gap": (
+            sums.loc[(REFERENCE, "overlap_dp"), "gap"] <= 1e-9
+        ).all(),
         "nothing proves its plan sooner by more than a tenth": (corner <= 1.1 * soonest).all(),
         "no other engine does by more than a fifth": (corner <= 1.2 * anywhere).all(),
         "the frame takes at least five times as long everywhere": (
             (frame / corner).dropna() >= 5
         ).all(),
     }
-    if (sums["scene"] == "arch25").any():
+    if "arch25" in soonest.index:
         parts |= {
             "the frame takes at least fifty times as long": _arch25(frame / corner) >= 50,
             "rigid bricks spend half of their time or less on the proof": (
@@ -183,12 +151,6 @@ def holds(runs: pd.DataFrame) -> dict[str, bool]:
     return {text: bool(true) for text, true in parts.items()}
 
 
-def _of(sums: pd.DataFrame, engine: str, name: str, column: str = "total") -> pd.Series:
-    """Return a column of an engine with a formulation, by scene and criterion."""
-    own = sums[(sums["engine"] == engine) & (sums["formulation"] == name)]
-    return own.set_index(["scene", "criterion"])[column].sort_index()
-
-
 def _arch25(ratios: pd.Series) -> float:
     """Return the ratio on the reference arch under equations 2 and 3."""
     return float(ratios["arch25", "equations-2-3"])
@@ -196,18 +158,20 @@ def _arch25(ratios: pd.Series) -> float:
 
 def experiment(options: Options) -> Finding:
     load = STORE.exists() and not options.quick and not options.fresh
-    wanted = specs(quick=options.quick)
     RESULTS.mkdir(exist_ok=True)
     stored = pd.read_csv(STORE) if load else pd.DataFrame()
-    runs = collect(wanted, stored, None if options.quick else STORE)
+    runs = collect(specs(quick=options.quick), stored, None if options.quick else STORE)
     table = summarize(runs)
     print(table.to_string(index=False, float_format="%.4g"))
     ratios = pd.read_csv(RATIOS) if load and RATIOS.exists() else pd.DataFrame()
     if not len(ratios) or set(ratios["version"]) != {version("seqopt")}:
-        ratios = ratios_of(QUICK_WAYS if options.quick else WAYS)
+        module = "experiments.placement.parts.worst_ratios"
+        ways = QUICK_WAYS if options.quick else WAYS
+        ratios = pd.DataFrame(apart(module, way, limit=LIMIT) for way in ways)
+        ratios = ratios.assign(version=version("seqopt"))
     print(ratios.to_string(index=False, float_format="%.4g"))
-    parts = holds(runs) | free_pays(ratios)
-    return on_this_run(holds=told(parts), speed_accuracy=table, worst_ratios=ratios)
+    good = told(holds(runs) | free_pays(ratios))
+    return on_this_run(holds=good, speed_accuracy=table, worst_ratios=ratios)
 
 
 CLAIM = Claim(
@@ -216,9 +180,9 @@ CLAIM = Claim(
     quick="one small arch, nothing written",
     times=Times.JUDGED,
     pictures={
-        "speed_accuracy.png": drawn(headline, "runs"),
-        "worst_step.png": drawn(worst_step_chart, "runs", "worst_ratios"),
-        "profiles.png": drawn(profile_charts, "runs"),
+        "speed_accuracy.png": drawn(charts.headline, "runs"),
+        "worst_step.png": drawn(charts.worst_step_chart, "runs", "worst_ratios"),
+        "profiles.png": drawn(charts.profile_charts, "runs"),
     },
     options=(Option("--fresh", "repeat runs that are stored"),),
 )

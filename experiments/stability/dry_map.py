@@ -5,32 +5,20 @@ line to either side as those of `arch25` do, of three thicknesses, with four coe
 friction, are built without mortar by two, three and four mobile robots. Every robot may place, hold
 or let go at any time, and the finished arch is released; every state must be proven to stand, with
 no robot beyond its payload, neither there nor between springs. The least payload with which a
-schedule exists is found to a tenth, over the weight of the arch; up to four times that weight is
-tried.
-
-The claim holds if no arch needs more payload with a robot or with friction added, beyond the tenth,
-and some are built by three robots and not by two.
-
-What it does not show: other lines of an arch, other orders of its bricks, reach. Bricks are placed
-from one end; a state that is not proven to stand counts as one that falls.
+schedule exists is found to a tenth, up to four times the weight of the arch. Some must be built by
+three robots and not by two. Not shown: other lines of an arch, other orders of its bricks, reach.
 
 Claim: all 19,601 grip sets of a dry `arch25` are decided, a twentieth solved; two robots fail.
 
 Method, ``grips``: every set of two or three nodes that holds the newest of 2 to 25 bricks (the
 first one is held alone) is screened as rigid bricks laid dry (friction 25 degrees, the robots'
-payloads): does it stand? A linear program is solved where nothing known decides it. A random sample
-of every brick count is put to the certificate by cone programs. The same is asked with a bond of 3
-kPa, and dry with a tilt of 3 degrees. Then robots build with hands free: any of them may hold or
-release any node, one at a time, as long as every state stands; two of them are compared with three.
-A state that is not proven to fall counts as standing for two, and one not proven to stand as
-falling for three, so that either answer is proven.
-
-The claim holds if no set stays open, the certificate contradicts none of the sample, at most one
-program in twenty sets is solved for the dry arch, two robots end before the last brick, and three
-place it.
-
-Reach is left out of the build, so that what two robots cannot do no two robots can; what three can
-do needs reach. The three robots of the scene are a matter of the free schedule.
+payloads): does it stand? A linear program is solved where nothing known decides it, and the
+certificate, by cone programs, must contradict none of a random sample of every brick count. The
+same is asked with a bond of 3 kPa, and dry with a tilt of 3 degrees. Then robots build with hands
+free: any of them may hold or release any node, one at a time, as long as every state stands. A
+state that is not proven to fall counts as standing for two robots, who must end before the last
+brick, and one not proven to stand as falling for three, who must place it. Reach is left out, so
+that what two robots cannot do no two robots can; what three can do needs reach.
 
 Claim: without bond the sequential and the cantilever method fail; larger arches need more bond.
 
@@ -46,12 +34,8 @@ steps with cantilevered bricks stand by bond alone, and it needs more bond than 
 method; (3) the three-robot plan needs less bond than both. One arch, and arches of its shape.
 
 Inputs: generated arches, the shipped scene and plan. Command: ``python -m
-experiments.stability.dry_map [--quick] [--only PART]``. Writes ``dry_map.csv``, ``dry_grips.csv``,
-``dry_grips_build.csv``, ``failing_steps.csv`` and ``failing_scale.csv`` to ``experiments/results``
-and ``dry_map.png``, ``dry_grips.png`` and ``failing_steps.png`` to ``docs/figures``.
+experiments.stability.dry_map [--quick] [--only PART]``.
 """
-
-from __future__ import annotations
 
 import time
 from itertools import combinations, product
@@ -59,34 +43,23 @@ from itertools import combinations, product
 import numpy as np
 import pandas as pd
 
-from experiments.harness.claim import ONLY, Claim, Finding, Options, Times, together, told
+from experiments.harness.claim import Claim, Finding, Options, Times, told
 from experiments.harness.results import drawn
-from experiments.stability.parts.dry_charts import SIZES, failing_chart, grips_chart, map_chart
-from experiments.stability.parts.dry_models import (
-    CLOSE,
-    Cell,
-    Plans,
-    growth,
-    least_payload,
-    reached,
-)
+from experiments.harness.scenes import arch25, method_steps
+from experiments.stability.parts import dry_charts as charts
+from experiments.stability.parts.dry_models import CLOSE, growth, least_payload, reached
 from formulations.contact.limit_analysis import compile_equilibrium
+from seqopt import Step
 from seqopt.arrays import Ints
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar, bond_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.network.build import build_network
 from seqopt.network.network import GROUND, Network
-from seqopt.plan.solving import pose, solve
 from seqopt.responses.table import analyze, force_column
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.steps import Step
-from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability._prover import Prover
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen
 from seqopt.stability.assessment import Verdict, _verdict_of, assess_steps, bonded, stability_table
-from seqopt.study.published import EQUATIONS, published_plan
 
 BRICKS, THICKNESSES = (7, 10, 13, 16), (0.03, 0.053, 0.116)  # m
 FRICTIONS, ROBOTS = (0.2, 0.3, 0.466, 0.8), (2, 3, 4)
@@ -104,22 +77,14 @@ def never_more(table: pd.DataFrame, added: str) -> bool:
 
 
 def map_holds(table: pd.DataFrame) -> bool:
-    """Return whether robots and friction never hurt, and three robots do what two cannot."""
-    built = table.assign(built=np.isfinite(table["least_payload"]))
-    two, three = (
-        built[built["robots"] == count].set_index(["bricks", "thickness_m", "friction"])["built"]
-        for count in (2, 3)
-    )
-    return bool(
-        never_more(table, "robots") and never_more(table, "friction") and (three & ~two).any()
-    )
+    least = table.pivot_table("least_payload", ["bricks", "thickness_m", "friction"], "robots")
+    gained = (np.isfinite(least[3]) & ~np.isfinite(least[2])).any()
+    return bool(gained and never_more(table, "robots") and never_more(table, "friction"))
 
 
 def arches(options: Options) -> Finding:
-    cells: list[Cell] = list(
-        product(*(QUICK if options.quick else (BRICKS, THICKNESSES, FRICTIONS, ROBOTS)))
-    )
-    table = pd.DataFrame(map(least_payload, cells))
+    sizes = QUICK if options.quick else (BRICKS, THICKNESSES, FRICTIONS, ROBOTS)
+    table = pd.DataFrame(map(least_payload, product(*sizes)))
     print(table.to_string(index=False, float_format="%.3g"))
     found = np.isfinite(table["least_payload"]).groupby(table["robots"]).sum()
     built = ", ".join(f"{count} by {robots}" for robots, count in found.items())
@@ -138,14 +103,8 @@ def grip_sets(bricks: int) -> Ints:
     newest, places = {2 * bricks - 1, 2 * bricks}, range(2, 2 * bricks + 1)
     if bricks == 1:
         return np.array([[2, 0, 0]])
-    return np.array(
-        [
-            held + (0,) * (3 - count)
-            for count in (2, 3)
-            for held in combinations(places, count)
-            if newest & set(held)
-        ]
-    )
+    sets = [held for count in (2, 3) for held in combinations(places, count) if newest & {*held}]
+    return np.array([held + (0,) * (3 - len(held)) for held in sets])
 
 
 def contradictions(network: Network, bricks: int, sets: Ints, found: Ints, mortar: Mortar) -> int:
@@ -163,32 +122,22 @@ def contradictions(network: Network, bricks: int, sets: Ints, found: Ints, morta
 
 
 def screened(network: Network, case: tuple[str, Mortar, float], counts: range) -> pd.DataFrame:
-    """Return a row per brick count."""
     name, mortar, tilt = case
     screen, rows = Screen(network, mortar, np.radians(tilt)), []
     for bricks in counts:
         sets, before, start = grip_sets(bricks), screen.solved, time.process_time()
         found = screen.stands(bricks, sets)
         seconds = time.process_time() - start
-        rows.append(
-            {
-                "case": name,
-                "bricks": bricks,
-                "sets": len(sets),
-                "solved": screen.solved - before,
-                "stand": int((found == STANDS).sum()),
-                "fall": int((found == FALLS).sum()),
-                "open": int((found == OPEN).sum()),
-                "seconds": seconds,
-                "sample": 0 if tilt else min(SAMPLE, len(sets)),
-                "contradicted": 0 if tilt else contradictions(network, bricks, sets, found, mortar),
-            }
-        )
+        wrong = 0 if tilt else contradictions(network, bricks, sets, found, mortar)
+        row = {"case": name, "bricks": bricks, "sets": len(sets), "solved": screen.solved - before}
+        row |= {"stand": int((found == STANDS).sum()), "fall": int((found == FALLS).sum())}
+        row |= {"open": int((found == OPEN).sum()), "seconds": seconds}
+        row |= {"sample": 0 if tilt else min(SAMPLE, len(sets)), "contradicted": wrong}
+        rows.append(row)
     return pd.DataFrame(rows)
 
 
 def built_by(network: Network, robots: int, *, proven: bool) -> dict[str, object]:
-    """Return a row on what robots that reach everything can built_by dry."""
     screen, start = Screen(network, DRY), time.process_time()
     placed = reached(screen, robots, proven=proven)
     seconds = time.process_time() - start
@@ -208,7 +157,7 @@ def grips_hold(table: pd.DataFrame, built: pd.DataFrame) -> bool:
 
 
 def grips(options: Options) -> Finding:
-    network = build_network(load_scene("arch25"))
+    network = arch25().network
     counts = range(1, len(network.inner) + 1)
     cases = CASES[:1] if options.quick else CASES
     table = pd.concat([screened(network, case, counts) for case in cases], ignore_index=True)
@@ -219,21 +168,9 @@ def grips(options: Options) -> Finding:
     return Finding(grips_hold(table, built), tables={"dry_grips": table, "dry_grips_build": built})
 
 
+FEW = (*METHODS, "three-robot, published")
+EVERY = (*METHODS, "modified sequential", *[*charts.NAMES][2:], "three-robot, minimax")
 TWISTING = (9, 11, 21, 23, 33, 35, 45, 47)  # table 4 of the paper
-SCALED = ("sequential", "cantilever", "three-robot, published", "three-robot, optimized")
-
-
-def plans(engine: ComplianceEngine) -> Plans:
-    """Return the steps of every method of the reference arch."""
-    net = engine.network
-    out = {name: method(net) for name, method in METHODS.items()}
-    modified = pose(engine, modified_sequential(net), EQUATIONS)
-    out["modified sequential"] = solve(modified, "cascade").steps
-    out["three-robot, published"] = published_plan(net.scene)
-    loop = pose(engine, three_robot_loop(net), EQUATIONS)
-    out["three-robot, optimized"] = solve(loop, "overlap_dp").steps
-    out["three-robot, minimax"] = solve(loop, "minimax").steps
-    return out
 
 
 def cantilevered(net: Network, step: Step) -> int:
@@ -244,83 +181,71 @@ def cantilevered(net: Network, step: Step) -> int:
     return step.bricks - max([standing, *(block[node] for node in step.held)])
 
 
+COLUMNS = [
+    "method", "step", "type", "bricks", "cantilevered", "bond_needed_Pa", "dry",
+    "dry_friction_needed", "dry_tilt_deg", "dry_grip_N", "first_brick", "first_joint", "epoxy",
+    "epoxy_tilt_deg", "epoxy_grip_N", "F_largest_N", "M_sup_Nm", "D_max_1e-3mm", "unproven",
+]  # fmt: skip
+ENDS = {
+    "verdict": "",
+    "friction_needed": "_friction_needed",
+    "tilt_survived_deg": "_tilt_deg",
+    "largest_grip_force_N": "_grip_N",
+}  # of the names of columns, after the mortar's
+
+
 def tabulate(engine: ComplianceEngine, name: str, steps: tuple[Step, ...]) -> pd.DataFrame:
     """Return margins and elastic responses of every step."""
     net = engine.network
     table = analyze(engine, steps)
     robots = [force_column(robot) for robot in net.scene.robots]
     largest = table[robots].abs().max(axis=1).fillna(0.0)
-    dry = stability_table(steps, assess_steps(net, steps, DRY))
-    bound = stability_table(steps, assess_steps(net, steps, EPOXY))
-    return pd.DataFrame(
-        {
-            "method": name,
-            "step": dry["step"],
-            "type": dry["type"],
-            "bricks": dry["bricks"],
-            "cantilevered": [cantilevered(net, step) for step in steps],
-            "bond_needed_Pa": dry["bond_needed_Pa"],
-            "dry": dry["verdict"],
-            "dry_friction_needed": dry["friction_needed"],
-            "dry_tilt_deg": dry["tilt_survived_deg"],
-            "dry_grip_N": dry["largest_grip_force_N"],
-            "first_brick": dry["first_brick"],
-            "first_joint": dry["first_joint"],
-            "epoxy": bound["verdict"],
-            "epoxy_tilt_deg": bound["tilt_survived_deg"],
-            "epoxy_grip_N": bound["largest_grip_force_N"],
-            "F_largest_N": largest,
-            "M_sup_Nm": table["M_sup_Nm"],
-            "D_max_1e-3mm": table["D_max_1e-3mm"],
-            "unproven": dry["unproven"] + bound["unproven"],
-        }
-    )
+    dry, bound = (stability_table(steps, assess_steps(net, steps, m)) for m in (DRY, EPOXY))
+    own = {name: f"dry{end}" for name, end in ENDS.items()}
+    other = {name: f"epoxy{end}" for name, end in ENDS.items()}
+    out = dry.rename(columns=own).join(bound[[*ENDS]].rename(columns=other))
+    out = out.join(table[["M_sup_Nm", "D_max_1e-3mm"]]).assign(method=name, F_largest_N=largest)
+    out["cantilevered"] = [cantilevered(net, step) for step in steps]
+    out["unproven"] = dry["unproven"] + bound["unproven"]
+    return out[COLUMNS]
 
 
 def methods_hold(steps: pd.DataFrame, scale: pd.DataFrame) -> dict[str, bool]:
-    """Return the parts of the claim and whether the tables bear them out."""
     worst = steps.groupby("method")["bond_needed_Pa"].max()
     falls = steps[steps["dry"] != "stands"]
-    twisting = falls[falls["method"] == "sequential"]["step"]
+    fell = {*falls[falls["method"] == "sequential"]["step"]}
     hanging = steps[(steps["method"] == "cantilever") & (steps["cantilevered"] > 0)]
     grows = scale[scale["method"].isin(METHODS)].pivot_table(
         values="bond_needed_Pa", index=["scaling", "method"], columns="times"
     )
-    published = worst["three-robot, published"]
-    return {
-        "every step is decided, and stands with the paper's epoxy": bool(
-            (steps["epoxy"] == "stands").all() and (steps["unproven"] == 0).all()
-        ),
-        "without bond the sequential method falls at every twisting step": set(TWISTING)
-        <= set(twisting),
+    published, cantilever, sequential = (
+        worst[name] for name in ("three-robot, published", "cantilever", "sequential")
+    )
+    decided = (steps["epoxy"] == "stands").all() and (steps["unproven"] == 0).all()
+    parts = {
+        "every step is decided, and stands with the paper's epoxy": decided,
+        "without bond the sequential method falls at every twisting step": {*TWISTING} <= fell,
         "the cantilever method has steps that stand by bond alone, all with cantilevered bricks "
-        "among them": bool((hanging["dry"] != "stands").all()),
-        "it needs more bond than the sequential method": bool(
-            worst["cantilever"] > worst["sequential"]
-        ),
-        "the published plan needs less than both": bool(
-            published < min(worst["cantilever"], worst["sequential"])
-        ),
-        "the bond both need grows with every scaling": bool(
+        "among them": (hanging["dry"] != "stands").all(),
+        "it needs more bond than the sequential method": cantilever > sequential,
+        "the published plan needs less than both": published < min(cantilever, sequential),
+        "the bond both need grows with every scaling": (
             (grows.diff(axis=1).iloc[:, 1:] > 0).all(axis=None)
         ),
     }
+    return {text: bool(true) for text, true in parts.items()}
 
 
 def methods(options: Options) -> Finding:
-    quick: bool = options.quick
-    scene = load_scene("arch25")
-    engine = ComplianceEngine(build_network(scene))
-    made = plans(engine)
-    if quick:
-        made = {name: made[name] for name in (*METHODS, "three-robot, published")}
-        made = {
-            name: tuple(step for step in steps if step.bricks in (5, 6, 11, 12, 17, 18, 23, 24))
-            for name, steps in made.items()
-        }
+    engine = arch25()
+    made = method_steps(engine, FEW if options.quick else EVERY)
+    if options.quick:
+        late = (5, 6, 11, 12, 17, 18, 23, 24)
+        made = {n: tuple(step for step in m if step.bricks in late) for n, m in made.items()}
     steps = pd.concat([tabulate(engine, name, part) for name, part in made.items()])
-    fixed = {name: made[name] for name in SCALED if name in made}
-    scale = pd.DataFrame(growth(scene, fixed, SIZES[: 1 if quick else None]))
+    fixed = {name: made[name] for name in charts.NAMES if name in made}
+    sizes = charts.SIZES[: 1 if options.quick else None]
+    scale = pd.DataFrame(growth(engine.network.scene, fixed, sizes))
     for name, table in steps.groupby("method", sort=False):
         falls = table[table["dry"] != "stands"]
         numbers = ", ".join(map(str, falls["step"]))
@@ -330,26 +255,16 @@ def methods(options: Options) -> Finding:
     return Finding(told(methods_hold(steps, scale)), tables=tables)
 
 
-def experiment(options: Options) -> Finding:
-    return together(options, arches=arches, grips=grips, methods=methods)
-
-
 CLAIM = Claim(
-    experiment,
+    {"arches": arches, "grips": grips, "methods": methods},
     quick="two small arches; all grip sets dry and upright; late steps; nothing written",
     times=Times.SHOWN,
-    options=(ONLY,),
-    digits={
-        "dry_map": 4,
-        "dry_grips": 3,
-        "dry_grips_build": 3,
-        "failing_steps": 5,
-        "failing_scale": 5,
-    },
+    digits={"dry_map": 4, "dry_grips": 3, "dry_grips_build": 3}
+    | dict.fromkeys(("failing_steps", "failing_scale"), 5),
     pictures={
-        "dry_map.png": drawn(map_chart, "dry_map"),
-        "dry_grips.png": drawn(grips_chart, "dry_grips"),
-        "failing_steps.png": drawn(failing_chart, "failing_steps", "failing_scale"),
+        "dry_map.png": drawn(charts.map_chart, "dry_map"),
+        "dry_grips.png": drawn(charts.grips_chart, "dry_grips"),
+        "failing_steps.png": drawn(charts.failing_chart, "failing_steps", "failing_scale"),
     },
 )
 

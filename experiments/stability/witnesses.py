@@ -27,18 +27,13 @@ Differences, and who is right:
   them up exist, which is all that we and RBE ask; but nothing builds them up: they fall in LMGC90
   and CRA rejects them. "Stands" means that forces exist, not that they will arise.
 
-Why RBE's tension alone does not do: curve-3-blocks with friction 0.05 lacks a little bond, and less
-tension is left there (7e-5) than in the shelves (2e-4), which stand by RBE's own constraints.
-
-CRA fails on the shelves too, and decides one and the same arch, like two of the samples, by its
-density alone, which scales every force alike; it is a local search with absolute tolerances.
+RBE's tension alone does not do: less is left in curve-3-blocks with friction 0.05, which lacks a
+little bond, than in the shelves, which stand by RBE's own constraints. CRA fails on the shelves
+too, and decides one arch by its density alone, which scales every force alike.
 
 Inputs: compas_cra, ``pip install "seqopt[witness]"``; LMGC90 (compas_lmgc90) in this or another
-Python. Command: ``python -m experiments.stability.witnesses [--quick] [--lmgc90 PYTHON]``. Writes
-``experiments/results/witnesses.csv`` and ``docs/figures/witnesses.png``.
+Python. Command: ``python -m experiments.stability.witnesses [--quick] [--lmgc90 PYTHON]``.
 """
-
-from __future__ import annotations
 
 import sys
 import time
@@ -49,15 +44,10 @@ import pandas as pd
 
 from experiments.harness.claim import Claim, Extra, Finding, Option, Options, Times, none_of
 from experiments.harness.lmgc90 import python_with_lmgc90
+from experiments.stability.parts import witness_cra
 from experiments.stability.parts.blocks import ring, stack
 from experiments.stability.parts.witness_chart import LARGEST, differing, picture, words
-from experiments.stability.parts.witness_cra import (
-    SAMPLES,
-    coupled,
-    force_only,
-    sample_scene,
-    without_tension,
-)
+from experiments.stability.parts.witness_cra import SAMPLES, force_only, sample_scene
 from experiments.stability.parts.witness_lmgc90 import moved_by
 from experiments.stability.parts.witness_scenes import Scene, arch, incline, scene_of
 from seqopt.contact.mortar import Mortar
@@ -76,14 +66,9 @@ KNOWN = {
 ASIDE = {  # samples again, with less friction
     LARGEST: (0.2, 0.1),
     "bridge": (0.1, 0.05),
-    "shelf": (0.4,),
-    "shelf-s1": (0.4,),
-    "shelf-s2": (0.4,),
-    "shelf-s3": (0.4,),
+    **dict.fromkeys(("shelf", "shelf-s1", "shelf-s2", "shelf-s3", "A", "snake"), (0.4,)),
     "shelf-stable": (0.4, 0.2),
-    "A": (0.4,),
     "H": (0.0,),
-    "snake": (0.4,),
     "curve-3-blocks": (0.1, 0.05),
 }
 AT_ONE = ("shelf-stable", "snake")  # samples again, not scaled to weigh 1
@@ -111,8 +96,7 @@ def sample_trials(names: list[str]) -> list[Trial]:
         scene, friction = sample_scene(name), SAMPLES[name].friction
         out.append(Trial("sample", name, scene, friction, coupled=name != LARGEST))
         if name in AT_ONE:
-            trial = Trial("sample", f"{name}, density 1", scene, friction, 1.0, coupled=True)
-            out.append(trial)
+            out.append(Trial("sample", f"{name}, density 1", scene, friction, 1.0, coupled=True))
         for less in ASIDE.get(name, ()):
             out.append(Trial("sample", f"{name}, friction {less:g}", scene, less))
     return out
@@ -126,7 +110,6 @@ def without_a_support(name: str) -> Trial:
 
 
 def built_trials() -> list[Trial]:
-    """Return the stacks, inclines and arches."""
     out = []
     for offsets in STACKS:
         name = f"stack {', '.join(f'{x:g}' for x in offsets)}"
@@ -136,65 +119,44 @@ def built_trials() -> list[Trial]:
     return out + [Trial("arch", f"arch t/R {x:g}", arch(x), 0.8) for x in ARCHES]
 
 
-def density_trials() -> list[Trial]:
-    """Return 25 blocks of thickness 1 on a span of 10, the outer two fixed, at all densities."""
-    scene = scene_of(ring(25, 5.5, 1.0), {0, 24})
-    return [Trial("density", f"25 at {x:g}", scene, 0.84, x, coupled=True) for x in DENSITIES]
-
-
 def ours(trial: Trial) -> tuple[Verdict, float]:
     """Return our verdict and the bond that is lacking, over the heaviest weight per mean face."""
     assembly = trial.scene.assembly(trial.density or 1.0)
-    prove = Prover(assembly, compile_equilibrium)
-    stand = prove(bonded(assembly, Mortar(friction=trial.friction)))
+    stand = Prover(assembly, compile_equilibrium)(bonded(assembly, Mortar(friction=trial.friction)))
     return _verdict_of(stand), stand.value
+
+
+def timed(trial: Trial) -> tuple[tuple[Verdict, float], float]:
+    start = time.perf_counter()
+    return ours(trial), time.perf_counter() - start
 
 
 def row_of(trial: Trial, python: str | None, *, aside: bool) -> dict[str, object]:
     """Return what all say about a trial; aside, CRA is asked as well."""
-    start = time.perf_counter()
-    verdict, lacking = ours(trial)
-    seconds = time.perf_counter() - start
+    (verdict, lacking), seconds = timed(trial)
     word = force_only(trial.scene, trial.friction, trial.density)
     undecided = word.verdict is Verdict.UNDECIDED
     convex = trial.density is None and all(solid.convex for solid in trial.scene.solids)
-    exact = without_tension(trial.scene, trial.friction).value if undecided else ""
-    cra = aside and trial.coupled
-    return {
-        "group": trial.group,
-        "case": trial.name,
-        "blocks": len(trial.scene.solids),
-        "contacts": len(trial.scene.touches),
-        "friction": trial.friction,
-        "density": trial.density or np.nan,
-        "ours": verdict.value,
-        "lacking_bond": lacking,
-        "seconds": seconds,
-        "rbe": word.verdict.value,
-        "tension": word.tension,
-        "rbe_seconds": word.seconds,
-        "no_tension": exact,
-        "cra": coupled(trial.scene, trial.friction, trial.density) if cra else "",
-        "lmgc90": moved_by(python, trial.scene, trial.friction) if python and convex else "",
-    }
+    exact = witness_cra.without_tension(trial.scene, trial.friction).value if undecided else ""
+    asked = trial.scene, trial.friction, trial.density
+    cra = witness_cra.coupled(*asked) if aside and trial.coupled else ""
+    row = {"group": trial.group, "case": trial.name, "blocks": len(trial.scene.solids)}
+    row |= {"contacts": len(trial.scene.touches), "friction": trial.friction}
+    row |= {"density": trial.density or np.nan, "ours": verdict.value, "lacking_bond": lacking}
+    row |= {"seconds": seconds, "rbe": word.verdict.value, "tension": word.tension}
+    row |= {"rbe_seconds": word.seconds, "no_tension": exact, "cra": cra}
+    return row | {"lmgc90": moved_by(python, *asked[:2]) if python and convex else ""}
 
 
 def race(trials: list[Trial], rounds: int) -> pd.DataFrame:
     """Return median times (s) of us and RBE, who take turns, and their ratio."""
     rows = []
     for trial in trials:
-        runs = [
-            (_timed(trial), force_only(trial.scene, trial.friction).seconds) for _ in range(rounds)
-        ]
+        asked = trial.scene, trial.friction
+        runs = [(timed(trial)[1], force_only(*asked).seconds) for _ in range(rounds)]
         a, b = np.median(runs, axis=0)
         rows.append({"case": trial.name, "seconds": a, "rbe_seconds": b, "ratio": b / a})
     return pd.DataFrame(rows)
-
-
-def _timed(trial: Trial) -> float:
-    start = time.perf_counter()
-    ours(trial)
-    return time.perf_counter() - start
 
 
 def faults(table: pd.DataFrame, witnesses: list[str], ratio: float | None) -> list[str]:
@@ -223,11 +185,12 @@ def report(table: pd.DataFrame, witnesses: list[str]) -> None:
     print(f"undecided by us: {(table['ours'] == OPEN).sum()} of {len(table)}")
     for witness in witnesses:
         word = words(table, witness)
-        asked = int((table[witness] != "").sum())
-        open_ = int((table[witness] == OPEN).sum())
-        agree = int((word == table["ours"]).sum())
         differs = sorted(case for case, _ in differing(table, witness))
-        print(f"{witness}: asked {asked}, undecided {open_}, agree {agree}, differ {len(differs)}")
+        print(
+            f"{witness}: asked {(table[witness] != '').sum()}, undecided "
+            f"{(table[witness] == OPEN).sum()}, agree {(word == table['ours']).sum()}, "
+            f"differ {len(differs)}"
+        )
         for case in differs:
             print(f"  {case}: {KNOWN.get((case, witness), 'unexplained')}")
     settled = table[table["rbe"] == OPEN]
@@ -235,26 +198,27 @@ def report(table: pd.DataFrame, witnesses: list[str]) -> None:
 
 
 def trials(*, quick: bool) -> list[Trial]:
+    samples, freed = [*SAMPLES], [without_a_support("bridge")]
     if quick:
-        return [
-            *sample_trials(["bridge", "cubes", "A", "curve-3-blocks"]),
-            without_a_support("bridge"),
-            *built_trials(),
-        ]
-    freed = [without_a_support("bridge"), without_a_support("A")]
-    return [*sample_trials(list(SAMPLES)), *freed, *built_trials(), *density_trials()]
+        samples = ["bridge", "cubes", "A", "curve-3-blocks"]
+        return [*sample_trials(samples), *freed, *built_trials()]
+    freed += [without_a_support("A")]
+    # 25 blocks of thickness 1 on a span of 10, the outer two fixed
+    ends = scene_of(ring(25, 5.5, 1.0), {0, 24})
+    dense = [Trial("density", f"25 at {x:g}", ends, 0.84, x, coupled=True) for x in DENSITIES]
+    return [*sample_trials(samples), *freed, *built_trials(), *dense]
 
 
 def experiment(options: Options) -> Finding:
-    python = None if options.quick else python_with_lmgc90(options.lmgc90)
+    quick: bool = options.quick
+    python = None if quick else python_with_lmgc90(options.lmgc90)
     witnesses = ["rbe", "lmgc90"] if python else ["rbe"]
-    all_trials = trials(quick=options.quick)
-    raced = [t for t in all_trials if t.name in (LARGEST, "bridge")]
-    times = race(raced, 3 if options.quick else 5)
-    table = pd.DataFrame([row_of(t, python, aside=not options.quick) for t in all_trials])
+    all_trials = trials(quick=quick)
+    times = race([t for t in all_trials if t.name in (LARGEST, "bridge")], 3 if quick else 5)
+    table = pd.DataFrame([row_of(t, python, aside=not quick) for t in all_trials])
     report(table, witnesses)
     print(times.to_string(index=False, float_format="%.3g"))
-    ratio = None if options.quick else times.loc[times["case"] == LARGEST, "ratio"].max()
+    ratio = None if quick else times.loc[times["case"] == LARGEST, "ratio"].max()
     found = faults(table, witnesses, ratio)
     if python:  # rows of a witness are not given up because it is not there
         return Finding(none_of(found), tables={"witnesses": table})

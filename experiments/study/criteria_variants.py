@@ -8,19 +8,14 @@ first set holds, and to what responses are rounded before they are ranked. Which
 closest was seen after all were tried on the one plan there is: it describes that plan and predicts
 nothing.
 
-A further rule was picked among 3.2 million and not cross-validated
-(`experiments.study.parts.compression`). It is reported as an observation and is no part of the
-verdict: after the crown, compression explains the published choices better than displacement. It is
-set beside itself with displacement in 32 settings.
+A further rule was picked among 3.2 million and not cross-validated. It is an observation and no
+part of the verdict: after the crown, compression explains the published choices better than
+displacement. It is set beside itself with displacement in 32 settings.
 
 Inputs: the shipped scene and plan. Command: ``python -m experiments.study.criteria_variants
-[--quick]``. Writes ``experiments/results/criteria_variants.csv``, ``criteria_compression.csv`` and
-``docs/figures/criteria_variants.png``.
+[--quick]``.
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -28,18 +23,17 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
+from experiments.harness.scenes import arch25
+from seqopt import three_robot_loop
 from seqopt.arrays import Floats
-from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import TIED, rank_choice, rank_of
-from seqopt.network.build import build_network
 from seqopt.problem.criteria import RankSum, _mean_ranks, equal
-from seqopt.report._style import BLUE, GRAY, GREEN, PURPLE, VERMILION, dress, new_figure, styled
+from seqopt.report._style import BLUE, GRAY, GREEN, PURPLE, VERMILION, dress, styled
 from seqopt.responses._choices import StepChoices
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import CLOSEST, EQUATIONS, RESOLUTION, published_choice
 
 CROWN = 13  # bricks of the arch of Bruun et al. up to its crown
@@ -53,31 +47,18 @@ ROUNDED = (1.0, 0.1, 1e-6, 2.0)  # N, N m, 1e-3 mm
 
 @dataclass(frozen=True)
 class Rule:
-    """How candidates of an optimization are ordered, the choice before it being fixed.
+    """How candidates of an optimization are ordered, the choice before it being fixed."""
 
-    Parameters
-    ----------
-    fourth : str
-        Which response stands beside tension, moment and force after the crown.
-    window : str
-        Key of `WINDOWS`: which steps count.
-    join : str
-        One of `JOINS`: how the values of several steps become one.
-    rounded : float
-        To how many N, N m or 1e-3 mm.
-    """
-
-    fourth: str = "C_max"
-    window: str = "own steps"
-    join: str = "sum of rounded"
-    rounded: float = 1.0
+    fourth: str = "C_max"  # response beside tension, moment and force after the crown
+    window: str = "own steps"  # which steps count, of `WINDOWS`
+    join: str = "sum of rounded"  # how the values of several steps become one, of `JOINS`
+    rounded: float = 1.0  # to how many N, N m or 1e-3 mm
 
 
 FOUND = Rule()  # the one that the search picked
 
 
 def rules() -> list[Rule]:
-    """Return the rules that are compared."""
     return [Rule(*parts) for parts in product(FOURTH, WINDOWS, JOINS, ROUNDED)]
 
 
@@ -91,31 +72,28 @@ def order(problem: Layers, choice: tuple[int, ...], move: int, rule: Rule) -> Fl
         steps = [{name: v[before] for name, v in _values(s).items()} for s in shared] + steps
     known = [np.isfinite(s.responses["T_max"][before]) for s in shared]
     possible = np.all([np.ones(len(steps[0]["T_max"]), dtype=bool), *known], axis=0)
-    crowned = problem.schedule.moves[move].bricks >= CROWN
-    names = (*AFTER, rule.fourth) if crowned else BEFORE
+    names = (*AFTER, rule.fourth) if problem.schedule.moves[move].bricks >= CROWN else BEFORE
     out = np.full(len(possible), np.inf)
     out[possible] = sum(_ranks([s[n][possible] for s in steps], n, rule) for n in names)
     return out
 
 
 def _values(step: StepChoices) -> dict[str, Floats]:
-    """Return the responses of a step, with the sum of all robot forces."""
     found = dict(step.responses)
-    robots = [found[f"F_rob{i}"] for i in (1, 2, 3)]
-    return found | {"F_sum": np.nansum(robots, axis=0)}
+    return found | {"F_sum": np.nansum([found[f"F_rob{i}"] for i in (1, 2, 3)], axis=0)}
 
 
 def _ranks(values: list[Floats], name: str, rule: Rule) -> Floats:
     """Return the ranks (C,) of one response over the steps of a window."""
-    size = dict(RESOLUTION)[name[0]] * rule.rounded
-    steps = np.array(values) / size
-    joined: dict[str, Callable[[], Floats]] = {
-        "sum of rounded": lambda: _mean_ranks(np.round(steps).sum(axis=0)),
-        "rounded sum": lambda: _mean_ranks(np.round(steps.sum(axis=0))),
-        "rounded largest": lambda: _mean_ranks(np.round(steps.max(axis=0))),
-        "sum of ranks": lambda: np.sum([_mean_ranks(row) for row in np.round(steps)], axis=0),
+    steps = np.array(values) / (dict(RESOLUTION)[name[0]] * rule.rounded)
+    if rule.join == "sum of ranks":
+        return np.sum([_mean_ranks(row) for row in np.round(steps)], axis=0)
+    joined = {
+        "sum of rounded": np.round(steps).sum(axis=0),
+        "rounded sum": np.round(steps.sum(axis=0)),
+        "rounded largest": np.round(steps.max(axis=0)),
     }
-    return joined[rule.join]()
+    return _mean_ranks(joined[rule.join])
 
 
 def placed(problem: Layers, rule: Rule) -> pd.DataFrame:
@@ -123,11 +101,14 @@ def placed(problem: Layers, rule: Rule) -> pd.DataFrame:
     choice, rows = published_choice(problem), []
     for move, node in enumerate(choice):
         costs = order(problem, choice, move, rule)
-        others = np.delete(costs, node)
-        alone = bool((others > costs[node] * (1 + TIED)).all())
+        alone = bool((np.delete(costs, node) > costs[node] * (1 + TIED)).all())
         bricks = problem.schedule.moves[move].bricks
         rows.append({"bricks": bricks, "rank": rank_of(costs, node), "alone": alone})
     return pd.DataFrame(rows)
+
+
+def _places(ranks: pd.Series) -> dict[str, object]:
+    return {"first": int((ranks == 1).sum()), "among_three": int((ranks <= 3).sum())}
 
 
 def compression(problem: Layers, tried: list[Rule]) -> pd.DataFrame:
@@ -136,18 +117,14 @@ def compression(problem: Layers, tried: list[Rule]) -> pd.DataFrame:
     for rule in tried:
         table = placed(problem, rule)
         after = table[table["bricks"] >= CROWN]
-        row: dict[str, object] = {**vars(rule), "alone": int(table["alone"].sum())}
-        row |= {"first": int((table["rank"] == 1).sum())}
-        row |= {"among_three": int((table["rank"] <= 3).sum())}
+        row = {**vars(rule), "alone": int(table["alone"].sum()), **_places(table["rank"])}
         rows.append(row | {"first_after_crown": int((after["rank"] == 1).sum())})
     return pd.DataFrame(rows)
 
 
 def beside_displacement(table: pd.DataFrame) -> pd.DataFrame:
     """Return, for every setting, how often either names the published node after the crown."""
-    settings = ["window", "join", "rounded"]
-    value = "first_after_crown"
-    return table.pivot_table(value, index=settings, columns="fourth", aggfunc="first")
+    return table.pivot_table("first_after_crown", [*SETTINGS], "fourth", aggfunc="first")
 
 
 FINE = tuple((letter, 1e-6 * size) for letter, size in RESOLUTION)
@@ -166,16 +143,14 @@ SETS = {
 
 def variants() -> list[RankSum]:
     """Return the criteria that are tried, the printed equations first."""
-    pairs = [("equation 2", "equation 3"), ("equation 2", "equation 2")]
-    pairs += [("equation 3", "equation 3")]
-    pairs += [("equation 2", after) for after in list(SETS)[2:]]
-    pairs += [("T, M, moving, largest", after) for after in list(SETS)[1:]]
+    two, three, *others = SETS
+    pairs = [(two, three), (two, two), (three, three), *((two, after) for after in others)]
+    pairs += [("T, M, moving, largest", after) for after in (three, *others)]
+    finenesses = ((RESOLUTION, "1"), (FINE, "1e-6"))
     out = []
-    for before, after in pairs:
-        for crown in (CROWN, CROWN + 1):
-            for resolution, rounded in ((RESOLUTION, "1"), (FINE, "1e-6")):
-                name = f"{before} | {after} | {crown} | {rounded}"
-                out.append(RankSum(name, SETS[before], SETS[after], crown, resolution=resolution))
+    for (before, after), crown, (size, text) in product(pairs, (CROWN, CROWN + 1), finenesses):
+        name = f"{before} | {after} | {crown} | {text}"
+        out.append(RankSum(name, SETS[before], SETS[after], crown, resolution=size))
     return out
 
 
@@ -186,76 +161,55 @@ def scores(problem: Layers, criteria: list[RankSum]) -> pd.DataFrame:
     for criterion in criteria:
         ranks = rank_choice(replace(problem, criterion=criterion), choice)["rank_in_window"]
         before, after, crown, rounded = criterion.name.split(" | ")
-        rows.append(
-            {
-                "before_crown": before,
-                "after_crown": after,
-                "after_from_brick": int(crown),
-                "rounded_to": float(rounded),
-                "first": int((ranks == 1).sum()),
-                "among_three": int((ranks <= 3).sum()),
-            }
-        )
+        row = {"before_crown": before, "after_crown": after, "after_from_brick": int(crown)}
+        rows.append(row | {"rounded_to": float(rounded), **_places(ranks)})
     return pd.DataFrame(rows)
 
 
 def holds(table: pd.DataFrame, optimizations: int) -> bool:
-    """Return whether none names every published node first, and one more than the equations do."""
     most, printed = table["first"].max(), table["first"].iloc[0]
     return bool(printed < most < optimizations)
 
 
 @styled
 def chart(table: pd.DataFrame, observed: pd.DataFrame) -> Figure:
-    figure = new_figure(3.8)
-    axes = figure.subplots()
+    figure, axes = subplots(3.8)
     spread = 0.12 * (table.groupby(["first", "among_three"]).cumcount() % 5)
     axes.plot(table["first"] + spread, table["among_three"], "o", mfc="none", color=GRAY,
               label="other variant")  # fmt: skip
-    printed = table.iloc[0]
-    marked = {"ms": 9, "ls": "none"}
-    axes.plot(printed["first"], printed["among_three"], "s", color=VERMILION,
-              label="equations 2 and 3, as printed", **marked)  # fmt: skip
-    best = table.sort_values(["first", "among_three"]).iloc[-1]
-    words = f"best variant: {best['before_crown']};\nafter the crown {best['after_crown']}"
-    axes.plot(best["first"], best["among_three"], "^", color=BLUE, label=words, **marked)
-    for fourth, mark, color, response in (
-        ("C_max", "P", GREEN, "compression C_max"),
-        ("D_max", "X", PURPLE, "displacement D_max"),
+    best = table.sort_values(["first", "among_three"]).iloc[[-1]]
+    (before, after), *_ = best[["before_crown", "after_crown"]].to_numpy()
+    found = observed[observed[[*SETTINGS]].eq(SETTINGS).all(axis=1)].groupby("fourth")
+    rule = "observed rule, with {}\nafter the crown"
+    for rows, mark, color, label in (
+        (table.iloc[[0]], "s", VERMILION, "equations 2 and 3, as printed"),
+        (best, "^", BLUE, f"best variant: {before};\nafter the crown {after}"),
+        (found.get_group("C_max"), "P", GREEN, rule.format("compression C_max")),
+        (found.get_group("D_max"), "X", PURPLE, rule.format("displacement D_max")),
     ):
-        rows = observed[observed["fourth"] == fourth]
-        rows = rows[rows[[*SETTINGS]].eq(SETTINGS).all(axis=1)]
-        label = f"observed rule, with {response}\nafter the crown"
-        axes.plot(rows["first"], rows["among_three"], mark, color=color, label=label, **marked)
-    axes.set(
-        xlabel="choices of 22 in which the published node ranks first",
-        ylabel="choices in which it is\namong the first three",
-    )
+        axes.plot(rows["first"], rows["among_three"], mark, color=color, ms=9, label=label)
+    axes.set(xlabel="choices of 22 in which the published node ranks first")
+    axes.set(ylabel="choices in which it is\namong the first three")
     dress(axes)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside right center")
     return figure
 
 
 def experiment(options: Options) -> Finding:
-    quick: bool = options.quick
-    engine = ComplianceEngine(build_network(load_scene("arch25")))
-    robots = ("F_rob1", "F_rob2", "F_rob3")
-    also = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest", *robots)
+    engine, tried = arch25(), variants()
+    also = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest", "F_rob1", "F_rob2", "F_rob3")
     problem = candidate_layers(engine, three_robot_loop(engine.network), EQUATIONS, also=also)
-    tried = variants()
-    wanted = {CLOSEST.before, CLOSEST.after}
-    chosen = [
-        c for c in tried if {c.before, c.after} == wanted and c.crown == CROWN + CLOSEST.delay
-    ]
-    table = scores(problem, [tried[0], *chosen] if quick else tried)
-    ordered = table.sort_values(["first", "among_three"], ascending=False)
-    print(ordered.head(12).to_string(index=False))
+    if options.quick:
+        closest = {CLOSEST.before, CLOSEST.after}, CROWN + CLOSEST.delay
+        tried = tried[:1] + [c for c in tried if ({c.before, c.after}, c.crown) == closest]
+    table = scores(problem, tried)
+    print(table.nlargest(12, ["first", "among_three"]).to_string(index=False))
     print("equations as printed")
     print(table.head(1).to_string(index=False))
-    observed = compression(problem, [FOUND] if quick else rules())
+    observed = compression(problem, [FOUND] if options.quick else rules())
     print("rules with compression or displacement after the crown, an observation")
     print(observed.to_string(index=False))
-    if not quick:
+    if not options.quick:
         print(beside_displacement(observed).to_string())
     tables = {"criteria_variants": table, "criteria_compression": observed}
     return Finding(holds(table, len(problem.schedule.moves)), tables=tables)

@@ -7,17 +7,11 @@ are within 5 % of print beyond rounding (`experiments.harness.yardstick`).
 Method: `experiments.study.parts.paper_items` lists the paper's figures and tables in order with
 what has no numbers; `experiments.study.parts.counterpart_rows` computes every printed value anew.
 Which three disagree was seen in the first run; the claim fails if a fourth does, if one of the
-three agrees, or if an item has no values. How far the calibration and the discrete elements are
-off, and why, is the subject of `experiments.calibration.calibration` and
-`experiments.discrete.discrete_arches`.
+three agrees, or if an item has no values.
 
 Inputs: the shipped scene, plan and tables. Command: ``python -m
-experiments.study.paper_counterparts [--quick]``. Writes
-``experiments/results/paper_counterparts.csv``, ``docs/counterparts.md`` and
-``docs/figures/counterpart_*.png``.
+experiments.study.paper_counterparts [--quick]``; it writes ``docs/counterparts.md`` too.
 """
-
-from __future__ import annotations
 
 from functools import cache, partial
 
@@ -36,7 +30,6 @@ QUICK = {"fig:arch_vault", "table:model_results", "table:2robot_tension", "table
 
 
 def faults(items: list[Item], table: pd.DataFrame) -> list[str]:
-    """Return what speaks against the claim."""
     out = []
     for item in items:
         rows = table[table["id"] == item.label]
@@ -63,12 +56,10 @@ def experiment(options: Options) -> Finding:
 
 @cache
 def model() -> Ours:
-    """Return what all pictures are drawn from beside stored rows."""
     return ours()
 
 
 def picture(name: str) -> Figure:
-    """Return one of `TITLES` from stored rows."""
     return drawn(name, stored("paper_counterparts"), model())
 
 

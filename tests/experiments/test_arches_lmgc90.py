@@ -180,7 +180,7 @@ def test_a_missing_or_failing_lmgc90_is_none(engine25, step, monkeypatch):
     def late(*args, **kwargs):
         raise subprocess.TimeoutExpired("lmgc90", 1.0)
 
-    monkeypatch.setattr(arches_lmgc90.subprocess, "run", late)
+    monkeypatch.setattr(subprocess, "run", late)
     assert asked(sys.executable, {"blocks": []}) is None
 
 

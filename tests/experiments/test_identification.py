@@ -6,11 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.calibration.identify_arch25 import beside_shipped, fit, holds, residuals, target
+from experiments.calibration.identify_arch25 import fit, residuals, target
 from experiments.calibration.parts.arch_numbers import (
     OFFSETS,
     SHAPE,
     VARIANTS,
+    beside_shipped,
+    holds,
     report,
     scene_of,
     start_of,

@@ -3,15 +3,10 @@
 A vault is a chain of rigid bricks with a joint between neighbors and one at either abutment. A
 line load across its whole width acts at one place; stiffness is load over vertical displacement
 there. `load_stiffness` takes it from the compliance operator of a scene. `planar_parts` and
-`planar_stiffness` derive it by hand: cut one abutment, let statics give what every joint
-transmits, and let the energy of the springs (Castigliano) give the three unknowns and the
-displacement.
-
-Sources: `arch_tests.csv` and `arch_stiffness.csv` in ``seqopt/data/paper``. Lengths are in m,
-forces in N.
+`planar_stiffness` derive it by hand: cut one abutment, let statics give what every joint transmits,
+and let the energy of the springs (Castigliano) give the three unknowns and the displacement.
+Lengths are in m, forces in N.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,16 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from seqopt import ArchShape, Scene, arch_scene, build_network
 from seqopt.arrays import Floats
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._operator import OperatorBuilder
-from seqopt.network.build import build_network
-from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.scene import Scene
 from seqopt.study.published import SOURCE, printed
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Vault:
     """One tested vault: as printed, with measured and the paper's stiffness in N/m."""
 
@@ -45,27 +38,24 @@ class Vault:
     measured: float
     study: float
 
+    @property
+    def area(self) -> float:
+        """Area of a joint, m²."""
+        return self.width * self.thickness
+
+
+PRINTED = [
+    "test", "reference", "L_m", "r_m", "b_m", "t_mm", "n_bricks", "h_mm", "x_m",
+    "gamma_m_kg_m3", "k_e_kN_mm", "k_m_kN_mm",
+]  # columns, in the order of `Vault`  # fmt: skip
+
 
 def vaults() -> tuple[Vault, ...]:
     """Return the eight tests; column ``r`` is the rise (see the documentation)."""
     table = printed("arch_tests").merge(printed("arch_stiffness"), on=["test", "reference"])
-    return tuple(
-        Vault(
-            test=int(row["test"]),
-            reference=str(row["reference"]),
-            span=float(row["L_m"]),
-            rise=float(row["r_m"]),
-            width=float(row["b_m"]),
-            thickness=float(row["t_mm"]) / 1e3,
-            bricks=int(row["n_bricks"]),
-            fill=float(row["h_mm"]) / 1e3,
-            load_at=float(row["x_m"]),
-            density=float(row["gamma_m_kg_m3"]),
-            measured=float(row["k_e_kN_mm"]) * 1e6,
-            study=float(row["k_m_kN_mm"]) * 1e6,
-        )
-        for row in table.to_dict("records")
-    )
+    table[["t_mm", "h_mm"]] /= 1e3
+    table[["k_e_kN_mm", "k_m_kN_mm"]] *= 1e6
+    return tuple(Vault(*row) for row in table[PRINTED].itertuples(index=False, name=None))
 
 
 class Chain(NamedTuple):
@@ -119,15 +109,8 @@ def chain(
 ) -> Chain:
     """Return the joints and the load of a vault in one reading of its printed numbers.
 
-    Parameters
-    ----------
-    vault : Vault
-    line, place : str
-        Key of `LINES` and of `PLACES`.
-    fewer : int
-        Bricks by which the chain is shorter than printed.
-    strip : float
-        Width over which the load is spread, m; zero is a line.
+    ``line`` is of `LINES`, ``place`` of `PLACES`; the chain is shorter than printed by ``fewer``
+    bricks; the load is spread over a ``strip``, m, zero is a line.
     """
     points, slope = LINES[line](vault, vault.bricks - fewer)
     at = PLACES[place](vault, points) + strip * np.linspace(-0.5, 0.5, 9 if strip else 1)
@@ -147,8 +130,8 @@ def scene(vault: Vault, translational: float, rotational: float) -> Scene:
         translational_stiffness=(translational,) * 3,
         rotational_stiffness=(rotational,) * 3,
     )
-    provenance = f"test {vault.test}, {vault.reference}, after {SOURCE}"
-    return arch_scene(shape, f"vault{vault.test}", provenance=provenance)
+    source = f"test {vault.test}, {vault.reference}, after {SOURCE}"
+    return arch_scene(shape, f"vault{vault.test}", provenance=source)
 
 
 def load_stiffness(built: Scene, at: float) -> float:
@@ -249,9 +232,8 @@ class Law:
         """Return the stiffness of every vault for ratios (R,), per unit k_t."""
         rows = []
         for vault, parts in zip(self.tests, self.parts, strict=True):
-            area = vault.width * vault.thickness
-            turn = LAWS[self.name](vault) * ratio
-            rows.append(planar_stiffness(parts, np.full_like(ratio, area), turn))
+            slide, turn = np.full_like(ratio, vault.area), LAWS[self.name](vault) * ratio
+            rows.append(planar_stiffness(parts, slide, turn))
         return np.array(rows)
 
     def relative(self, ratio: Floats) -> Floats:
@@ -282,18 +264,21 @@ MEASURES: dict[str, tuple[Callable[[Floats], Floats], int]] = {
 
 def fit(law: Law, measure: str, kept: Floats) -> tuple[float, float]:
     """Return the k_t and k_r that fit the tests in ``kept`` (T,) bool best."""
-    _scale_of, power = MEASURES[measure]
-    low, high = np.log(law.bounds)
+    ends = low, high = np.log(law.bounds)
     for _ in range(4):
         ratio = np.exp(np.linspace(low, high, 401))
-        share = law.relative(ratio)[kept]
-        scale = _scale_of(share)
-        best = int((np.abs(scale * share - 1) ** power).sum(axis=0).argmin())
-        step = (high - low) / 400
-        center = np.log(ratio[best])
-        low = max(center - 2 * step, np.log(law.bounds[0]))
-        high = min(center + 2 * step, np.log(law.bounds[1]))
-    return float(scale[best]), float(scale[best] * ratio[best])
+        best, scale = best_of(law.relative(ratio)[kept], measure)
+        near = np.log(ratio[best]) + np.array([-2, 2]) * (high - low) / 400
+        low, high = np.clip(near, *ends)
+    return scale, float(scale * ratio[best])
+
+
+def best_of(share: Floats, measure: str) -> tuple[int, float]:
+    """Return which column of model over measured (T, R) fits best with which factor."""
+    _scale_of, power = MEASURES[measure]
+    scale = _scale_of(share)
+    best = int((np.abs(scale * share - 1) ** power).sum(axis=0).argmin())
+    return best, float(scale[best])
 
 
 def errors(law: Law, pair: tuple[float, float]) -> Floats:

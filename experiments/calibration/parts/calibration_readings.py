@@ -7,36 +7,22 @@ full or half, and with free ones: then the smallest possible largest deviation f
 sought, over all tests and over some of them.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pandas as pd
 
-from experiments.calibration.parts.barrel_vaults import (
-    LINES,
-    PLACES,
-    Parts,
-    Vault,
-    chain,
-    planar_parts,
-    planar_stiffness,
-    vaults,
-)
+from experiments.calibration.parts import barrel_vaults
+from experiments.calibration.parts.barrel_vaults import Parts, Vault, chain, planar_parts, vaults
 from seqopt.arrays import Floats
 
 PRINTED = (1e11, 0.9e9)  # N/m³ and what is printed in kN/(rad m²), in N
 POWERS = {"b": (0, 1.0), "b t": (1, 1.0), "b t2": (2, 1.0), "b t3/12": (3, 1 / 12)}
 SHEAR = {"rigid": 0.0, "as along": 1.0, "a tenth": 10.0}  # compliance across over along
 HALVES = ((1.0, 1.0), (0.5, 0.5), (1.0, 0.5), (0.5, 1.0))  # of k_t and of k_r
-GROUPS = {
-    "all": range(8),
-    "2-8": range(1, 8),
-    "3-8": range(2, 8),
-    "2,3,4,6,7,8": (1, 2, 3, 5, 6, 7),
-}
+GROUPS = {"all": range(8), "2-8": range(1, 8), "3-8": range(2, 8)}
+GROUPS |= {"2,3,4,6,7,8": (1, 2, 3, 5, 6, 7)}
 RATIO = np.geomspace(1e-5, 1e4, 181)
 
 
@@ -50,8 +36,8 @@ def against_study(tests: tuple[Vault, ...], parts: list[Parts], law: str, k: Flo
     """Return stiffnesses over the paper's (T, R) for rows (R, 2) of k_t and k_r."""
     rows = []
     for vault, part in zip(tests, parts, strict=True):
-        slide, turn = k[:, 0] * vault.width * vault.thickness, k[:, 1] * section(vault, law)
-        rows.append(planar_stiffness(part, slide, turn) / vault.study)
+        slide, turn = k[:, 0] * vault.area, k[:, 1] * section(vault, law)
+        rows.append(barrel_vaults.planar_stiffness(part, slide, turn) / vault.study)
     return np.array(rows)
 
 
@@ -70,13 +56,11 @@ def _row(tests: tuple[Vault, ...], parts: list[Parts], law: str) -> dict[str, ob
     for percent in (5, 10):
         within = (np.abs(ratio - 1) <= percent / 100).sum(axis=0)
         out[f"within_{percent}"] = int(within.max())
-        best = int(within.argmax())
-        out[f"halves_{percent}"] = "{:g} {:g}".format(*HALVES[best])
+        out[f"halves_{percent}"] = "{:g} {:g}".format(*HALVES[within.argmax()])
     for name, group in GROUPS.items():
         worst = np.abs(np.log(ratio[list(group)])).max(axis=0)
-        best = int(worst.argmin())
-        out[f"printed_{name}"] = 100 * (np.exp(worst[best]) - 1)
-        out[f"halves_{name}"] = "{:g} {:g}".format(*HALVES[best])
+        out[f"printed_{name}"] = 100 * (np.exp(worst.min()) - 1)
+        out[f"halves_{name}"] = "{:g} {:g}".format(*HALVES[worst.argmin()])
     for i, vault in enumerate(tests):
         out[f"printed_test_{vault.test}"] = ratio[i, 0]
     free = np.log(against_study(tests, parts, law, np.stack([np.ones_like(RATIO), RATIO], axis=1)))
@@ -90,9 +74,9 @@ def _row(tests: tuple[Vault, ...], parts: list[Parts], law: str) -> dict[str, ob
 
 def readings() -> pd.DataFrame:
     """Return a row per reading; ``free_*`` are the least largest deviations in percent."""
-    tests = vaults()
-    rows = []
-    for line, place, fewer, spread, shear in product(LINES, PLACES, (0, 1), (0, 1), SHEAR):
+    tests, rows = vaults(), []
+    lines, places = barrel_vaults.LINES, barrel_vaults.PLACES
+    for line, place, fewer, spread, shear in product(lines, places, (0, 1), (0, 1), SHEAR):
         parts = [
             planar_parts(chain(v, line, place, fewer=fewer, strip=spread * v.fill), SHEAR[shear])
             for v in tests
@@ -104,22 +88,17 @@ def readings() -> pd.DataFrame:
 
 
 def summary(scan: pd.DataFrame) -> str:
-    """Return the best readings of every kind as text."""
     names = ["line", "place", "fewer", "shear", "load", "law"]
     lines = [f"{len(scan)} readings"]
     for percent in (5, 10):
         columns = [*names, f"within_{percent}", f"halves_{percent}"]
         best = scan.sort_values(f"within_{percent}", ascending=False)[columns].head(4)
         lines.append(f"tests within {percent} % at the printed stiffnesses\n{best.to_string()}")
-    for name in GROUPS:
-        columns = [*names, f"printed_{name}", f"halves_{name}"]
-        best = scan.sort_values(f"printed_{name}")[columns].groupby("law").head(1)
+    for name, (kind, *beside) in product(GROUPS, (("printed", "halves"), ("free", "k_t", "k_r"))):
+        columns = [*names, *(f"{column}_{name}" for column in (kind, *beside))]
+        best = scan.sort_values(f"{kind}_{name}")[columns].groupby("law").head(1)
         text = best.to_string(float_format="%.3g")
-        lines.append(f"largest deviation over tests {name}, printed stiffnesses\n{text}")
-        columns = [*names, f"free_{name}", f"k_t_{name}", f"k_r_{name}"]
-        best = scan.sort_values(f"free_{name}")[columns].groupby("law").head(1)
-        text = best.to_string(float_format="%.3g")
-        lines.append(f"largest deviation over tests {name}, free stiffnesses\n{text}")
+        lines.append(f"largest deviation over tests {name}, {kind} stiffnesses\n{text}")
     return "\n".join(lines)
 
 
@@ -134,13 +113,10 @@ def entries() -> pd.DataFrame:
     free = np.log(against_study(tests, parts, "b t", k))
     best, middle, _ = closest(free[list(GROUPS["3-8"])])
     pair = np.exp(-middle) * k[best : best + 1]
-    rows = []
-    for vault in tests:
-        row: dict[str, object] = {"test": vault.test}
-        row["model_over_study"] = np.exp(free[tests.index(vault), best] - middle)
-        for name in ("span", "rise", "width", "thickness", "bricks", "load_at"):
-            row[name] = needed(vault, name, pair)
-        rows.append(row)
+    names, rows = ("span", "rise", "width", "thickness", "bricks", "load_at"), []
+    for vault, log in zip(tests, free[:, best], strict=True):
+        row = {"test": vault.test, "model_over_study": np.exp(log - middle)}
+        rows.append(row | {name: needed(vault, name, pair) for name in names})
     return pd.DataFrame(rows)
 
 
@@ -153,8 +129,7 @@ def needed(vault: Vault, name: str, pair: Floats) -> float:
         line = chain(changed)
         if 0 < line.loads[0] < line.points[-1, 0] and line.points[:, 1].min() > -1e-9:
             factors.append(factor)
-            ratio = against_study((changed,), [planar_parts(line)], "b t", pair)
-            logs.append(np.log(ratio[0, 0]))
+            logs.append(np.log(against_study((changed,), [planar_parts(line)], "b t", pair)[0, 0]))
     signs = np.sign(logs)
     turns = np.flatnonzero(signs[:-1] != signs[1:])
     if not len(turns):

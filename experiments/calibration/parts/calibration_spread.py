@@ -6,26 +6,14 @@ another measure, without one test and with joints otherwise stiff across; and by
 the tests bound the rotational stiffness.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from scipy import stats
 
-from experiments.calibration.parts.barrel_vaults import (
-    BED,
-    LAWS,
-    MEASURES,
-    Law,
-    Vault,
-    chain,
-    errors,
-    fit,
-    planar_parts,
-)
+from experiments.calibration.parts import barrel_vaults
+from experiments.calibration.parts.barrel_vaults import BED, LAWS, MEASURES, Law, Vault, errors, fit
 from seqopt.arrays import Floats
 
 LEVEL = 0.95
@@ -64,7 +52,8 @@ def chosen_anew(models: dict[str, Law]) -> tuple[list[str], Floats]:
 
 def bed(tests: tuple[Vault, ...], across: str) -> Law:
     """Return the bed of springs with joints so stiff across."""
-    return Law(BED, tests, tuple(planar_parts(chain(v), ACROSS[across]) for v in tests))
+    chains = map(barrel_vaults.chain, tests)
+    return Law(BED, tests, tuple(barrel_vaults.planar_parts(c, ACROSS[across]) for c in chains))
 
 
 def mean_size(error: Floats) -> float:
@@ -77,21 +66,21 @@ def root_mean_square(error: Floats) -> float:
 
 def comparison(models: dict[str, Law]) -> pd.DataFrame:
     """Return errors of the bed of springs beside those of the paper's column, percent."""
-    law = models[BED]
+    law, squares = models[BED], "root mean square, least squares"
     paper = np.array([v.study / v.measured - 1 for v in law.tests])
     own, least = (errors(law, fit(law, measure, whole(law))) for measure in MEASURES)
     other = np.array([v.test != DECISIVE for v in law.tests])
     size, root = mean_size(paper), root_mean_square(paper)
+    left = root_mean_square(left_out(law, "squares")[1])
     rows = [
         (IN_SAMPLE, mean_size(own), size),
         ("each test left out", mean_size(left_out(law, "absolute")[1]), size),
         (ANEW, mean_size(chosen_anew({name: models[name] for name in LAWS})[1]), size),
         (f"without test {DECISIVE}", mean_size(own[other]), mean_size(paper[other])),
-        ("root mean square, least squares, all tests fitted", root_mean_square(least), root),
-        ("root mean square, least squares, each test left out",
-         root_mean_square(left_out(law, "squares")[1]), root),
+        (f"{squares}, all tests fitted", root_mean_square(least), root),
+        (f"{squares}, each test left out", left, root),
         *_paired(100 * (np.abs(paper) - np.abs(own))),
-    ]  # fmt: skip
+    ]
     for across in ACROSS:
         varied = bed(law.tests, across)
         inside = errors(varied, fit(varied, "absolute", whole(varied)))
@@ -110,12 +99,9 @@ def _paired(gains: Floats) -> list[tuple[str, float, float]]:
     return [(name, value, np.nan) for name, value in named.items()]
 
 
-@dataclass(frozen=True)
-class Route:
-    """What is summed over the tests, and up to which multiple of its least value k_r is kept."""
-
-    summed: Callable[[Floats], Floats]  # of model over measured (T, R)
-    limit: float
+Route = tuple[Callable[[Floats], Floats], float]
+"""What is summed over the tests, of model over measured (T, R), and up to which multiple of its
+least value k_r is kept."""
 
 
 def threshold(numbers: int, fitted: int, count: int = 8) -> float:
@@ -128,10 +114,10 @@ def routes(count: int = 8) -> dict[str, Route]:
     """Return profiles that differ in which error is taken for random, and how it is spread."""
     squares, sizes = threshold(1, 2, count), float(np.exp(stats.chi2.ppf(LEVEL, 1) / 2 / count))
     return {
-        "squares of relative errors": Route(lambda x: ((x - 1) ** 2).sum(axis=0), squares),
-        "sizes of relative errors": Route(lambda x: np.abs(x - 1).sum(axis=0), sizes),
-        "squares of logarithms": Route(lambda x: (np.log(x) ** 2).sum(axis=0), squares),
-        "sizes of logarithms": Route(lambda x: np.abs(np.log(x)).sum(axis=0), sizes),
+        "squares of relative errors": (lambda x: ((x - 1) ** 2).sum(axis=0), squares),
+        "sizes of relative errors": (lambda x: np.abs(x - 1).sum(axis=0), sizes),
+        "squares of logarithms": (lambda x: (np.log(x) ** 2).sum(axis=0), squares),
+        "sizes of logarithms": (lambda x: np.abs(np.log(x)).sum(axis=0), sizes),
     }
 
 
@@ -158,9 +144,9 @@ def rotational(tests: tuple[Vault, ...]) -> pd.DataFrame:
     rows = []
     for across in ACROSS:
         share = bed(tests, across).relative(RATIO)
-        for name, route in routes(len(tests)).items():
-            sums = np.array([route.summed(k / RATIO * share).min() for k in TURN])
-            low, high = interval(TURN, sums, route.limit)
+        for name, (summed, limit) in routes(len(tests)).items():
+            sums = np.array([summed(k / RATIO * share).min() for k in TURN])
+            low, high = interval(TURN, sums, limit)
             rows.append((f"profile, {name}", across, low, float(TURN[sums.argmin()]), high))
         for measure in MEASURES:
             drawn = np.percentile(resampled(share, measure), [2.5, 50, 97.5], method="higher")
@@ -170,12 +156,10 @@ def rotational(tests: tuple[Vault, ...]) -> pd.DataFrame:
 
 def resampled(share: Floats, measure: str) -> Floats:
     """Return k_r fitted to tests drawn with replacement, infinite where joints do not turn."""
-    random, (_scale_of, power) = np.random.default_rng(1), MEASURES[measure]
-    coarse, ratio = share[:, ::5], RATIO[::5]
+    random, coarse, ratio = np.random.default_rng(1), share[:, ::5], RATIO[::5]
     out = []
     for _ in range(DRAWS):
-        drawn = coarse[random.integers(0, len(coarse), len(coarse))]
-        scale = _scale_of(drawn)
-        best = int((np.abs(scale * drawn - 1) ** power).sum(axis=0).argmin())
-        out.append(np.inf if best == len(ratio) - 1 else scale[best] * ratio[best])
+        drawn = random.integers(0, len(coarse), len(coarse))
+        best, scale = barrel_vaults.best_of(coarse[drawn], measure)
+        out.append(np.inf if best == len(ratio) - 1 else scale * ratio[best])
     return np.array(out)

@@ -18,16 +18,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import linalg
 
+from seqopt import EPOXY, Step
 from seqopt.arrays import Floats
 from seqopt.contact._elastic_limits import opening_maps
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import bare_assembly, step_assembly
-from seqopt.contact.mortar import EPOXY
 from seqopt.engines.discrete._system import BedStiffness, System, build_system
 from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.interface import Fields, Want
 from seqopt.network.network import GROUND, Network
-from seqopt.sequence.steps import Step
 from seqopt.study.published import STUDY_BED, STUDY_PADS
 
 STIFFER = 10  # contacts per pad: its joint over those between bricks, as in section 3.2.3
@@ -41,14 +40,14 @@ class AtCorners(DiscreteEngine):
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields; see `DiscreteEngine.solve`."""
         if bricks not in self._systems:
-            system = build_system(self.network, bricks, EPOXY, STUDY_BED)
-            self._systems[bricks] = at_corners(self.network, system)
+            self._systems[bricks] = at_corners(self.network, bricks)
         return super().solve(bricks, grips, want)
 
 
-def at_corners(network: Network, system: System) -> System:
+def at_corners(network: Network, bricks: int) -> System:
     """Return a system whose beds are springs at the corners of the faces."""
-    assembly = bare_assembly(network, system.bricks)
+    system = build_system(network, bricks, EPOXY, STUDY_BED)
+    assembly = bare_assembly(network, bricks)
     area, where = shares(assembly), network.springs.position[system.acting]
     normal, tangential = STUDY_BED.normal * area, STUDY_BED.tangential * area
     return replace(
@@ -98,18 +97,13 @@ def padded(
         faces.append(middle + 0.5 * pinch.side * np.array(square))
         normal = np.cross(along, other)
         inward.append(normal if normal @ out < 0 else -normal)
-    return _with_contacts(assembly, np.array(faces), np.array(inward), block)
-
-
-def _with_contacts(assembly: Assembly, faces: Floats, inward: Floats, block: int) -> Assembly:
-    """Return the assembly with a block on further ground faces (F, 4, 3), no longer gripped."""
     count = len(faces)
-    return replace(
+    return replace(  # the block is on further faces of the ground and no longer gripped
         assembly,
         contact_name=assembly.contact_name + ("pad",) * count,
         bodies=np.vstack([assembly.bodies, np.tile([GROUND, block], (count, 1))]),
-        normal=np.vstack([assembly.normal, inward]),
-        corner=np.vstack([assembly.corner, faces.reshape(-1, 3)]),
+        normal=np.vstack([assembly.normal, *inward]),
+        corner=np.vstack([assembly.corner, *faces]),
         contact=np.append(assembly.contact, len(assembly.bodies) + np.repeat(np.arange(count), 4)),
         grip_block=np.empty(0, dtype=np.int64),
         grip_position=np.empty((0, 3)),
@@ -192,6 +186,5 @@ class Reading:
 
 
 def readings() -> list[Reading]:
-    """Return all readings of the table."""
     pinches = [Pinch(across, STUDY_PADS, side=side) for across, side in product(Across, PADS)]
     return [Reading(joint, pinch) for pinch, joint in product((None, *pinches), JOINTS)]

@@ -6,12 +6,7 @@ our discrete-element engine, and holds all against the double-cross model. LMGC9
 four corners of a face a quarter of its area.
 """
 
-from __future__ import annotations
-
-import json
-import subprocess
 import sys
-import tempfile
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -20,26 +15,19 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import ConvexHull
 
-from experiments.discrete.parts.arch_pads import (
-    SPREADS,
-    AtCorners,
-    bed_at_corners,
-    ground_forces,
-    padded,
-    pads_at_corners,
-    posed,
-)
+from experiments.discrete.parts import arch_pads
+from experiments.discrete.parts.arch_pads import SPREADS, AtCorners, padded, posed
+from experiments.harness import lmgc90
 from experiments.harness.lmgc90 import python_with_lmgc90
+from seqopt import EPOXY, Step
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.mortar import EPOXY
 from seqopt.engines.discrete._system import BedStiffness
 from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network._mechanics import node_motion
 from seqopt.network.network import GROUND, Network
-from seqopt.sequence.steps import Step
 from seqopt.study.published import STUDY_BED, STUDY_PADS
 
 PAD = 0.02  # m, side of the square that a pad touches: not printed
@@ -65,8 +53,7 @@ def scene_for(assembly: Assembly, bed: BedStiffness) -> dict[str, Any]:
     for i, c in enumerate(np.flatnonzero(assembly.bodies[:, 0] == GROUND)):
         face = corner[assembly.contact == c]
         # LMGC90 ends where two bodies share a centroid
-        back = face - THICK * (1 + 0.1 * i) * (TURN @ assembly.normal[c])
-        points = np.vstack([face, back])
+        points = np.vstack([face, face - THICK * (1 + 0.1 * i) * (TURN @ assembly.normal[c])])
         blocks.append(_hull(points, points.mean(axis=0), 0.0))
     return {"blocks": blocks, **_terms(bed)}
 
@@ -79,43 +66,24 @@ def _hull(points: Floats, centroid: Floats, weight: float) -> dict[str, Any]:
     """Return the convex hull of points (n, 3) as a block; without a weight it is fixed."""
     points = np.unique(points, axis=0)
     hull = ConvexHull(points)
-    faces = [
-        face
-        if np.linalg.det([*(points[face[1:]] - points[face[0]]), plane[:3]]) > 0
-        else face[::-1]
-        for face, plane in zip(hull.simplices, hull.equations, strict=True)
-    ]
+    faces = []
+    for face, plane in zip(hull.simplices, hull.equations, strict=True):
+        outward = np.linalg.det([*(points[face[1:]] - points[face[0]]), plane[:3]]) > 0
+        faces.append(face if outward else face[::-1])
     used, index = np.unique(np.array(faces), return_inverse=True)
-    return {
-        "vertices": points[used].tolist(),
-        "faces": index.reshape(-1, 3).tolist(),
-        "centroid": centroid.tolist(),
-        "weight": weight,
-        "fixed": weight == 0.0,
-    }
+    row = {"vertices": points[used].tolist(), "faces": index.reshape(-1, 3).tolist()}
+    return row | {"centroid": centroid.tolist(), "weight": weight, "fixed": weight == 0.0}
 
 
 def asked(python: str, scene: dict[str, Any]) -> dict[str, Any] | None:
     """Return what LMGC90 says in another Python, in our axes, or None if it breaks off."""
-    program = Path(__file__).with_name("springs_lmgc90.py")
-    with tempfile.TemporaryDirectory() as folder:
-        shown, said = Path(folder) / "scene.json", Path(folder) / "result.json"
-        shown.write_text(json.dumps(scene), encoding="utf-8")
-        command = [python, str(program), str(shown), str(said)]
-        try:
-            subprocess.run(command, cwd=folder, capture_output=True, check=False, timeout=LIMIT)
-        except subprocess.TimeoutExpired:
-            return None
-        if not said.exists():
-            return None
-        result: dict[str, Any] = json.loads(said.read_text(encoding="utf-8"))
+    program = str(Path(__file__).with_name("springs_lmgc90.py"))
+    result = lmgc90.asked(python, program, scene, LIMIT)
+    if result is None:
+        return None
     twist = np.array(result["twist"]).reshape(-1, 2, 3) @ TURN
-    return {
-        **result,
-        "twist": twist.reshape(-1, 6),
-        "force": np.array(result["force"]) @ TURN,
-        "pair": np.array(result["pair"]),
-    }
+    row = {**result, "twist": twist.reshape(-1, 6), "force": np.array(result["force"]) @ TURN}
+    return row | {"pair": np.array(result["pair"])}
 
 
 def on_ground(result: dict[str, Any], blocks: int) -> Floats:
@@ -137,9 +105,8 @@ def inner_nodes(network: Network, step: Step) -> list[int]:
 def moved(engine: Engine, step: Step) -> Floats:
     """Return how far the inner nodes move by an engine, m."""
     fields = engine.solve(step.bricks, [list(step.held)], Want.DISPLACEMENTS)
-    return np.asarray(
-        np.linalg.norm(fields.displacement[0][inner_nodes(engine.network, step)], axis=1)
-    )
+    inner = fields.displacement[0][inner_nodes(engine.network, step)]
+    return np.asarray(np.linalg.norm(inner, axis=1))
 
 
 def moved_by_twists(network: Network, step: Step, twist: Floats) -> Floats:
@@ -156,7 +123,7 @@ def error(own: Floats, other: Floats) -> float:
 def spread_engine(network: Network, pinch: Pinch, spread: str) -> DiscreteEngine:
     """Return our discrete elements with faces that are even beds or springs at corners."""
     if spread == "corners":
-        return AtCorners(network, bed=STUDY_BED, pinch=pads_at_corners(pinch))
+        return AtCorners(network, bed=STUDY_BED, pinch=arch_pads.pads_at_corners(pinch))
     return DiscreteEngine(network, bed=STUDY_BED, pinch=pinch)
 
 
@@ -166,7 +133,7 @@ def compared(
     """Return a row on one reading of a step, or None if LMGC90 breaks off."""
     network, pinch = engine.network, Pinch(across, STUDY_PADS, side=PAD)
     assembly, bed = posed(padded(network, step, pinch, spread), spread)
-    twist, corner_force = bed_at_corners(assembly, bed)
+    twist, corner_force = arch_pads.bed_at_corners(assembly, bed)
     result = asked(python, scene_for(assembly, bed))
     if result is None or len(result["pair"]) != len(assembly.corner):
         return None
@@ -195,7 +162,7 @@ def _reactions(
     assembly: Assembly, corner_force: Floats, result: dict[str, Any], factor: float
 ) -> dict[str, float]:
     """Return forces at base and pads by both, N, and the largest stresses by LMGC90."""
-    ours = ground_forces(assembly, corner_force)
+    ours = arch_pads.ground_forces(assembly, corner_force)
     theirs = on_ground(result, len(assembly.centroid))
     weight = assembly.weight.sum(axis=0)
     tension, shear = stresses(result, len(assembly.centroid), factor)

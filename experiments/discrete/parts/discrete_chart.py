@@ -7,17 +7,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from seqopt.report._style import (
-    BLUE,
-    GREEN,
-    ORANGE,
-    SMALL,
-    VERMILION,
-    dress,
-    name_panels,
-    new_figure,
-    styled,
-)
+from experiments.harness.charts import subplots
+from seqopt.report._style import BLUE, GREEN, ORANGE, SMALL, VERMILION, dress, name_panels, styled
 
 PANELS = {"as printed": "even", "springs at corners": "corners"}  # joints, and as LMGC90 has them
 COLORS = {"node": (BLUE, "o"), "pads, width": (VERMILION, "^"), "pads, thickness": (ORANGE, "v")}
@@ -39,37 +30,35 @@ def chart(
     seen: pd.DataFrame,
     near: float,
 ) -> Figure:
-    """Draw the readings as stated, by joint, and those with the best pads."""
-    figure = new_figure(5.6)
-    first, second, third = figure.subplots(1, 3)
+    figure, panels = subplots(5.6, 1, 3)
+    first, second, third = panels
     for axes, joint in zip((first, second), PANELS, strict=True):
         readings(axes, errors[errors.index.get_level_values("joint") == joint].droplevel("joint"))
         witness(axes, seen[seen["spread"] == PANELS[joint]], list(study.index))
         axes.plot(study.to_numpy(), "ks", ms=6, label="printed (3DEC)", zorder=5)
         axes.set_title(f"joints {joint}" if joint == "as printed" else f"joints as {joint}")
         # the ratio of displacements is drawn evenly
-        axes.set_yscale(
-            "function",
-            functions=(lambda e: (e / 100 + 1) ** 0.3, lambda r: 100 * (r ** (1 / 0.3) - 1)),
-        )
+        even = (lambda e: (e / 100 + 1) ** 0.3, lambda r: 100 * (r ** (1 / 0.3) - 1))
+        axes.set_yscale("function", functions=even)
         axes.set(ylim=(-95, 650), yticks=TICKS)
     with_best_pads(third, best)
-    third.errorbar(
-        range(len(study)), study, near, fmt="ks", ms=6, capsize=4, zorder=5,
-        label=f"printed, ± {near:g} points",
-    )  # fmt: skip
+    look = {"fmt": "ks", "ms": 6, "capsize": 4, "zorder": 5}
+    third.errorbar(range(len(study)), study, near, label=f"printed, ± {near:g} points", **look)
     third.set(ylim=(-30, 40))
-    for axes in (first, second, third):
+    for axes in panels:
         tidy(axes, list(study.index))
-    name_panels(first, second, third)
+    dress(*panels)
+    name_panels(*panels)
     first.set_ylabel("mean difference of the double-cross model\nfrom the discrete elements [%]")
-    legends(figure, first, third)
+    look = {"loc": "outside lower left", "title": "(a) and (b)", "ncols": 2, "columnspacing": 1}
+    figure.legend(*first.get_legend_handles_labels(), alignment="left", **look)
+    look = {"loc": "outside lower right", "title": "(c)", "alignment": "left"}
+    figure.legend(*third.get_legend_handles_labels(), **look)
     figure.suptitle(words(best, study, seen), fontsize=SMALL, x=0.01, ha="left")
     return figure
 
 
 def readings(axes: Axes, errors: pd.DataFrame) -> None:
-    """Draw a line per grip and size of pads."""
     sides = sorted({side for _, side in errors.index if side})
     for grip, side in errors.index:
         dashes = DASHES[sides.index(side)] if side else "-"
@@ -80,7 +69,6 @@ def readings(axes: Axes, errors: pd.DataFrame) -> None:
 
 
 def witness(axes: Axes, seen: pd.DataFrame, bricks: list[int]) -> None:
-    """Draw what LMGC90 says, a mark per arch and grip."""
     if seen.empty:
         return
     at = [bricks.index(count) for count in seen["bricks"]]
@@ -109,22 +97,9 @@ def tidy(axes: Axes, bricks: list[int]) -> None:
     axes.set_xlabel("bricks placed")
     axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:+.0f}" if y else "0"))
     axes.axhline(0, color="0.5", lw=0.8, zorder=0)
-    dress(axes)
-
-
-def legends(figure: Figure, left: Axes, right: Axes) -> None:
-    """Name the lines of the panels below them."""
-    figure.legend(
-        *left.get_legend_handles_labels(),
-        loc="outside lower left", ncols=2, title="(a) and (b)", alignment="left", columnspacing=1,
-    )  # fmt: skip
-    figure.legend(
-        *right.get_legend_handles_labels(), loc="outside lower right", title="(c)", alignment="left"
-    )
 
 
 def words(best: pd.DataFrame, study: pd.Series[float], seen: pd.DataFrame) -> str:
-    """Return what the picture shows."""
     off = (best - study).abs().max(axis=1).min()
     text = (
         "Disagrees with print: no reading of the discrete elements gives the printed errors on all "

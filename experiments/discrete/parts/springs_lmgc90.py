@@ -5,11 +5,10 @@ with a cohesive zone, with stiffness per area. LMGC90 simulates once per process
 mesh is wrong and prints much, hence the files: ``python springs_lmgc90.py scene.json result.json``.
 
 The scene has ``blocks`` (vertices, faces, fixed, weight in N, centroid in m), ``normal`` and
-``tangential`` (N/m³), ``step`` (s) and ``steps``. The result has ``twist`` (B, 6), displacements of
-the centroids and small rotations, averaged over the last part of the time, ``sway``, the largest
-standard deviation of a displacement over that time, over the largest displacement, and at the end
-per contact point ``pair``, ``force`` on the pair's first block (N), its parts ``local`` (tangent,
-normal, tangent) and ``area`` (m²).
+``tangential`` (N/m³), ``step`` (s) and ``steps``. The result has ``twist`` (B, 6), mean motions of
+the centroids over the last part of the time, ``sway``, the largest standard deviation of a
+displacement over the largest one, and at the end per contact point ``pair``, ``force`` on the
+pair's first block (N), its parts ``local`` (tangent, normal, tangent) and ``area`` (m²).
 
 - The cohesive zone has no strength to lose and no friction. A joint then is linear: in compression
   the spring alone acts, in tension and in shear spring and zone in series, and `RIGID` and `HALVES`
@@ -81,7 +80,6 @@ def volume(block: dict[str, Any]) -> float:
 
 
 def frames(flat: Any) -> np.ndarray:
-    """Return axes of inertia (B, 3, 3), rows are unit vectors."""
     return np.array(flat, dtype=float).reshape(-1, 3, 3)
 
 

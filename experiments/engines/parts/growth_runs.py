@@ -33,10 +33,8 @@ def analyzed(network: seqopt.Network) -> Done:
 
 
 def searched(network: seqopt.Network, **more: object) -> Done:
-    """Choose the grips of the three-robot loop without proof."""
     engine, schedule = seqopt.make_engine("compliance", network), seqopt.three_robot_loop(network)
-    problem = seqopt.pose(engine, schedule, EQUATIONS, **more)
-    plan = seqopt.solve(problem, "cascade", proof=False)
+    plan = seqopt.solve(seqopt.pose(engine, schedule, EQUATIONS, **more), "cascade", proof=False)
     return engine, plan.steps, plan.models
 
 
@@ -57,8 +55,7 @@ def proven(network: seqopt.Network) -> Done:
 def proven_lazily(network: seqopt.Network) -> Done:
     """Find the least worst ratio of the three-robot loop, by the pairs that its proof needs."""
     engine, schedule = seqopt.make_engine("compliance", network), seqopt.three_robot_loop(network)
-    problem = seqopt.pose(engine, schedule, WORST_RATIO)
-    plan = seqopt.solve(problem, "minimax", lazy=True)
+    plan = seqopt.solve(seqopt.pose(engine, schedule, WORST_RATIO), "minimax", lazy=True)
     return engine, plan.steps, plan.models
 
 
@@ -83,8 +80,7 @@ def errors(engine: Engine, steps: Sequence[Step]) -> dict[str, float]:
 
     def largest(bricks: int, sets: np.ndarray, want: Want) -> float:
         wanted, index = network.index_of_grip
-        columns = index[np.searchsorted(wanted, sets)]
-        exact = solve_mixed(network, bricks, columns).edge_force
+        exact = solve_mixed(network, bricks, index[np.searchsorted(wanted, sets)]).edge_force
         off = np.abs(engine.solve(bricks, sets, want).edge_force - exact).max(axis=1)
         return float((off / np.abs(exact).max(axis=1)).max())
 
@@ -103,7 +99,6 @@ def errors(engine: Engine, steps: Sequence[Step]) -> dict[str, float]:
 
 
 def run(task: str, name: str) -> Row:
-    """Return what a task took, of a built-in scene or a chain by its brick count."""
     own = name.startswith("chain") or name == "arch25"
     scene = scene_named(name) if own else seqopt.load_scene(name)
     start, clock = time.process_time(), time.perf_counter()

@@ -6,8 +6,6 @@ length ``sqrt(12 c / k)`` about the joint, with ``EA/L = k`` and ``EI/L = GJ/L =
 these.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -40,47 +38,22 @@ class Peer(Protocol):
 
 @dataclass(frozen=True)
 class Chain:
-    """A partial structure as bars and joints between the inner nodes of its bricks.
-
-    Attributes
-    ----------
-    bricks : int
-    position, load : (2b, 3) float
-        Inner nodes, m, and the weight they carry, N.
-    springs : (s,) int
-        Springs that act.
-    joints : (s, 2) int
-        Inner nodes they join, `GROUND` first for a ground end.
-    point, anchor, across : (s, 3) float
-        Of the joints: position; fixed point of a ground end; a direction off the arch's plane.
-    stiffness : (2,) float
-        Of every joint, in translation and in rotation.
-    motion : (3N, 12b) sparse
-        Displacements of the network's nodes for those of the inner nodes.
-    half : (E, 3s) sparse
-        Forces of half-edges for the joints' forces on their second bodies.
-    inner : (b,) int
-        Edges along the bricks.
-    acts : (G,) bool
-        Which of the scene's ground ends act.
-    support : (A,) int
-        Joints at those A that do.
-    """
+    """A partial structure as bars and joints between the inner nodes of its bricks."""
 
     bricks: int
-    position: Floats
-    load: Floats
-    springs: Ints
-    joints: Ints
-    point: Floats
-    anchor: Floats
-    across: Floats
-    stiffness: Floats
-    motion: sparse.csr_array
-    half: sparse.csr_array
-    inner: Ints
-    acts: Bools
-    support: Ints
+    position: Floats  # (2b, 3) of the inner nodes, m
+    load: Floats  # (2b, 3) weight that these carry, N
+    springs: Ints  # (s,) that act
+    joints: Ints  # (s, 2) inner nodes they join, `GROUND` first for a ground end
+    point: Floats  # (s, 3) position of the joints
+    anchor: Floats  # (s, 3) fixed point of a ground end
+    across: Floats  # (s, 3) a direction off the arch's plane
+    stiffness: Floats  # (2,) of every joint, in translation and in rotation
+    motion: sparse.csr_array  # (3N, 12b) displacements of all nodes for those of the inner ones
+    half: sparse.csr_array  # (E, 3s) forces of half-edges for the joints' on their second bodies
+    inner: Ints  # (b,) edges along the bricks
+    acts: Bools  # (G,) which of the scene's ground ends act
+    support: Ints  # (A,) joints at those that do
 
     @property
     def length(self) -> float:
@@ -118,16 +91,16 @@ def chain_of(network: Network, bricks: int) -> Chain:
     place = {int(node): i for i, node in enumerate(network.inner.ravel())}
     joints = np.full((len(acting), 2), GROUND)
     row = {int(s): i for i, s in enumerate(acting)}
-    sides: list[tuple[int, int, float]] = []
-    for edge in range(network.count_edges(bricks)):
-        spring = int(network.edge_spring[edge])
-        if network.edge_kind[edge] == PartKind.INNER or spring not in row:
+    half = np.zeros((network.count_edges(bricks), len(acting), 3))
+    for edge in range(len(half)):
+        spring, kind = int(network.edge_spring[edge]), network.edge_kind[edge]
+        if kind == PartKind.INNER or spring not in row:
             continue
         first = network.edge_brick[edge] == springs.bodies[spring, 0]
-        if network.edge_kind[edge] == PartKind.JOINT:
+        if kind == PartKind.JOINT:
             joints[row[spring], 0 if first else 1] = place[int(network.edge_nodes[edge, 0])]
-        first = first and network.edge_kind[edge] == PartKind.JOINT
-        sides.append((edge, row[spring], -1.0 if first else 1.0))
+        sign = -1.0 if first and kind == PartKind.JOINT else 1.0
+        half[edge, row[spring]] = sign * network.edge_axis[edge]
     return Chain(
         bricks=bricks,
         position=network.node_position[network.inner[:bricks].ravel()],
@@ -139,20 +112,11 @@ def chain_of(network: Network, bricks: int) -> Chain:
         across=springs.axes[acting, 1],
         stiffness=kinds[0, :, 0],
         motion=_motion(network, bricks),
-        half=_half(network, bricks, sides, len(acting)),
-        inner=np.flatnonzero(network.edge_spring[: network.count_edges(bricks)] < 0),
+        half=sparse.csr_array(half.reshape(len(half), -1)),
+        inner=np.flatnonzero(network.edge_spring[: len(half)] < 0),
         acts=np.isin(springs.support, acting),
         support=np.array([row[s] for s in springs.support.tolist() if s in row], dtype=np.int64),
     )
-
-
-def _half(
-    network: Network, bricks: int, sides: list[tuple[int, int, float]], joints: int
-) -> sparse.csr_array:
-    out = np.zeros((network.count_edges(bricks), 3 * joints))
-    for edge, joint, sign in sides:
-        out[edge, 3 * joint : 3 * joint + 3] = sign * network.edge_axis[edge]
-    return sparse.csr_array(out)
 
 
 def _motion(network: Network, bricks: int) -> sparse.csr_array:
@@ -166,9 +130,7 @@ def _motion(network: Network, bricks: int) -> sparse.csr_array:
         if network.edge_kind[edge] != PartKind.JOINT:
             continue
         near, far = (int(n) for n in network.edge_nodes[edge])
-        spring = network.edge_spring[edge]
-        acts = network.springs.since[spring] <= bricks
-        share = 0.5 if acts else 1.0
+        share = 0.5 if network.springs.since[network.edge_spring[edge]] <= bricks else 1.0
         arm = network.node_position[far] - network.node_position[near]
         block = out[3 * far : 3 * far + 3, 6 * place[near] : 6 * place[near] + 6]
         block += share * np.hstack([np.eye(3), -skew(arm)])
@@ -198,14 +160,11 @@ class Beams(NamedTuple):
 
 
 def beams(chain: Chain) -> Beams:
-    """Return the structure as beams alone."""
     count, joints = len(chain.position), len(chain.joints)
     ends = count + np.arange(2 * joints).reshape(-1, 2)
     real = chain.joints != GROUND
-    along, half = (
-        np.arange(count).reshape(-1, 2),
-        np.stack([chain.joints[real], ends[real]], axis=1),
-    )
+    along = np.arange(count).reshape(-1, 2)
+    half = np.stack([chain.joints[real], ends[real]], axis=1)
     factor = np.full(chain.bricks + joints + len(half), CONTRAST)
     factor[chain.bricks : chain.bricks + joints] = 1.0
     return Beams(

@@ -5,8 +5,6 @@ half-edges as rigid offsets of the joints' beams, which leaves it two nodes a br
 need a bar for each half-edge. See `experiments.peers.parts.chain` for how they show rigid bricks.
 """
 
-from __future__ import annotations
-
 import ctypes
 import importlib
 import importlib.util
@@ -43,31 +41,19 @@ class OpenSees:
         self.bars = range(1, chain.bricks + 1)
         self.joints = range(chain.bricks + 1, chain.bricks + 1 + len(chain.joints))
         for tag in self.bars:
-            first, second = 2 * tag - 1, 2 * tag
-            span = chain.position[second - 1] - chain.position[first - 1]
+            span = chain.position[2 * tag - 1] - chain.position[2 * tag - 2]
             ops.geomTransf("Linear", tag, *_aside(span))
-            self._beam(tag, first, second, CONTRAST, float(np.linalg.norm(span)))
+            self._beam(tag, 2 * tag - 1, 2 * tag, CONTRAST, float(np.linalg.norm(span)))
         for tag, (i, j), s in zip(self.joints, chain.joints, range(len(chain.joints)), strict=True):
             first = i + 1 if i != GROUND else count + 1 + s
             start = chain.position[i] if i != GROUND else chain.anchor[s]
             if i == GROUND:
                 ops.node(int(first), *start.tolist())
                 ops.fix(int(first), *[1] * 6)
-            offsets = chain.ends[s] - np.stack([start, chain.position[j]])
-            ops.geomTransf(
-                "Linear", tag, *_aside(chain.across[s]), "-jntOffset", *offsets.ravel().tolist()
-            )
+            offsets = (chain.ends[s] - np.stack([start, chain.position[j]])).ravel().tolist()
+            ops.geomTransf("Linear", tag, *_aside(chain.across[s]), "-jntOffset", *offsets)
             self._beam(tag, int(first), int(j) + 1, 1.0, chain.length)
         self.bases = (count + 1 + chain.support).tolist()
-        self._load_and_analysis()
-
-    def _beam(self, tag: int, first: int, second: int, factor: float, length: float) -> None:
-        axial, turn = (factor * length * self.chain.stiffness).tolist()
-        ends = (first, second)
-        self.ops.element("elasticBeamColumn", tag, *ends, axial, 1.0, 1.0, turn, turn, turn, tag)
-
-    def _load_and_analysis(self) -> None:
-        ops = self.ops
         ops.timeSeries("Constant", 1)
         ops.pattern("Plain", 1, 1)
         for i, force in enumerate(self.chain.load.tolist()):
@@ -78,6 +64,11 @@ class OpenSees:
         ops.algorithm("Linear")
         ops.integrator("LoadControl", 1.0)
         ops.analysis("Static", "-noWarnings")
+
+    def _beam(self, tag: int, first: int, second: int, factor: float, length: float) -> None:
+        axial, turn = (factor * length * self.chain.stiffness).tolist()
+        ends = (first, second)
+        self.ops.element("elasticBeamColumn", tag, *ends, axial, 1.0, 1.0, turn, turn, turn, tag)
 
     def solve(self, grips: Ints, want: Want) -> Answer:
         """See `Peer.solve`."""
@@ -179,14 +170,10 @@ class Conmech:
         parts, sections = self.beams, self.beams.sections(chain).tolist()
         fixed = set(parts.fixed.tolist())
         nodes = [io.Node(x, i, i in fixed) for i, x in enumerate(parts.position.tolist())]
-        pairs = enumerate(parts.pairs.tolist())
-        elements = [io.Element(pair, b, f"b{b}") for b, pair in pairs]
-        shapes = [
-            io.CrossSec(axial, turn, turn, turn, [f"b{b}"])
-            for b, (axial, turn) in enumerate(sections)
-        ]
-        tags = [element.elem_tag for element in elements]
-        unit = [io.Material(1.0, 1.0, 1.0, 0.0, tags)]
+        elements = [io.Element(pair, b, f"b{b}") for b, pair in enumerate(parts.pairs.tolist())]
+        named = enumerate(sections)
+        shapes = [io.CrossSec(axial, turn, turn, turn, [f"b{b}"]) for b, (axial, turn) in named]
+        unit = [io.Material(1.0, 1.0, 1.0, 0.0, [element.elem_tag for element in elements])]
         supports = [io.Support([1] * 6, node) for node in sorted(fixed)]
         self.frame = solver.NumpyStiffness(io.Model(nodes, elements, supports, [], unit, shapes))
         zero = [0.0] * 3
@@ -211,23 +198,17 @@ class Conmech:
         if want & Want.EDGES:
             bars = ends[:bricks, 7]
             own = np.stack([frame._rot_list[b][:3, :3] for b in self.beams.joint_beams(chain)])
-            local = ends[self.beams.joint_beams(chain), 7:10]
-            force = -np.einsum("bji,bj->bi", own, local)
+            force = -np.einsum("bji,bj->bi", own, ends[self.beams.joint_beams(chain), 7:10])
         if want & Want.DISPLACEMENTS:
-            order = np.argsort(moved[:, 0])
-            state = moved[order, 1:][: len(chain.position)]
+            state = moved[np.argsort(moved[:, 0]), 1:][: len(chain.position)]
         return chain.answer(state, force, bars, held, base)
 
 
-PACKAGES: dict[str, Callable[[Chain], Peer]] = {
-    "PyNite": PyNite,
-    "OpenSeesPy": OpenSees,
-    "pyconmech": Conmech,
-}
+PACKAGES: dict[str, Callable[[Chain], Peer]]
+PACKAGES = {"PyNite": PyNite, "OpenSeesPy": OpenSees, "pyconmech": Conmech}
 
 
 def missing_packages() -> list[str]:
-    """Return the packages that are not installed or do not load."""
     out = []
     for name, module in MODULES.items():
         try:

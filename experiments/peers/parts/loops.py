@@ -8,8 +8,6 @@ A rigid brick has six unknowns at its first inner node. If its second is held th
 moved there; if both are, they are turned so that only the turn about the line between is free.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,30 +23,17 @@ from seqopt.network.network import GROUND, Network
 
 @dataclass(frozen=True)
 class Kept:
-    """What is computed once per brick count; n unknowns.
-
-    Attributes
-    ----------
-    rigid : bool
-    matrix : (n, n) float
-    load : (n,) float
-    edge, displacement, support : (E, n), (3N, n), (6A, n) sparse
-        Fields for unit displacements.
-    edge_of_load : (E, 6b) sparse
-        Edge forces for unit forces on the inner nodes; rigid bricks only.
-    dead : (6b,) float
-        Weight on the inner nodes.
-    """
+    """What is computed once per brick count; n unknowns."""
 
     chain: Chain
     rigid: bool
-    matrix: Floats
-    load: Floats
-    edge: sparse.csr_array
-    displacement: sparse.csr_array
-    support: sparse.csr_array
-    edge_of_load: sparse.csr_array
-    dead: Floats
+    matrix: Floats  # (n, n)
+    load: Floats  # (n,)
+    edge: sparse.csr_array  # (E, n), as the next two for unit displacements
+    displacement: sparse.csr_array  # (3N, n)
+    support: sparse.csr_array  # (6A, n)
+    edge_of_load: sparse.csr_array  # (E, 6b) for unit forces on inner nodes; rigid bricks only
+    dead: Floats  # (6b,) weight on the inner nodes
 
 
 def gap_rows(chain: Chain, place: Ints, position: Floats) -> Floats:
@@ -104,7 +89,8 @@ def kept(network: Network, bricks: int, *, rigid: bool, factor: float = 1.0) -> 
     onto = np.zeros((edge.shape[0], 6 * bricks))
     if rigid:
         maps = build_statics(network)
-        node = _from_first(chain)
+        shifts = [_shift(chain, brick) for brick in range(bricks)]
+        node = linalg.block_diag(*(np.vstack([np.eye(6), shift]) for shift in shifts))
         spread = np.zeros((len(network.springs.since), 3, matrix.shape[0]))
         spread[chain.springs] = force[:, :3]
         edge = maps.edge_of_spring[: len(onto)] @ spread.reshape(-1, matrix.shape[0])
@@ -114,8 +100,7 @@ def kept(network: Network, bricks: int, *, rigid: bool, factor: float = 1.0) -> 
         matrix += np.einsum("bik,bij,bjl->kl", bars, stiffness, bars, optimize=True)
         edge[chain.inner] = along
     base = force[chain.support]
-    arm = chain.point[chain.support] - chain.anchor[chain.support]
-    base[:, 3:] += skew(arm) @ base[:, :3]
+    base[:, 3:] += skew(chain.point[chain.support] - chain.anchor[chain.support]) @ base[:, :3]
     return Kept(
         chain=chain,
         rigid=rigid,
@@ -127,15 +112,6 @@ def kept(network: Network, bricks: int, *, rigid: bool, factor: float = 1.0) -> 
         edge_of_load=sparse.csr_array(onto),
         dead=chain.load.ravel(),
     )
-
-
-def _from_first(chain: Chain) -> Floats:
-    """Return the motions (12b, 6b) of the inner nodes for those of the bricks' first ones."""
-    out = np.zeros((12 * chain.bricks, 6 * chain.bricks))
-    for b in range(chain.bricks):
-        out[12 * b : 12 * b + 6, 6 * b : 6 * b + 6] = np.eye(6)
-        out[12 * b + 6 : 12 * b + 12, 6 * b : 6 * b + 6] = _shift(chain, b)
-    return out
 
 
 def _shift(chain: Chain, brick: int) -> Floats:
@@ -164,7 +140,10 @@ class Loop:
         """See `Peer.solve`."""
         parts = self.parts
         turns = self._turns(grips) if parts.rigid else []
-        fixed = self._fixed(grips, turns)
+        held = set(grips.tolist())
+        fixed = (6 * np.unique(self._at(grips))[:, None] + np.arange(3)).ravel()
+        pairs = [b for b, _ in turns if {2 * b, 2 * b + 1} <= held]
+        fixed = np.array([*fixed, *(6 * b + i for b in pairs for i in (4, 5))])
         matrix, load = parts.matrix.copy(), parts.load.copy()
         for brick, turn in turns:
             part = slice(6 * brick, 6 * brick + 6)
@@ -177,65 +156,46 @@ class Loop:
         for brick, turn in turns:
             state[6 * brick : 6 * brick + 6] = turn @ state[6 * brick : 6 * brick + 6]
         force = self._reactions(grips, state)
-        edge: Floats = np.zeros(0)
-        moved: Floats = np.zeros(0)
-        if want & Want.EDGES:
-            edge = self._edges(grips, state, force)
-        if want & Want.DISPLACEMENTS:
-            moved = (parts.displacement @ state).reshape(-1, 3)
+        edge = self._edges(grips, state, force) if want & Want.EDGES else np.zeros(0)
+        moved = parts.displacement @ state if want & Want.DISPLACEMENTS else np.zeros(0)
         support = np.zeros((len(parts.chain.acts), 6))
         support[parts.chain.acts] = (parts.support @ state).reshape(-1, 6)
-        return Answer(edge, moved, force, support)
+        return Answer(edge, moved.reshape(-1, 3), force, support)
 
     def _factor_and_solve(self, matrix: Floats, load: Floats) -> Floats:
         values = matrix[self.take]
         if self.banded:
             band = np.zeros((self.width + 1, len(load)))
             band[self.band] = values
-            return np.asarray(
-                linalg.solveh_banded(
-                    band, load, overwrite_ab=True, overwrite_b=True, lower=True, check_finite=False
-                )
-            )
-        shape = matrix.shape
-        stored = sparse.csc_array((values, *self.pattern), shape=shape)
+            options = {"overwrite_ab": True, "overwrite_b": True, "check_finite": False}
+            return np.asarray(linalg.solveh_banded(band, load, lower=True, **options))
+        stored = sparse.csc_array((values, *self.pattern), shape=matrix.shape)
         options = {"SymmetricMode": True}
         factors = splu(stored, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
         return np.asarray(factors.solve(load))
 
     def _turns(self, grips: Ints) -> list[tuple[int, Floats]]:
         """Return bricks whose unknowns change, and the motions of the first node for unit ones."""
-        held = set(grips.tolist())
-        out = []
+        chain, held, out = self.parts.chain, set(grips.tolist()), []
         for brick in sorted({g // 2 for g in held if g % 2}):
+            turn = np.linalg.inv(_shift(chain, brick))
             if 2 * brick in held:
-                span = (
-                    self.parts.chain.position[2 * brick + 1] - self.parts.chain.position[2 * brick]
-                )
-                turn: Floats = np.eye(6)
-                turn[3:, 3:] = np.linalg.svd(span[None])[2].T  # about the line first
-            else:
-                turn = np.asarray(np.linalg.inv(_shift(self.parts.chain, brick)), dtype=float)
+                span = np.diff(chain.position[2 * brick : 2 * brick + 2], axis=0)
+                turn = np.eye(6)
+                turn[3:, 3:] = np.linalg.svd(span)[2].T  # about the line first
             out.append((brick, turn))
         return out
 
-    def _fixed(self, grips: Ints, turns: list[tuple[int, Floats]]) -> Ints:
-        if not self.parts.rigid:
-            return np.asarray((6 * grips[:, None] + np.arange(3)).ravel())
-        bricks = np.unique(grips // 2)
-        fixed = (6 * bricks[:, None] + np.arange(3)).ravel()
-        pairs = [b for b, _ in turns if {2 * b, 2 * b + 1} <= set(grips.tolist())]
-        return np.array([*fixed, *(6 * b + i for b in pairs for i in (4, 5))])
+    def _at(self, grips: Ints) -> Ints:
+        """Return which six unknowns each grip holds some of."""
+        return grips // 2 if self.parts.rigid else grips
 
     def _reactions(self, grips: Ints, state: Floats) -> Floats:
         """Return the grips' forces; two on one brick each take what reaches their own node."""
         parts = self.parts
-        if not parts.rigid:
-            rows = (6 * grips[:, None] + np.arange(3)).ravel()
-            return np.asarray(parts.matrix[rows] @ state - parts.load[rows]).reshape(-1, 3)
-        rows = (6 * (grips // 2)[:, None] + np.arange(3)).ravel()
+        rows = (6 * self._at(grips)[:, None] + np.arange(3)).ravel()
         force = np.asarray(parts.matrix[rows] @ state - parts.load[rows]).reshape(-1, 3)
-        for g in (g for g in grips.tolist() if g % 2 and g - 1 in grips):
+        for g in (g for g in grips.tolist() if parts.rigid and g % 2 and g - 1 in grips):
             self._split(grips, g, state, force)
         return force
 
@@ -247,8 +207,7 @@ class Loop:
         span = parts.chain.position[second] - parts.chain.position[second - 1]
         axis = span / np.linalg.norm(span)
         mine = np.cross(total[3:], span) / (span @ span)
-        edge = parts.chain.inner[brick]
-        reach = parts.edge[[edge]] @ state + axis @ parts.chain.load[second]
+        reach = parts.edge[[parts.chain.inner[brick]]] @ state + axis @ parts.chain.load[second]
         mine = mine - float(reach[0]) * axis
         force[list(grips).index(second)] = mine
         force[list(grips).index(second - 1)] = total[:3] - mine
@@ -263,15 +222,9 @@ class Loop:
         return np.asarray(edge)
 
 
-LOOPS = {
-    "SciPy bars, SuperLU": (False, False),
-    "SciPy bars, banded": (False, True),
-    "SciPy bricks, SuperLU": (True, False),
-    "SciPy bricks, banded": (True, True),
-}
+LOOPS = [f"SciPy {body}, {way}" for body in ("bars", "bricks") for way in ("SuperLU", "banded")]
 
 
 def loop(network: Network, bricks: int, name: str, factor: float = 1.0) -> Loop:
-    """Return a loop by its name."""
-    rigid, banded = LOOPS[name]
-    return Loop(kept(network, bricks, rigid=rigid, factor=factor), banded=banded)
+    parts = kept(network, bricks, rigid="bricks" in name, factor=factor)
+    return Loop(parts, banded="banded" in name)

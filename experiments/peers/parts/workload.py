@@ -1,7 +1,5 @@
 """What engine and peers are asked: every distinct model of the three-robot loop."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Literal, NamedTuple
 
@@ -11,15 +9,14 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.optimize import linprog
 
+from seqopt import Network, three_robot_loop
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Fields, Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import find_formulation
-from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS
 
 SETTINGS = ("reactions", "criterion", "all fields")
@@ -35,9 +32,7 @@ class Case(NamedTuple):
 
     def asked(self, setting: str) -> Want:
         """Return what a setting asks of these models."""
-        return {"reactions": Want.SUPPORT, "criterion": self.want, "all fields": Want.RESPONSES}[
-            setting
-        ]
+        return (Want.SUPPORT, self.want, Want.RESPONSES)[SETTINGS.index(setting)]
 
 
 class Recorder:
@@ -60,7 +55,6 @@ class Recorder:
 
 
 def workload(net: Network) -> tuple[Layers, list[Case]]:
-    """Return the posed problem and all models it takes."""
     recorder = Recorder(net)
     problem = candidate_layers(recorder, three_robot_loop(net), EQUATIONS)
     assert problem.evaluation.models  # evaluated here, and so recorded
@@ -129,12 +123,10 @@ def by_networkx(problem: PlacementProblem) -> float:
     raised = max(0.0, -min(float(cost.min()) for cost in costs))
     for layer, cost in enumerate(costs):
         for i, j in zip(*np.nonzero(np.isfinite(cost)), strict=True):
-            weight = float(cost[i, j]) + raised
-            graph.add_edge((layer, int(i)), (layer + 1, int(j)), weight=weight)
+            graph.add_edge((layer, int(i)), (layer + 1, int(j)), weight=float(cost[i, j]) + raised)
     for j in range(costs[-1].shape[1]):
         graph.add_edge((len(costs), j), GOAL, weight=0.0)
-    length = nx.dijkstra_path_length(graph, (0, 0), GOAL)
-    return float(length) - raised * len(costs)
+    return float(nx.dijkstra_path_length(graph, (0, 0), GOAL)) - raised * len(costs)
 
 
 def by_linprog(method: Literal["highs-ds", "highs-ipm"]) -> Callable[[PlacementProblem], float]:
@@ -163,7 +155,6 @@ def by_linprog(method: Literal["highs-ds", "highs-ipm"]) -> Callable[[PlacementP
 
 
 def by_formulation(name: str) -> Callable[[PlacementProblem], float]:
-    """Return a registered formulation as a solver of the same kind."""
     which = find_formulation(name)
     return lambda problem: float(which.solve(problem).objective)
 

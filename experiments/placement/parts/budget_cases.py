@@ -5,8 +5,6 @@ SECONDS``, which prints a row as JSON. The process keeps to one core, and to the
 `MOST_MEMORY` allows.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import resource
@@ -19,16 +17,13 @@ from pathlib import Path
 import numpy as np
 
 from experiments.harness.runs import scene_named
+from seqopt import CRITERIA, build_network, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, SeqoptError
 from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.layers import Layers, candidate_layers, steps_over, travel
-from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import Formulation, Selection, Watch, find_formulation
 from seqopt.plan.judge.certificate import judge
-from seqopt.plan.solving import solve
-from seqopt.sequence.three_robots import three_robot_loop
-from seqopt.study.published import CRITERIA
 
 COUNTED = ("F_largest", "M_sup")
 COMPARED = ("equations-2-3", "weighted")
@@ -55,13 +50,11 @@ def posed(bricks: int, criterion: str, case: str) -> Layers:
     choice = solve(problem, "overlap_dp").selection.choice
     if case == NO_BUDGET:
         return problem
-    whole = _whole(problem, choice)
-    spent = [budget.spent(choice) for budget in whole]
-    kept = [
-        replace(budget, bound=share * most if i == 0 else float(np.floor(share * most)))
-        for i, (budget, share, most) in enumerate(zip(whole, CASES[case], spent, strict=True))
-        if share is not None
-    ]
+    kept = []
+    for i, (budget, share) in enumerate(zip(_whole(problem, choice), CASES[case], strict=True)):
+        if share is not None:
+            bound = share * budget.spent(choice)
+            kept.append(replace(budget, bound=float(np.floor(bound)) if i else bound))
     return replace(problem, budgets=tuple(kept))
 
 
@@ -94,7 +87,6 @@ def timed(
 
 
 def row(problem: Layers, name: str, limit: float) -> dict[str, object]:
-    """Return what a formulation finds and proves of a problem, and what that takes."""
     formulation = find_formulation(name)
     found, seconds = timed(problem, formulation, limit)
     out: dict[str, object] = {"solve": seconds, "verify": 0.0}

@@ -1,7 +1,5 @@
 """The charts of speed against accuracy."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -11,58 +9,32 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from experiments.harness.charts import note, subplots, ticks
 from experiments.harness.results import two
 from experiments.harness.runs import NO_PROOF, REFERENCE
 from seqopt.arrays import Floats
-from seqopt.report._style import (
-    BLUE,
-    GRAY,
-    GREEN,
-    INK,
-    ORANGE,
-    PURPLE,
-    SKY,
-    SMALL,
-    VERMILION,
-    dress,
-    look,
-    name_panels,
-    new_figure,
-    plain,
-    styled,
-)
+from seqopt.report import _style as inks
+from seqopt.report._style import dress, looks, name_panels, plain, styled
 from seqopt.report.text import in_words
 
 
 def pareto(cost: Floats, loss: Floats) -> np.ndarray:
     """Return which points no other one beats in cost and loss at once, (n,) bool."""
     no_worse = (cost[:, None] <= cost) & (loss[:, None] <= loss)
-    better = (cost[:, None] < cost) | (loss[:, None] < loss)
-    return ~(no_worse & better).any(axis=0)
+    return ~(no_worse & ((cost[:, None] < cost) | (loss[:, None] < loss))).any(axis=0)
 
 
 def performance_profile(costs: pd.DataFrame, ratios: Floats) -> pd.DataFrame:
     """Return the share of instances that each solver does within a multiple of the best.
 
-    Parameters
-    ----------
-    costs : DataFrame
-        A row per instance, a column per solver; infinite where it failed.
-    ratios : (r,) float
+    ``costs`` have a row per instance and a column per solver; infinite where it failed.
     """
-    best = costs.min(axis=1)
-    relative = costs.div(best, axis=0)
-    return pd.DataFrame(
-        {name: [(relative[name] <= r).mean() for r in ratios] for name in costs}, index=ratios
-    )
+    return data_profile(costs.div(costs.min(axis=1), axis=0), ratios)
 
 
 def data_profile(evaluations: pd.DataFrame, budgets: Floats) -> pd.DataFrame:
     """Return the share of instances that each solver does within a budget of evaluations."""
-    return pd.DataFrame(
-        {name: [(evaluations[name] <= b).mean() for b in budgets] for name in evaluations},
-        index=budgets,
-    )
+    return pd.DataFrame({b: (evaluations <= b).mean() for b in budgets}).T
 
 
 def shifted_mean(values: Floats, shift: float) -> float:
@@ -71,9 +43,9 @@ def shifted_mean(values: Floats, shift: float) -> float:
 
 
 KINDS = {
-    "sequence without choice": ("D", GRAY),
-    "three-robot loop, choice proven": ("o", BLUE),
-    "free schedule, choice proven": ("s", GREEN),
+    "sequence without choice": ("D", inks.GRAY),
+    "three-robot loop, choice proven": ("o", inks.BLUE),
+    "free schedule, choice proven": ("s", inks.GREEN),
 }
 ASIDE = {  # points: where words stand
     "free, 3 robots": (-45, -4),
@@ -91,22 +63,21 @@ WAYS = {
 }
 TOP = 2.0  # worst ratio up to which points are drawn
 LINES = {
-    ("frame 1e7", "overlap_dp"): ("everything, stiff-bar frame", VERMILION, "s", "-"),
-    (REFERENCE, "overlap_dp"): ("everything, rigid bricks", BLUE, "o", "-"),
-    (REFERENCE, NO_PROOF): ("the same without proof", SKY, "D", "--"),
+    ("frame 1e7", "overlap_dp"): ("everything, stiff-bar frame", inks.VERMILION, "s", "-"),
+    (REFERENCE, "overlap_dp"): ("everything, rigid bricks", inks.BLUE, "o", "-"),
+    (REFERENCE, NO_PROOF): ("the same without proof", inks.SKY, "D", "--"),
 }
 CHOOSING = {
-    "overlap_mip": ("choice alone: integer program", PURPLE, "^", ":"),
-    "overlap_lp": ("choice alone: linear program", ORANGE, "v", ":"),
-    "overlap_dp": ("choice alone: dynamic programming", INK, "P", ":"),
+    "overlap_mip": ("choice alone: integer program", inks.PURPLE, "^", ":"),
+    "overlap_lp": ("choice alone: linear program", inks.ORANGE, "v", ":"),
+    "overlap_dp": ("choice alone: dynamic programming", inks.INK, "P", ":"),
 }
 
 
 @styled
 def worst_step_chart(runs: pd.DataFrame, ratios: pd.DataFrame) -> Figure:
     """Draw time against the worst ratio on the reference arch, and how time grows with bricks."""
-    figure = new_figure(4.2)
-    worst, growth = figure.subplots(1, 2)
+    figure, (worst, growth) = subplots(4.2, 1, 2)
     _ratios(worst, ratios)
     _growth(growth, runs[runs["criterion"] == "equations-2-3"])
     dress(worst, growth)
@@ -115,39 +86,29 @@ def worst_step_chart(runs: pd.DataFrame, ratios: pd.DataFrame) -> Figure:
 
 
 def _ratios(axes: Axes, ratios: pd.DataFrame) -> None:
-    """Draw time against the worst ratio of ways with and without a schedule that is given."""
     fixed, free = ratios["proven"].fillna("") == "", ratios["way"].str.startswith("free")
     kinds = (fixed, ~fixed & ~free, ~fixed & free)
     for rows, (label, (marker, color)) in zip(kinds, KINDS.items(), strict=True):
-        part = ratios[rows]
-        height = part["worst_ratio"].clip(upper=TOP)
-        axes.plot(part["seconds"], height, marker, color=color, ms=6, label=label)
-    for row in ratios.to_dict("records"):
-        way, ratio = str(row["way"]), float(row["worst_ratio"])
+        height = ratios["worst_ratio"][rows].clip(upper=TOP)
+        axes.plot(ratios["seconds"][rows], height, marker, color=color, ms=6, label=label)
+    for way, seconds, ratio in ratios[["way", "seconds", "worst_ratio"]].itertuples(index=False):
         words = WAYS.get(way, way.removeprefix("free, "))
         words += f": {ratio:.0f}, above" if ratio > TOP else ""
-        axes.annotate(
-            words,
-            (float(row["seconds"]), min(ratio, TOP)),
-            ASIDE.get(way, (7, -3)),
-            textcoords="offset points",
-            fontsize=SMALL,
-        )
+        note(axes, words, (seconds, min(ratio, TOP)), ASIDE.get(way, (7, -3)))
     proven = ratios[~fixed].reset_index(drop=True)
     loss = proven["worst_ratio"].round(15).to_numpy()
     best = proven[pareto(proven["seconds"].to_numpy(), loss)].sort_values("seconds")
-    axes.step(best["seconds"], best["worst_ratio"], color=INK, lw=0.8, where="post", zorder=0)
-    axes.axhline(1, color=GRAY, lw=0.8, ls=":")
+    axes.step(best["seconds"], best["worst_ratio"], color=inks.INK, lw=0.8, where="post", zorder=0)
+    axes.axhline(1, color=inks.GRAY, lw=0.8, ls=":")
     axes.set(xscale="log", xlabel="time from scene to plan [s]", xlim=(0.03, 400), ylim=(0.6, 2.45))
     axes.set(ylabel="worst step over the best published maxima")
-    axes.set_title("reference arch: the worst step")
+    axes.set(title="reference arch: the worst step")
     axes.set_yticks([0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0])
     plain(axes.xaxis)
     axes.legend(loc="upper right")
 
 
 def _growth(axes: Axes, runs: pd.DataFrame) -> None:
-    """Draw how the exact choice costs more with more bricks, by stage."""
     for (engine, name), (label, color, marker, dashes) in LINES.items():
         own = runs[(runs["engine"] == engine) & (runs["formulation"] == name)]
         own = own[own["status"] != "time limit"].sort_values("bricks")
@@ -158,12 +119,10 @@ def _growth(axes: Axes, runs: pd.DataFrame) -> None:
         choose = own[["compile", "solve"]].sum(axis=1)
         axes.plot(own["bricks"], choose, dashes, marker=marker, color=color, label=label)
     axes.set(xscale="log", yscale="log", xlabel="bricks of the arch", ylabel="time [s]")
-    axes.set(ylim=(1e-4, 3e5))
-    axes.set_xticks([7, 13, 25, 49], ["7", "13", "25", "49"])
-    axes.minorticks_off()
+    axes.set(ylim=(1e-4, 3e5), title="longer arches: time by stage")
+    ticks([7, 13, 25, 49], axes.xaxis)
     plain(axes.yaxis)
     axes.set_yticks([1e-4, 1e-3, 0.01, 0.1, 1, 10, 100])
-    axes.set_title("longer arches: time by stage")
     axes.legend(loc="upper left")
 
 
@@ -180,29 +139,30 @@ EXACT = {
     "overlap_lp": "linear program",
     "overlap_mip": "integer program",
 }
-LOOKS = {
-    name: look(number) for number, name in enumerate((*EXACT, "cascade", "rank_search", "beam"))
-}
+LOOKS = looks((*EXACT, "cascade", "rank_search", "beam"))
 ENGINES = {
     REFERENCE: "exactly rigid bricks",
     "auto": "automatic choice of engine",
     "frame 1e7": "stiff-bar frame",
     "discrete": "discrete elements",
 }
-LABEL: dict[str, Any] = {
-    "textcoords": "offset points",
-    "va": "center",
-    "fontsize": SMALL,
-    "in_layout": False,
+DONE: dict[str, Any] = {"marker": "o", "color": inks.BLUE, "ms": 8, "ls": "none"}
+WITHOUT = {
+    "marker": "D",
+    "color": inks.VERMILION,
+    "mfc": "white",
+    "ms": 6,
+    "mew": 1.4,
+    "ls": "none",
 }
+SOLID, HATCHED = {"color": inks.BLUE}, {"fc": "white", "ec": inks.VERMILION, "hatch": "////"}
+LABEL: dict[str, Any] = {"va": "center", "in_layout": False}
 
 
 @styled
 def headline(runs: pd.DataFrame) -> Figure:
-    """Draw how long ways to a plan of the reference arch take, exact ones and others."""
     table = runs[(runs["scene"] == "arch25") & (runs["criterion"] == "equations-2-3")]
-    figure = new_figure(4.9)
-    ways, engines = figure.subplots(2, 1, height_ratios=[7, 5])
+    figure, (ways, engines) = subplots(4.9, 2, 1, height_ratios=[7, 5])
     _ways(ways, table[table["engine"] == REFERENCE].set_index("formulation"))
     _engines(engines, table)
     for panel in (ways, engines):
@@ -213,33 +173,32 @@ def headline(runs: pd.DataFrame) -> Figure:
 
 
 def _ways(axes: Axes, table: pd.DataFrame) -> None:
-    """Draw a bar for every way to choose, its gap beside it."""
     order = [name for name in (*SEARCHES, *EXACT) if name in table.index]
     least = float(table["total"].get(NO_PROOF, np.nan))
     for row, name in enumerate(order):
         time, gap = float(table["total"][name]), float(table["gap"][name])
         exact = name in EXACT
-        style = {"color": BLUE} if exact else {"fc": "white", "ec": VERMILION, "hatch": "////"}
+        style = (
+            {"color": inks.BLUE}
+            if exact
+            else {"fc": "white", "ec": inks.VERMILION, "hatch": "////"}
+        )
         axes.barh(row, time, height=0.62, **style)
         worth = "the best plan, proven" if exact else "the best plan, but not proven"
         if gap > EXACT_GAP:
             worth = f"a plan {100 * gap:.2g} % above the best"
         if name == "overlap_dp":
             worth += f": {100 * (time / least - 1):.0f} % more time than without proof"
-        axes.annotate(f"{time:.3f} s, {worth}", (time, row), (5, 0), **LABEL)
+        note(axes, f"{time:.3f} s, {worth}", (time, row), (5, 0), **LABEL)
     axes.set_yticks(range(len(order)), [(SEARCHES | EXACT)[name] for name in order])
     axes.set(ylim=(len(order) - 0.4, -0.6), xlim=(0, 2.4 * float(table["total"][order].max())))
-    axes.set_xlabel("time from scene to plan [s]")
-    axes.set_title("Ways to choose the grips of the reference arch, with exactly rigid bricks")
-    kinds = [
-        Patch(color=BLUE, label="exact"),
-        Patch(fc="white", ec=VERMILION, hatch="////", label="heuristic"),
-    ]
+    title = "Ways to choose the grips of the reference arch, with exactly rigid bricks"
+    axes.set(xlabel="time from scene to plan [s]", title=title)
+    kinds = [Patch(**SOLID, label="exact"), Patch(**HATCHED, label="heuristic")]
     axes.legend(handles=kinds, loc="upper right")
 
 
 def _engines(axes: Axes, table: pd.DataFrame) -> None:
-    """Draw the times of every engine, with the exact choice and without proof."""
     times = table.pivot_table(index="engine", columns="formulation", values="total")
     ended = table[table["status"] == "time limit"]["engine"].unique()
     error = table.groupby("engine")["error"].max()
@@ -248,59 +207,49 @@ def _engines(axes: Axes, table: pd.DataFrame) -> None:
     for row, name in enumerate(names):
         exact, search = float(times["overlap_dp"][name]), float(times[NO_PROOF][name])
         if name in ended:
-            axes.plot(exact, row, ">", color=BLUE, mfc="white", ms=8)
-            axes.annotate(f"stopped after {exact:.0f} s", (exact, row), (8, 0), **LABEL)
+            axes.plot(exact, row, ">", color=inks.BLUE, mfc="white", ms=8)
+            note(axes, f"stopped after {exact:.0f} s", (exact, row), (8, 0), **LABEL)
             continue
-        axes.plot([search, exact], [row, row], color=GRAY, lw=1.2, zorder=1)
-        axes.plot(search, row, "D", color=VERMILION, mfc="white", ms=6, mew=1.4)
-        axes.plot(exact, row, "o", color=BLUE, ms=8)
+        axes.plot([search, exact], [row, row], color=inks.GRAY, lw=1.2, zorder=1)
+        axes.plot(search, row, **WITHOUT)
+        axes.plot(exact, row, **DONE)
         text = f"{two(exact)} s"
         if name != REFERENCE:
             text += f", {two(exact / base)} times as long"
         if error[name] > 0:
             text += f"; responses off by {error[name]:.0e}".replace("e-0", "e-")
-        axes.annotate(text, (exact, row), (9, 0), **LABEL)
-        axes.annotate(f"{two(search)} s", (search, row), (-8, 0), ha="right", **LABEL)
+        note(axes, text, (exact, row), (9, 0), **LABEL)
+        note(axes, f"{two(search)} s", (search, row), (-8, 0), ha="right", **LABEL)
     axes.set_yticks(range(len(names)), [ENGINES[name] for name in names])
     axes.set(ylim=(len(names) - 0.4, -0.6), xscale="log", xlim=(0.01, 2e5))
-    axes.set_xlabel("time from scene to plan [s], logarithmic")
+    axes.set(xlabel="time from scene to plan [s], logarithmic")
     axes.set_title("Engines that compute the responses")
-    axes.set_xticks([0.01, 0.1, 1, 10, 100], ["0.01", "0.1", "1", "10", "100"])
-    axes.minorticks_off()
-    kinds = [
-        Line2D([], [], marker="o", color=BLUE, ms=8, ls="none", label="exact: dynamic programming"),
-        Line2D([], [], marker="D", color=VERMILION, mfc="white", ms=6, mew=1.4, ls="none",
-               label="heuristic: without proof"),
-    ]  # fmt: skip
+    ticks([0.01, 0.1, 1, 10, 100], axes.xaxis)
+    words = {"exact: dynamic programming": DONE, "heuristic: without proof": WITHOUT}
+    kinds = [Line2D([], [], label=text, **mark) for text, mark in words.items()]
     axes.legend(handles=kinds, loc="upper right")
 
 
 @styled
 def profile_charts(runs: pd.DataFrame) -> Figure:
-    """Draw performance profiles of the choice and data profiles in model evaluations."""
     own = runs[(runs["engine"] == REFERENCE) & runs["formulation"].isin(LOOKS)]
     own = own.assign(instance=own["scene"] + own["criterion"], choose=own["compile"] + own["solve"])
-    figure = new_figure(3.7)
-    parts = figure.subplots(1, 3, sharey=True)
-    ratios = np.logspace(0, 4, 81)
+    figure, parts = subplots(3.7, 1, 3, sharey=True)
     for axes, tolerance, text in ((parts[0], 1e-6, "optimal"), (parts[1], CLOSE, "within 1 %")):
-        done = own["choose"].where(own["gap"] <= tolerance, np.inf)
-        costs = own.assign(cost=done).pivot_table(
-            values="cost", index="instance", columns="formulation"
-        )
-        _steps(axes, performance_profile(costs, ratios))
+        costs = _by_instance(own, own["choose"].where(own["gap"] <= tolerance, np.inf))
+        _steps(axes, performance_profile(costs, np.logspace(0, 4, 81)))
         axes.set(xlabel="time to choose\nover the shortest", title=f"plans {text}, by time")
     parts[0].set(ylabel="share of the scenes and criteria [%]")
     models = own["models"].astype(float).where(own["gap"] <= CLOSE, np.inf)
-    counts = own.assign(cost=models / own["moves"]).pivot_table(
-        values="cost", index="instance", columns="formulation"
-    )
-    _steps(parts[2], data_profile(counts, np.logspace(1, 4, 81)))
+    _steps(parts[2], data_profile(_by_instance(own, models / own["moves"]), np.logspace(1, 4, 81)))
     parts[2].set(xlabel="structures analyzed\nper repositioning", title="within 1 %, by analyses")
     name_panels(*parts)
-    handles, labels = parts[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    figure.legend(*parts[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
+
+
+def _by_instance(own: pd.DataFrame, cost: pd.Series) -> pd.DataFrame:
+    return own.assign(cost=cost).pivot_table("cost", "instance", "formulation")
 
 
 def _steps(axes: Axes, profile: pd.DataFrame) -> None:

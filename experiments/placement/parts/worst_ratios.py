@@ -1,15 +1,12 @@
 """One way to a plan of the reference arch: its time, and its worst ratio over the published maxima.
 
-Plans of the loop and of the free schedule make different sums least and have different steps. What
-all of them have is a worst step: the largest of grip force, M_sup, T_max and D_max over the best
+What all plans have is a worst step: the largest of grip force, M_sup, T_max and D_max over the best
 maxima that any published method reaches, one after the other, as exactly rigid bricks answer. Times
 run from the scene to the plan, with its proof; of several repeats the median, after one that does
 not count.
 
 Command: ``python -m experiments.placement.parts.worst_ratios WAY`` prints the row of a way as JSON.
 """
-
-from __future__ import annotations
 
 import json
 import statistics
@@ -21,11 +18,10 @@ from functools import partial
 import numpy as np
 
 import seqopt
+from seqopt import Plan, Step
 from seqopt.graph.states.states import build_states
 from seqopt.plan.judge.schedules import _state_columns
-from seqopt.plan.plan import Plan
 from seqopt.sequence.rules import with_robots
-from seqopt.sequence.steps import Step
 from seqopt.study.published import WORST_RATIO, published_plan
 
 Steps = Sequence[Step]
@@ -59,9 +55,7 @@ def free(aim: str, robots: int = 3, **words: object) -> tuple[Steps, str]:
 
 
 WAYS: dict[str, Callable[[], tuple[Steps, str]]] = {
-    "sequential": partial(fixed, "sequential"),
-    "cantilever": partial(fixed, "cantilever"),
-    "published": partial(fixed, "published"),
+    **{name: partial(fixed, name) for name in ("sequential", "cantilever", "published")},
     "loop, ranks": partial(chosen, "equations-2-3", "overlap_dp"),
     "loop, sum of ratios": partial(chosen, "weighted-published", "overlap_dp"),
     "loop, worst ratio": partial(chosen, WORST_RATIO.name, "minimax"),
@@ -74,24 +68,15 @@ WAYS: dict[str, Callable[[], tuple[Steps, str]]] = {
 
 
 def row(way: str) -> Row:
-    """Return what a way takes, and what its plan is worth."""
     seconds, (steps, least) = timed(WAYS[way])
     if seconds < 1:
-        times = [timed(WAYS[way])[0] for _ in range(REPEATED)]
-        seconds = statistics.median(times)
+        seconds = statistics.median(timed(WAYS[way])[0] for _ in range(REPEATED))
     robots = len(steps[0].grips)
-    return {
-        "way": way,
-        "robots": robots,
-        "proven": least,
-        "seconds": seconds,
-        "worst_ratio": worst_ratio(steps, robots),
-        "steps": len(steps),
-    }
+    out = {"way": way, "robots": robots, "proven": least, "seconds": seconds}
+    return out | {"worst_ratio": worst_ratio(steps, robots), "steps": len(steps)}
 
 
 def timed(call: Callable[[], tuple[Steps, str]]) -> tuple[float, tuple[Steps, str]]:
-    """Return the seconds of a call, and what it returns."""
     start = time.perf_counter()
     made = call()
     return time.perf_counter() - start, made

@@ -1,7 +1,5 @@
 """Rigid blocks that are not bricks of a scene: textbook structures and outside assemblies."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -31,10 +29,10 @@ class Blocks:
 
     def assembly(self, density: float, gravity: float = 9.81) -> Assembly:
         """Return the assembly of blocks of one density (kg/m³)."""
-        volume = np.array([_volume(block) for block in self.vertex])
-        centroid = np.array([_centroid(block) for block in self.vertex])
-        weight = np.zeros_like(centroid)
-        weight[:, 2] = -density * gravity * volume
+        parts = [_tetrahedra(block) for block in self.vertex]
+        volume = np.array([sizes.sum() for sizes, _ in parts])
+        centroid = np.array([sizes @ middle / sizes.sum() for sizes, middle in parts])
+        weight = np.outer(np.abs(volume), [0.0, 0.0, -density * gravity])
         return touching(centroid, weight, self.contacts)
 
 
@@ -44,18 +42,16 @@ def touching(centroid: Floats, weight: Floats, contacts: Sequence[Contact]) -> A
     bodies = np.array([contact.bodies for contact in contacts])
     normals = np.array([_normal(face) for face in faces])
     middle = np.array([face.mean(axis=0) for face in faces])
-    start = np.where(
-        (bodies[:, 0] == GROUND)[:, None], middle, centroid[bodies[:, 0]]
-    )  # the ground lies behind its face
+    ends = bodies.tolist()
+    # the ground lies behind its face
+    start = np.where((bodies[:, 0] == GROUND)[:, None], middle, centroid[bodies[:, 0]])
     turned = np.einsum("ci,ci->c", normals, centroid[bodies[:, 1]] - start) < 0
     normals[turned] *= -1
     return Assembly(
         block_name=tuple(range(1, len(centroid) + 1)),
         centroid=centroid,
         weight=weight,
-        contact_name=tuple(
-            f"{'ground' if a == GROUND else a + 1}-{b + 1}" for a, b in bodies.tolist()
-        ),
+        contact_name=tuple(f"{'ground' if a == GROUND else a + 1}-{b + 1}" for a, b in ends),
         bodies=bodies,
         normal=normals,
         corner=np.concatenate(faces),
@@ -77,11 +73,9 @@ def stack(offsets: Sequence[float], size: Sequence[float] = (1.0, 1.0, 1.0)) -> 
         base = flat + np.array([x, 0, i * height])
         vertex.append(np.concatenate([base, base + up]))
         before = at[i - 1] if i else x
-        low, high = max(x, before), min(x, before) + length
-        face = np.array([[low, 0, 0], [high, 0, 0], [high, width, 0], [low, width, 0]])
-        contacts.append(
-            Contact((i - 1, i) if i else (GROUND, 0), face + np.array([0, 0, i * height]))
-        )
+        low, high, z = max(x, before), min(x, before) + length, i * height
+        face = np.array([[low, 0, z], [high, 0, z], [high, width, z], [low, width, z]])
+        contacts.append(Contact((i - 1, i) if i else (GROUND, 0), face))
     return Blocks(np.array(vertex), tuple(contacts))
 
 
@@ -113,12 +107,3 @@ def _tetrahedra(block: Floats) -> tuple[Floats, Floats]:
     corners = block[np.array(triangles)] - middle
     volume = np.linalg.det(corners) / 6
     return volume, corners.sum(axis=1) / 4 + middle
-
-
-def _volume(block: Floats) -> float:
-    return abs(float(_tetrahedra(block)[0].sum()))
-
-
-def _centroid(block: Floats) -> Floats:
-    volume, middle = _tetrahedra(block)
-    return np.asarray(volume @ middle / volume.sum())

@@ -1,21 +1,19 @@
 """Figures of `experiments.stability.dry_map`: what stands, is built dry, and needs which bond."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from experiments.harness.charts import note, subplots
 from seqopt.contact.mortar import EPOXY
-from seqopt.report._style import GRAY, SMALL, dress, looks, name_panels, new_figure, plain, styled
+from seqopt.report._style import GRAY, SMALL, dress, looks, name_panels, plain, styled
 
 
 @styled
 def grips_chart(table: pd.DataFrame) -> Figure:
-    figure = new_figure(3.4)
-    share, work = figure.subplots(1, 2)
+    figure, (share, work) = subplots(3.4, 1, 2)
     for name, style in looks(table["case"].unique()).items():
         rows = table[table["case"] == name]
         line = style.line() | {"lw": 1.1, "ms": 4, "label": name}
@@ -38,10 +36,9 @@ LARGEST = 0.7  # payload over the arch's weight at the end of the scale
 
 @styled
 def map_chart(table: pd.DataFrame) -> Figure:
-    """Draw a panel per thickness and number of robots: friction over bricks."""
     thicknesses, robots = (sorted(table[c].unique()) for c in ("thickness_m", "robots"))
-    figure = new_figure(6.6)
-    axes = figure.subplots(len(thicknesses), len(robots), sharex=True, sharey=True, squeeze=False)
+    look = {"sharex": True, "sharey": True, "squeeze": False}
+    figure, axes = subplots(6.6, len(thicknesses), len(robots), **look)
     for row, thickness in zip(axes, thicknesses, strict=True):
         for axis, count in zip(row, robots, strict=True):
             part = table[(table["thickness_m"] == thickness) & (table["robots"] == count)]
@@ -82,8 +79,7 @@ LOOKS = looks(NAMES)
 
 @styled
 def failing_chart(steps: pd.DataFrame, scale: pd.DataFrame) -> Figure:
-    figure = new_figure(6.6)
-    (bond, shift), (force, size) = figure.subplots(2, 2)
+    figure, ((bond, shift), (force, size)) = subplots(6.6, 2, 2)
     for name, style in LOOKS.items():
         table = steps[steps["method"] == name]
         worst = table.groupby("bricks")[["bond_needed_Pa", "D_max_1e-3mm", "F_largest_N"]].max()
@@ -99,9 +95,9 @@ def failing_chart(steps: pd.DataFrame, scale: pd.DataFrame) -> Figure:
     bond.set(ylabel="bond needed [kPa]", ylim=(0.7 * NONE / 1e3, 2e4), title="bond")
     ticks = [NONE / 1e3, 1.0, 10.0, 100.0, 1e3]
     bond.set_yticks(ticks, ["none", *(f"{tick:,g}" for tick in ticks[1:])])
-    shift.set(ylabel="largest displacement D_max [1e-3 mm]", ylim=(2e-3, 2e3))
-    shift.set_title("displacement, bonded bricks")
+    shift.set(ylabel="largest displacement D_max [1e-3 mm]", title="displacement, bonded bricks")
     force.set(ylabel="largest robot force [N]", ylim=(0, 460), title="robot force, bonded bricks")
+    shift.set_ylim(2e-3, 2e3)
     for axes in (bond, shift, force):
         axes.set_xlabel("bricks placed")
     plain(shift.yaxis)
@@ -113,16 +109,11 @@ def failing_chart(steps: pd.DataFrame, scale: pd.DataFrame) -> Figure:
 
 
 def _limit(axes: Axes, value: float, text: str, at: float = 0.01, up: float = 2) -> None:
-    """Draw a limit with its name."""
     axes.axhline(value, color=GRAY, lw=1, ls="-")
-    axes.annotate(
-        text, (at, value), (0, up), xycoords=("axes fraction", "data"),
-        textcoords="offset points", fontsize=SMALL,
-    )  # fmt: skip
+    note(axes, text, (at, value), (0, up), xycoords=("axes fraction", "data"))
 
 
 def _grow(axes: Axes, scale: pd.DataFrame) -> None:
-    """Draw the bond that every method needs as arches grow."""
     for (name, label), table in scale.groupby(["method", "scaling"], sort=False):
         if label == "heavier" or str(name) not in LOOKS:
             continue

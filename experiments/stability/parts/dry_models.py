@@ -1,7 +1,5 @@
 """Arches that free robots build dry, how far two come, and the bond that larger arches need."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
@@ -11,23 +9,17 @@ import numpy as np
 
 from experiments.harness.scenes import longer
 from formulations.contact.limit_analysis import compile_equilibrium
-from seqopt.arrays import Ints, Vector
+from seqopt import FreeRules, Network, Scene, Step, build_network, make_engine, pose, solve
+from seqopt.arrays import Vector
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, Mortar
-from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import build_states
-from seqopt.network.build import build_network
-from seqopt.network.network import Network
-from seqopt.plan.solving import pose, solve
 from seqopt.problem.standing import Standing
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Robot, Spring
-from seqopt.scene.scene import Scene
-from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability._prover import Prover
@@ -81,16 +73,9 @@ def least_payload(cell: Cell) -> dict[str, float]:
     while high < np.inf and high > CLOSE * low:
         middle = float(np.sqrt(low * high)) if low else high / 4
         low, high = (low, middle) if can_build(cell, middle * weight) else (middle, high)
-    return {
-        "bricks": bricks,
-        "thickness_m": thickness,
-        "friction": friction,
-        "robots": robots,
-        "span_m": abs(last[0] - first[0]),
-        "weight_N": weight,
-        "least_payload": high,
-        "too_little": low,
-    }
+    row = {"bricks": bricks, "thickness_m": thickness, "friction": friction, "robots": robots}
+    row |= {"span_m": abs(last[0] - first[0]), "weight_N": weight, "least_payload": high}
+    return row | {"too_little": low}
 
 
 Sets = frozenset[frozenset[int]]
@@ -100,9 +85,8 @@ def reached(screen: Screen, robots: int, *, proven: bool) -> int:
     """Return how many bricks can be placed by robots that hold and release wherever they like.
 
     Between two states one grip is taken or let go; a brick is placed by a robot that is free, and
-    held by it at either node. Payloads are the scene's; reach counts for nothing, so that no
-    schedule of as many robots of less reach comes farther. A state must be
-    proven to stand, or else not be proven to fall.
+    held by it at either node. Reach counts for nothing, so that no schedule of as many robots of
+    less reach comes farther. A state must be proven to stand, or else not be proven to fall.
     """
     before: Sets = frozenset([frozenset()])
     total = len(screen.network.inner)
@@ -118,13 +102,9 @@ def reached(screen: Screen, robots: int, *, proven: bool) -> int:
 
 def _standing(screen: Screen, bricks: int, robots: int, *, proven: bool) -> Sets:
     """Return the sets of nodes with which a partial structure stands."""
-    every = [
-        held
-        for count in range(robots + 1)
-        for held in combinations(range(1, 2 * bricks + 1), count)
-    ]
-    rows: Ints = np.array([held + (0,) * (robots - len(held)) for held in every])
-    found = screen.stands(bricks, rows)
+    places = range(1, 2 * bricks + 1)
+    every = [held for count in range(robots + 1) for held in combinations(places, count)]
+    found = screen.stands(bricks, np.array([held + (0,) * (robots - len(held)) for held in every]))
     kept = found == 1 if proven else found != -1
     return frozenset(frozenset(every[i]) for i in np.flatnonzero(kept))
 
@@ -157,42 +137,25 @@ def scaled(scene: Scene, size: float, density: float) -> Scene:
         return factor * x, factor * y, factor * z
 
     def stiff(spring: Spring) -> dict[str, Vector]:
-        return {
-            "position": point(spring.position),
-            "translational_stiffness": point(spring.translational_stiffness, size**2),
-            "rotational_stiffness": point(spring.rotational_stiffness, size**4),
-        }
+        powers = {"position": 1, "translational_stiffness": 2, "rotational_stiffness": 4}
+        return {name: point(getattr(spring, name), size**power) for name, power in powers.items()}
 
-    return replace(
-        scene,
-        bricks=tuple(
-            replace(
-                brick,
-                position=point(brick.position),
-                dimensions=point(brick.dimensions),
-                density=density * brick.density,
-            )
-            for brick in scene.bricks
-        ),
-        joints=tuple(replace(joint, **stiff(joint)) for joint in scene.joints),
-        grounds=tuple(
-            replace(ground, anchor=point(ground.anchor), **stiff(ground))
-            for ground in scene.grounds
-        ),
-        robots=tuple(
-            replace(robot, payload=robot.payload * density * size**3) for robot in scene.robots
-        ),
-    )
+    bricks = [
+        replace(b, position=point(b.position), dimensions=point(b.dimensions))
+        for b in (replace(brick, density=density * brick.density) for brick in scene.bricks)
+    ]
+    joints = [replace(joint, **stiff(joint)) for joint in scene.joints]
+    grounds = [replace(end, anchor=point(end.anchor), **stiff(end)) for end in scene.grounds]
+    robots = [replace(r, payload=r.payload * density * size**3) for r in scene.robots]
+    parts = {"bricks": bricks, "joints": joints, "grounds": grounds, "robots": robots}
+    return replace(scene, **{name: tuple(made) for name, made in parts.items()})
 
 
-def bonds(net: Network, steps: tuple[Step, ...]) -> list[float]:
-    """Return the bond that every step needs, Pa."""
-    out = []
-    for step in steps:
-        assembly = step_assembly(net, step.bricks, step.grips)
-        proven = Prover(assembly, compile_equilibrium)(bonded(assembly, DRY))
-        out.append(proven.value * assembly.stress_scale)
-    return out
+def bond(net: Network, step: Step) -> float:
+    """Return the bond that a step needs, Pa."""
+    assembly = step_assembly(net, step.bricks, step.grips)
+    proven = Prover(assembly, compile_equilibrium)(bonded(assembly, DRY))
+    return proven.value * assembly.stress_scale
 
 
 def extremes(label: str, times: float, scene: Scene, methods: Plans) -> Rows:
@@ -201,18 +164,12 @@ def extremes(label: str, times: float, scene: Scene, methods: Plans) -> Rows:
     for name, steps in methods.items():
         table = analyze(engine, steps)
         robots = [force_column(robot) for robot in scene.robots]
-        needed = np.array(bonds(engine.network, steps))
-        yield {
-            "scaling": label,
-            "times": times,
-            "bricks": len(scene.bricks),
-            "method": name,
-            "bond_needed_Pa": needed.max(),
-            "steps_without_bond_pct": 100 * float((needed <= 1e-6 * needed.max()).mean()),
-            "F_largest_N": float(table[robots].abs().to_numpy(float)[~table[robots].isna()].max()),
-            "M_sup_Nm": table["M_sup_Nm"].max(),
-            "D_max_1e-3mm": table["D_max_1e-3mm"].max(),
-        }
+        needed = np.array([bond(engine.network, step) for step in steps])
+        row = {"scaling": label, "times": times, "bricks": len(scene.bricks), "method": name}
+        row |= {"bond_needed_Pa": needed.max()}
+        row |= {"steps_without_bond_pct": 100 * float((needed <= 1e-6 * needed.max()).mean())}
+        row |= {"F_largest_N": float(table[robots].astype(float).abs().max(axis=None))}
+        yield row | table[["M_sup_Nm", "D_max_1e-3mm"]].max().to_dict()
 
 
 def growth(scene: Scene, methods: Plans, sizes: tuple[int, ...]) -> Rows:

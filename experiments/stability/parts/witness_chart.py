@@ -1,13 +1,12 @@
 """The picture of what the witnesses say."""
 
-from __future__ import annotations
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from experiments.harness.charts import note
 from experiments.harness.results import stored, two
 from experiments.stability.parts.witness_cra import SOUND, TORN
 from seqopt.report._style import SMALL, dress, name_panels, new_figure, styled
@@ -16,19 +15,14 @@ from seqopt.stability.limit_analysis import EXACT
 
 STANDS, FALLS, OPEN = (verdict.value for verdict in Verdict)
 COLOURS = {STANDS: "#0072B2", FALLS: "#D55E00", OPEN: "0.45"}
-GROUPS = {
-    "sample": ("o", 5e-10),
-    "stack": ("s", 8e-9),
-    "incline": ("D", 1.2e-7),
-    "arch": ("^", 2e-6),
-}  # marker, and where those that stand are drawn
+GROUPS = {"sample": ("o", 5e-10), "stack": ("s", 8e-9), "incline": ("D", 1.2e-7)}
+GROUPS |= {"arch": ("^", 2e-6)}  # marker, and where those that stand are drawn
 CRA = {"optimal": STANDS, "acceptable": STANDS, "infeasible": FALLS}  # anything else: open
 LEFT, RIGHT, BOTTOM, TOP = 5e-11, 40.0, 1e-9, 10.0
 
 
 @styled
 def chart(table: pd.DataFrame, times: pd.DataFrame, differ: set[str]) -> Figure:
-    """Draw verdicts against RBE's tension, times, and one arch at several densities."""
     figure = new_figure(6.8)
     panels = figure.subplot_mosaic(
         [["all", "all"], ["times", "density"]], height_ratios=[2.1, 1], width_ratios=[1, 1.1]
@@ -55,11 +49,10 @@ def _scatter(axes: Axes, table: pd.DataFrame, differ: set[str]) -> None:
         for chosen, edge in ((~odd & ~twice, "none"), (~odd & twice, "k")):
             colour = part.loc[chosen, "ours"].map(COLOURS)
             axes.scatter(x[chosen], y[chosen], 32, c=colour, marker=marker, ec=edge, lw=0.9)
-        axes.scatter(
-            x[odd], y[odd], 44, c="w", marker=marker, ec=part.loc[odd, "ours"].map(COLOURS), lw=1.8
-        )
-        for name, at in zip(part.loc[odd, "case"], zip(x[odd], y[odd], strict=True), strict=True):
-            axes.annotate(name, at, (8, 0), textcoords="offset points", va="center", fontsize=SMALL)
+        edge = part.loc[odd, "ours"].map(COLOURS)
+        axes.scatter(x[odd], y[odd], 44, c="w", marker=marker, ec=edge, lw=1.8)
+        for name, *at in zip(part.loc[odd, "case"], x[odd], y[odd], strict=True):
+            note(axes, name, at, (8, 0), va="center")
         axes.scatter([], [], 32, c="0.5", marker=marker, lw=0, label=group)
     for name, face, edge, width in (
         ("LMGC90 agrees too (black edge)", "0.5", "k", 0.9),
@@ -69,10 +62,8 @@ def _scatter(axes: Axes, table: pd.DataFrame, differ: set[str]) -> None:
     for verdict in (STANDS, FALLS):
         axes.scatter([], [], 32, c=COLOURS[verdict], marker="s", lw=0, label=f"seqopt: {verdict}")
     axes.set(xscale="log", yscale="log", xlim=(LEFT, RIGHT), ylim=(BOTTOM / 3, 3 * TOP))
-    powers = range(-4, 2)
-    axes.set_xticks(
-        [3e-8, *(10.0**k for k in powers)], ["none", *(f"$10^{{{k}}}$" for k in powers)]
-    )
+    powers = {f"$10^{{{k}}}$": 10.0**k for k in range(-4, 2)}
+    axes.set_xticks([3e-8, *powers.values()], ["none", *powers])
     axes.minorticks_off()
     axes.set_xlabel("bond that is lacking, by seqopt (heaviest weight over mean face)")
     axes.set_ylabel("tension that is left, by RBE (mean weight of a block)")
@@ -107,9 +98,8 @@ def _density(axes: Axes, table: pd.DataFrame) -> None:
         for column, verdict in enumerate(word):
             corner = (column - 0.48, row - 0.44)
             axes.add_patch(Rectangle(corner, 0.96, 0.88, color=COLOURS[verdict], lw=0))
-            axes.text(
-                column, row, short[verdict], ha="center", va="center", color="w", fontsize=SMALL
-            )
+            look = {"ha": "center", "va": "center", "color": "w", "fontsize": SMALL}
+            axes.text(column, row, short[verdict], **look)
     axes.set_yticks(range(len(words)), list(words))
     axes.set_xticks(range(len(table)), [f"{x:g}" for x in table["density"]])
     axes.set(xlim=(-0.5, len(table) - 0.5), ylim=(len(words) - 0.5, -0.5), xlabel="density [kg/m³]")
@@ -131,12 +121,10 @@ def words(table: pd.DataFrame, witness: str) -> pd.Series:
 def differing(table: pd.DataFrame, witness: str) -> set[tuple[str, str]]:
     """Return where a witness decides otherwise than we."""
     word = words(table, witness)
-    differs = (word != OPEN) & (word != table["ours"])
-    return {(case, witness) for case in table.loc[differs, "case"]}
+    return {(case, witness) for case in table.loc[(word != OPEN) & (word != table["ours"]), "case"]}
 
 
 def picture() -> Figure:
-    """Return the figure from stored rows; times are those of the run that they tell."""
     table = stored("witnesses")
     words_of = ["rbe", "no_tension", "cra", "lmgc90"]
     table[words_of] = table[words_of].fillna("")

@@ -8,8 +8,6 @@ to 8 % too wide in its corners. `coupled` (CRA) asks also that the forces belong
 the blocks, which rejects blocks that are wedged; a local search, its "infeasible" is no proof.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json
@@ -64,28 +62,24 @@ def sample_scene(name: str) -> Scene:
     graph = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
     graph = graph["data"]["graph"]["data"]
     keys = {key: i for i, key in enumerate(graph["node"])}
-    solids = tuple(_solid(node["block"]["data"]) for node in graph["node"].values())
+    solids = tuple(_solid(**node["block"]["data"]) for node in graph["node"].values())
     marked = {keys[key] for key, node in graph["node"].items() if node.get("is_support")}
     supports = frozenset(marked | {keys[str(i)] for i in SAMPLES[name].supports})
-    stored = [
-        _touch((keys[u], keys[v]), face["data"]["points"], face["data"]["frame"]["data"])
-        for u, ends in graph["edge"].items()
-        for v, edge in ends.items()
-        for face in edge.get("interfaces", ())
-    ]
+    stored = []
+    for u, ends in graph["edge"].items():
+        for v, edge in ends.items():
+            for face in (each["data"] for each in edge.get("interfaces", ())):
+                axes = [face["frame"]["data"][name] for name in ("xaxis", "yaxis")]
+                pair = keys[u], keys[v]
+                stored.append(Touch(pair, np.array(face["points"]), np.array(axes)))
     scene = Scene(solids, supports, tuple(t for t in stored if not supports >= set(t.pair)))
     return scene if stored else detected(scene, SAMPLES[name])
 
 
-def _solid(block: dict[str, Any]) -> Solid:
-    number = {key: i for i, key in enumerate(block["vertex"])}
-    vertex = np.array([[v["x"], v["y"], v["z"]] for v in block["vertex"].values()])
-    faces = tuple(tuple(number[str(i)] for i in face) for face in block["face"].values())
-    return Solid(vertex, faces)
-
-
-def _touch(pair: tuple[int, int], points: Any, frame: dict[str, Any]) -> Touch:
-    return Touch(pair, np.array(points), np.array([frame["xaxis"], frame["yaxis"]]))
+def _solid(vertex: dict[str, Any], face: dict[str, Any], **_: Any) -> Solid:
+    number = {key: i for i, key in enumerate(vertex)}
+    faces = tuple(tuple(number[str(i)] for i in corners) for corners in face.values())
+    return Solid(np.array([[v["x"], v["y"], v["z"]] for v in vertex.values()]), faces)
 
 
 def detected(scene: Scene, sample: Sample) -> Scene:
@@ -95,14 +89,13 @@ def detected(scene: Scene, sample: Sample) -> Scene:
     with contextlib.redirect_stdout(io.StringIO()):
         find(assembly, nmax=20, amin=sample.area, tmax=sample.distance)
     touches = []
-    for (u, v), face in _faces(assembly):
-        frame = {"xaxis": list(face.frame.xaxis), "yaxis": list(face.frame.yaxis)}
-        touches.append(_touch((u, v), face.points, frame))
+    for pair, face in _faces(assembly):
+        axes = np.array([[*face.frame.xaxis], [*face.frame.yaxis]])
+        touches.append(Touch(pair, np.array(face.points), axes))
     return replace(scene, touches=tuple(touches))
 
 
 def _compas(scene: Scene) -> Any:
-    """Return the scene as an assembly of compas_cra."""
     assembly = import_module("compas_cra.datastructures").CRA_Assembly()
     make = import_module("compas_assembly.datastructures").Block.from_vertices_and_faces
     frame = import_module("compas.geometry").Frame
@@ -172,16 +165,9 @@ def without_tension(scene: Scene, friction: float) -> Verdict:
         octagon = matrices.friction_setup(assembly, friction)
         load = matrices.external_force_setup(assembly, len(scene.free) / scene.volume).ravel()
     corners = balance.shape[1] // 3
-    found = linprog(
-        np.zeros(3 * corners),
-        A_ub=octagon,
-        b_ub=np.zeros(octagon.shape[0]),
-        A_eq=balance,
-        b_eq=-load,
-        bounds=[(0, None), (None, None), (None, None)] * corners,
-        method="highs-ipm",
-        options={"time_limit": LIMIT},
-    )
+    parts = np.zeros(3 * corners), octagon, np.zeros(octagon.shape[0]), balance, -load
+    bounds = [(0, None), (None, None), (None, None)] * corners
+    found = linprog(*parts, bounds, method="highs-ipm", options={"time_limit": LIMIT})
     return {0: Verdict.STANDS, 2: Verdict.FALLS}.get(found.status, Verdict.UNDECIDED)
 
 

@@ -1,7 +1,5 @@
 """Solids of any shape that touch: what all witnesses are shown, and how we read it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -26,24 +24,23 @@ class Solid:
     def mass(self) -> tuple[float, Floats]:
         """Volume and centroid; every face is a fan of triangles around its middle."""
         corner = self.vertex - self.vertex.mean(axis=0)
-        fans = [corner[list(face)] for face in self.faces]
-        parts = [
-            np.stack([fan, np.roll(fan, -1, axis=0), np.tile(fan.mean(axis=0), (len(fan), 1))], 1)
-            for fan in fans
-        ]
+        parts = []
+        for fan in (corner[list(face)] for face in self.faces):
+            middle = np.broadcast_to(fan.mean(axis=0), fan.shape)
+            parts.append(np.stack([fan, np.roll(fan, -1, axis=0), middle], 1))
         triangles = np.concatenate(parts)
         volume = np.linalg.det(triangles) / 6
         total = float(volume.sum())
-        middle = volume @ triangles.sum(axis=1) / 4 / total
-        return total, middle + self.vertex.mean(axis=0)
+        return total, (volume @ triangles.sum(axis=1) / 4 / total) + self.vertex.mean(axis=0)
 
     @property
     def convex(self) -> bool:
         """Whether no vertex lies before a face, but for a ten-thousandth of the size."""
         for face in self.faces:
-            spoke = self.vertex[list(face)] - self.vertex[list(face)].mean(axis=0)
+            middle = self.vertex[list(face)].mean(axis=0)
+            spoke = self.vertex[list(face)] - middle
             normal = np.cross(spoke, np.roll(spoke, -1, axis=0)).sum(axis=0)
-            height = (self.vertex - self.vertex[list(face)].mean(axis=0)) @ normal
+            height = (self.vertex - middle) @ normal
             if height.max() > 1e-4 * np.linalg.norm(normal) * np.ptp(self.vertex, axis=0).max():
                 return False
         return True
@@ -112,8 +109,7 @@ def scene_of(blocks: Blocks, supports: set[int]) -> Scene:
         if a == GROUND or {a, b} <= supports:
             continue
         first = contact.corner[1] - contact.corner[0]
-        second = contact.corner[-1] - contact.corner[0]
-        normal = np.cross(first, second)
+        normal = np.cross(first, contact.corner[-1] - contact.corner[0])
         if normal @ (solids[b].mass[1] - solids[a].mass[1]) < 0:
             normal = -normal
         axes = np.array([first, np.cross(normal, first)])
@@ -125,8 +121,7 @@ def scene_of(blocks: Blocks, supports: set[int]) -> Scene:
 def arch(ratio: float) -> Scene:
     """Return a semicircular arch of a thickness over radius, between two fixed springers."""
     count = VOUSSOIRS + 2
-    half_angle = 0.5 * np.pi * count / VOUSSOIRS
-    return scene_of(ring(count, 5.0, 5.0 * ratio, half_angle), {0, count - 1})
+    return scene_of(ring(count, 5.0, 5.0 * ratio, 0.5 * np.pi * count / VOUSSOIRS), {0, count - 1})
 
 
 def incline(turn: float = 0.0) -> Scene:

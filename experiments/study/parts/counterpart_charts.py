@@ -1,7 +1,5 @@
 """Pictures of the counterparts: printed values beside ours, with the agreement as a caption."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Callable
 
@@ -10,36 +8,23 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from experiments.study.parts.counterpart_model_charts import (
-    OFF,
-    OURS,
-    STUDY,
-    discrete,
-    geometry,
-    number_of,
-    of,
-    pair,
-    tidy,
-    vault_tests,
-)
+from experiments.study.parts import counterpart_model_charts as models
+from experiments.study.parts.counterpart_model_charts import OFF, OURS, STUDY, number_of, of, pair
 from experiments.study.parts.counterpart_page import NEAR, caption
 from experiments.study.parts.counterpart_rows import LOOP, RESPONSES, Ours, plan_rows
 from seqopt.engines.interface import Want
-from seqopt.report._style import INK, SMALL, new_figure, plain, styled
+from seqopt.report._style import INK, SMALL, dress, new_figure, plain, styled
 from seqopt.report.draw import ROBOT_COLORS, View, draw_bricks, draw_grips
 
 VIEW = View(azimuth=35, elevation=22)
 CAPTIONS = {
-    "F_rob1 [N]": "robot 1, F_rob1 [N]",
-    "F_rob2 [N]": "robot 2, F_rob2 [N]",
-    "F_rob3 [N]": "robot 3, F_rob3 [N]",
+    **{f"F_rob{i} [N]": f"robot {i}, F_rob{i} [N]" for i in (1, 2, 3)},
     "F_sup [N]": "support, F_sup [N]",
     "M_sup [N m]": "support, M_sup [N m]",
     "F_min [N]": "largest compression [N]",
     "T_max [N]": "largest tension T_max [N]",
     "F_avg [N]": "mean axial force [N]",
     "T_pct [%]": "edges in tension [%]",
-    "D_max [1e-3 mm]": "D_max [1e-3 mm]",
     "D_avg [1e-3 mm]": "mean displacement [1e-3 mm]",
     "D_std [1e-3 mm]": "its deviation [1e-3 mm]",
 }
@@ -84,7 +69,6 @@ def sequences(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
 
 
 def plan(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
-    """Draw the grips of the published plan above its responses."""
     above, below = figure.subfigures(2, 1, height_ratios=[1, 2.4])
     grips_of_plan(above.subplots(), of(table, "table:experimental_data3"), own)
     along_steps("table:experimental_data3")(below, table, own)
@@ -95,17 +79,18 @@ def grips_of_plan(axes: Axes, rows: pd.DataFrame, own: Ours) -> None:
     moves = {(move.robot, move.step) for move in own.problem.schedule.moves}
     for i, (color, ring) in enumerate(zip(ROBOT_COLORS, "os^", strict=False), start=1):
         part = rows[(rows["quantity"] == f"node of rob{i}")].reset_index(drop=True)
-        step = number_of(part)
-        free = part["printed"] < 0
+        step, free = number_of(part), part["printed"] < 0
+        label = f"robot {i}: line here, marks printed"
         axes.plot(step, part["ours"].mask(free), "-", color=color, lw=2)
-        axes.plot(step, part["printed"].mask(free), ring, ms=4, mfc="none", color=color,
-                  label=f"robot {i}: line here, marks printed")  # fmt: skip
+        axes.plot(
+            step, part["printed"].mask(free), ring, ms=4, mfc="none", color=color, label=label
+        )
         taken = [s for s in step if (f"rob{i}", s) in moves]
         axes.plot(taken, part["ours"][[s - 1 for s in taken]], "*", color=color, mec="k", ms=10)
     axes.plot([], [], "*", color="w", mec="k", ms=10, label="optimized grip")
     axes.legend(ncols=2, loc="upper left")
     axes.set(xlabel="step", ylabel="node", ylim=(0, 72))
-    tidy(axes)
+    dress(axes)
 
 
 def twisting(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
@@ -135,28 +120,22 @@ def twisting(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
     draw_bricks(shape, own.engine.network, 18, VIEW, twist=fields.brick_twist[0], magnify=2000)
     draw_grips(shape, own.engine.network, (None, 35, None), VIEW)
     shape.set_title("Figure 10: step 35, motion × 2,000")
-    for axes in (*panels[:3], forces, arm):
-        tidy(axes)
+    dress(*panels[:5])
 
 
 def maxima(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
-    labels = {
-        "table:2robot_tension": "Table 6",
-        "table:2robot_forces": "Table 7",
-        "table:optimization_results": "Table 10",
+    items = {
+        "Table 6": of(table, "table:2robot_tension"),
+        "Table 7": of(table, "table:2robot_forces"),
+        "Table 10": of(table, "table:optimization_results"),
     }
-    heights = [len(of(table, label)) for label in labels]
-    panels = figure.subplots(3, 1, height_ratios=heights, sharex=True)
-    for axes, (label, title) in zip(panels, labels.items(), strict=True):
-        rows = of(table, label)
-        ratio = rows["ours"] / rows["printed"]
-        colors = [OFF if error > NEAR else OURS for error in rows["error_pct"]]
+    panels = figure.subplots(3, 1, height_ratios=[*map(len, items.values())], sharex=True)
+    for axes, (title, rows) in zip(panels, items.items(), strict=True):
+        ratio, far = rows["ours"] / rows["printed"], (rows["error_pct"] > NEAR).to_numpy()
         axes.axvspan(0.95, 1.05, color="0.93")
         axes.axvline(1, color="k", lw=0.6)
-        for off, marker in ((False, "o"), (True, "D")):
-            some = (rows["error_pct"] > NEAR).to_numpy() == off
-            at = np.arange(len(rows))[some]
-            axes.scatter(ratio[some], at, c=np.array(colors)[some], marker=marker, s=26, zorder=3)
+        for some, color, marker in ((~far, OURS, "o"), (far, OFF, "D")):
+            axes.scatter(ratio[some], np.flatnonzero(some), 26, color, marker=marker, zorder=3)
         texts = [
             f"{row['quantity'].removeprefix('largest ')}, {row['at']}: "
             f"printed {row['printed']:g}, here {row['ours']:.1f}"
@@ -164,7 +143,7 @@ def maxima(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
         ]
         axes.set_yticks(range(len(rows)), texts)
         axes.set(ylim=(len(rows) - 0.5, -0.5), title=title)
-        tidy(axes)
+        dress(axes)
     panels[-1].set_xlabel("here over printed (gray: within 5 %)")
 
 
@@ -190,12 +169,12 @@ def along_steps(label: str) -> Draw:
             rows = of(table, label, name)
             step, off = number_of(rows), rows["error_pct"] > NEAR
             axes.plot(step, rows["ours"], "-", color=OURS, lw=1.2, label="here")
-            axes.plot(step, rows["printed"], "o", ms=3, mfc="none", mew=0.6, color=STUDY,
-                      label="printed")  # fmt: skip
-            axes.plot(step[off], rows["ours"][off], "D", ms=8, mfc="none", color=OFF,
-                      label="off by more than 5 %")  # fmt: skip
+            look = {"mfc": "none", "mew": 0.6, "color": STUDY, "label": "printed"}
+            axes.plot(step, rows["printed"], "o", ms=3, **look)
+            look = {"mfc": "none", "color": OFF, "label": "off by more than 5 %"}
+            axes.plot(step[off], rows["ours"][off], "D", ms=8, **look)
             axes.set_title(CAPTIONS.get(name, name))
-            tidy(axes)
+            dress(axes)
         handles, texts = panels[0].get_legend_handles_labels()
         for axes in panels[len(names) :]:
             axes.set_axis_off()
@@ -208,9 +187,9 @@ def along_steps(label: str) -> Draw:
 
 
 PICTURES: dict[str, tuple[Draw, float]] = {
-    "geometry": (geometry, 4.2),
-    "vaults": (vault_tests, 5.8),
-    "discrete": (discrete, 5.4),
+    "geometry": (models.geometry, 4.2),
+    "vaults": (models.vault_tests, 5.8),
+    "discrete": (models.discrete, 5.4),
     "sequences": (sequences, 8.2),
     "twisting": (twisting, 8.6),
     "maxima": (maxima, 8.0),
@@ -223,7 +202,6 @@ PICTURES: dict[str, tuple[Draw, float]] = {
 
 @styled
 def drawn(name: str, table: pd.DataFrame, own: Ours) -> Figure:
-    """Return a picture of `TITLES` with its caption."""
     draw, height = PICTURES[name]
     figure = new_figure(height)
     draw(figure, table, own)

@@ -1,7 +1,5 @@
 """Pictures of what the model rests on: geometry, vault tests and discrete elements."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -10,18 +8,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments.calibration.parts.barrel_vaults import Vault, chain, vaults
-from experiments.discrete.parts.arch_pads import STEPS
-from experiments.study.parts.counterpart_rows import (
-    Ours,
-    arch_corners,
-    bed_of_springs,
-    node_displacements,
-)
+from experiments.harness.charts import ticks
+from experiments.study.parts import counterpart_rows
+from experiments.study.parts.counterpart_rows import Ours, arch_corners, bed_of_springs
 from seqopt.report._style import BLUE, INK, VERMILION, dress, look, plain
 from seqopt.report.draw import View, draw_bricks
 from seqopt.study.published import printed
 
 OURS, STUDY, OFF = BLUE, "#222222", VERMILION
+BOTH = ["printed", "ours"]
 
 
 def of(table: pd.DataFrame, label: str, quantity: str = "") -> pd.DataFrame:
@@ -33,10 +28,6 @@ def of(table: pd.DataFrame, label: str, quantity: str = "") -> pd.DataFrame:
 def number_of(rows: pd.DataFrame) -> pd.Series:
     """Return the numbers at the end of where the rows are: steps, tests, bricks."""
     return rows["at"].str.extract(r"(\d+)")[0].astype(int)
-
-
-def tidy(axes: Axes) -> None:
-    dress(axes)
 
 
 def pair(axes: Axes, x: object, rows: pd.DataFrame, color: str = OURS, name: str = "") -> None:
@@ -62,61 +53,46 @@ def geometry(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
     corners = arch_corners(own.scene)
     low, high = corners.min(axis=0), corners.max(axis=0)
     rows = of(table, "fig:arch_vault").set_index("quantity")
-    text = {
-        name: f"{name.split(' ')[0]}: printed {rows.loc[name, 'printed']:.0f} mm, "
-        f"here {rows.loc[name, 'ours']:.0f} mm"
-        for name in ("span [mm]", "height [mm]")
-    }
+    span, height = (
+        "{}: printed {:.0f} mm, here {:.0f} mm".format(name, *rows.loc[f"{name} [mm]", BOTH])
+        for name in ("span", "height")
+    )
     arrow = {"arrowstyle": "<->", "color": STUDY, "lw": 0.9}
     side.annotate("", (low[0], -0.1), (high[0], -0.1), arrowprops=arrow)
-    side.text(low[[0]].mean() + 1.0, -0.2, text["span [mm]"], ha="center")
+    side.text(low[0] + 1.0, -0.2, span, ha="center")
     side.annotate("", (2.2, low[2]), (2.2, high[2]), arrowprops=arrow)
-    side.text(2.25, 0.95, text["height [mm]"], rotation=90, va="center")
-    side.set(xlim=(-0.15, 2.5), ylim=(-0.3, 2.0))
-    side.set_title("from the side")
+    side.text(2.25, 0.95, height, rotation=90, va="center")
+    side.set(xlim=(-0.15, 2.5), ylim=(-0.3, 2.0), title="from the side")
     plan.set_title("from above")
 
 
-def vault_tests(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
+def vault_tests(figure: Figure, _table: pd.DataFrame, _own: Ours) -> None:
     panels = figure.subplot_mosaic([["outline", "outline"], ["secants", "bars"]])
     outline, secants, bars = panels["outline"], panels["secants"], panels["bars"]
     _outlines(outline)
     study = printed("arch_stiffness")
-    slopes = {"measured": study["k_e_kN_mm"][0], "Bruun et al.": study["k_m_kN_mm"][0]}
-    slopes["here"] = of(table, "fig:secant_stiff")["ours"].iloc[0]
-    marks = {
-        "measured": ("k", "-", 2.5),
-        "Bruun et al.": ("0.5", "--", 1.5),
-        "here": (OURS, ":", 2),
-    }
-    for name, slope in slopes.items():
-        color, style, width = marks[name]
-        label = f"{name}: {slope:.1f} kN/mm"
-        secants.plot([0, 0.5], [0, 0.5 * slope], color=color, ls=style, lw=width, label=label)
-    secants.set(xlabel="displacement [mm]", ylabel="load [kN]", title="secants of test 1")
     at = study["test"].to_numpy(float)
     shown = {
-        "measured": study["k_e_kN_mm"],
-        "Bruun et al.": study["k_m_kN_mm"],
-        "here": bed_of_springs(),
+        "measured": (study["k_e_kN_mm"], {"color": "k", "ls": "-", "lw": 2.5}),
+        "Bruun et al.": (study["k_m_kN_mm"], {"color": "0.5", "ls": "--", "lw": 1.5}),
+        "here": (bed_of_springs(), {"color": OURS, "ls": ":", "lw": 2}),
     }
-    for i, (name, values) in enumerate(shown.items()):
+    for i, (name, (values, line)) in enumerate(shown.items()):
+        label = f"{name}: {values[0]:.1f} kN/mm"
+        secants.plot([0, 0.5], [0, 0.5 * values[0]], label=label, **line)
         bars.bar(at + 0.27 * (i - 1), values, 0.25, label=name, **BARS[i])
+    secants.set(xlabel="displacement [mm]", ylabel="load [kN]", title="secants of test 1")
     bars.set(yscale="log", xlabel="test", ylabel="stiffness [kN/mm]", title="stiffness")
     bars.set_ylim(top=3000)
-    ticks = [50, 100, 200, 500]
-    bars.set_yticks(ticks, [str(tick) for tick in ticks])
-    bars.minorticks_off()
     bars.set_xticks(at)
-    for axes in (outline, secants, bars):
-        tidy(axes)
+    ticks([50, 100, 200, 500], bars.yaxis)
+    dress(outline, secants, bars)
     outline.legend(loc="center left", bbox_to_anchor=(1, 0.5))
     secants.legend()
     bars.legend(ncols=2)
 
 
 def _outlines(outline: Axes) -> None:
-    """Draw the joints of every vault that was tested, and where its load stands."""
     shapes: dict[tuple[float, ...], list[Vault]] = {}
     for vault in vaults():
         shapes.setdefault((vault.span, vault.rise, vault.thickness), []).append(vault)
@@ -126,24 +102,22 @@ def _outlines(outline: Axes) -> None:
         x, y = made.points[:, 0] - made.points[:, 0].mean(), made.points[:, 1]
         tests = ", ".join(str(vault.test) for vault in alike)
         name = f"test{'s' * (len(alike) > 1)} {tests}"
-        line = style.line() | {"markevery": max(1, len(x) // 6), "mfc": "white"}
-        outline.plot(x, y, lw=1.2, label=name, **line)
+        line = style.line() | {"lw": 1.2, "markevery": max(1, len(x) // 6), "mfc": "white"}
+        outline.plot(x, y, label=name, **line)
         at = float(made.loads[0] - made.points[:, 0].mean())
         outline.plot(at, np.interp(at, x, y), "v", color=style.color, ms=9, zorder=3)
-    outline.set_aspect("equal")
-    outline.set(
-        xlabel="m", ylabel="m", title="lines of the joints of the eight tests; triangle: load"
-    )
+    title = "lines of the joints of the eight tests; triangle: load"
+    outline.set(xlabel="m", ylabel="m", title=title, aspect="equal")
 
 
 def discrete(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
     panels = figure.subplots(2, 3).ravel()
-    for axes, (bricks, step) in zip(panels, STEPS.items(), strict=False):
-        moved = node_displacements(own, step)
+    for axes, step in zip(panels, counterpart_rows.arches(own), strict=False):
+        moved = counterpart_rows.node_displacements(own, step)
         for number, (name, values) in enumerate(moved.items()):
             style = look(number).line() | {"ms": 3.5, "lw": 0.9, "markevery": 3}
             axes.plot(values.index, values, label=name, **style)
-        axes.set(yscale="log", xlabel="node", title=f"{bricks} bricks, {len(values)} nodes")
+        axes.set(yscale="log", xlabel="node", title=f"{step.bricks} bricks, {len(values)} nodes")
         plain(axes.yaxis)
     for axes in panels[[0, 3]]:
         axes.set_ylabel("displacement [1e-3 mm]")
@@ -152,7 +126,6 @@ def discrete(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
     errors.axhline(0, color="k", lw=0.6)
     errors.legend()
     errors.set(xlabel="bricks", title="mean error [%]")
-    for axes in panels:
-        tidy(axes)
+    dress(*panels)
     panels[5].set_axis_off()
     panels[5].legend(*panels[0].get_legend_handles_labels(), loc="center left", title="models")

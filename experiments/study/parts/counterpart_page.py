@@ -3,8 +3,6 @@
 Every number comes from the rows of `experiments.study.paper_counterparts`; a test compares them.
 """
 
-from __future__ import annotations
-
 import textwrap
 
 import pandas as pd
@@ -48,7 +46,6 @@ within two edges. Figures and tables are numbered in the order of the paper's so
 
 
 def verdict(rows: pd.DataFrame) -> str:
-    """Return whether the rows of an item agree with print."""
     share = float((rows["error_pct"] <= NEAR).mean())
     return AGREES if share == 1 else PARTLY if share >= 0.5 else DISAGREES
 
@@ -78,6 +75,10 @@ def statement(item: Item, rows: pd.DataFrame) -> str:
     return f"{text}."
 
 
+def stated(item: Item, table: pd.DataFrame) -> str:
+    return statement(item, table[table["id"] == item.label])
+
+
 def yardstick(rows: pd.DataFrame) -> str:
     """Return median, 90th and 95th percentile of the errors of responses, shares of edges aside."""
     error = rows["error_pct"][rows["quantity"].str.match("F_|M_sup|T_max|D_")]
@@ -86,9 +87,7 @@ def yardstick(rows: pd.DataFrame) -> str:
 
 
 def caption(picture: str, table: pd.DataFrame) -> str:
-    """Return how every item of a picture agrees."""
-    items = [item for item in ITEMS if item.picture == picture]
-    return " ".join(statement(item, table[table["id"] == item.label]) for item in items)
+    return " ".join(stated(item, table) for item in ITEMS if item.picture == picture)
 
 
 def line(item: Item, table: pd.DataFrame) -> str:
@@ -96,15 +95,13 @@ def line(item: Item, table: pd.DataFrame) -> str:
     head = f"| {item.number}, section {item.section}: `{item.label}` | {item.shows} |"
     if not item.has_numbers:
         return f"{head} no: {item.why} | – | – | – |"
-    commands = ["study.paper_counterparts", *([item.also] if item.also else [])]
-    named = ", ".join(f"`{name}`" for name in commands)
+    named = ", ".join(f"`{name}`" for name in ("study.paper_counterparts", item.also) if name)
     picture = f"[picture](figures/counterpart_{item.picture}.png)"
-    text = statement(item, table[table["id"] == item.label]).removeprefix(f"{item.number} ")
+    text = stated(item, table).removeprefix(f"{item.number} ")
     return f"{head} yes | {named} | {picture} | {text} |"
 
 
 def page(table: pd.DataFrame) -> str:
-    """Return the page of the documentation."""
     words = [verdict(table[table["id"] == item.label]) for item in ITEMS if item.has_numbers]
     total = (
         f"{len(words)} of {len(ITEMS)} have numbers: {words.count(AGREES)} agree, "
@@ -122,9 +119,7 @@ def page(table: pd.DataFrame) -> str:
 def section(picture: str, table: pd.DataFrame) -> str:
     """Return a picture with its caption and the reasons for what disagrees."""
     items = [item for item in ITEMS if item.picture == picture]
-    text = " ".join(
-        f"{statement(item, table[table['id'] == item.label])} {item.why}".strip() for item in items
-    )
+    text = " ".join(f"{stated(item, table)} {item.why}".strip() for item in items)
     image = f"![{TITLES[picture]}](figures/counterpart_{picture}.png)"
     body = textwrap.fill(f"*{TITLES[picture]}.* {text}", 120, break_on_hyphens=False)
     return f"{image}\n\n{body}\n"

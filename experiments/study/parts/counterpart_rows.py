@@ -4,8 +4,6 @@ Every function yields the rows of one item of `experiments.study.parts.paper_ite
 label in `COUNTERPARTS`.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -17,19 +15,17 @@ import pandas as pd
 from experiments.calibration.parts.barrel_vaults import BED, chain, fit, laws, vaults
 from experiments.discrete.parts.arch_pads import STEPS, Reading
 from experiments.discrete.parts.arches_lmgc90 import error, inner_nodes, moved
+from experiments.harness.scenes import arch25
 from experiments.harness.yardstick import ROUNDING, VALUES
 from experiments.study.parts.paper_items import CASCADE, COMPARED, MODIFIED, ROBOTS, TENSION
+from seqopt import Scene, Step
 from seqopt.arrays import Floats
-from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import rank_choice
-from seqopt.network.build import build_network
 from seqopt.report.comparison import Comparison, compare
-from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import load_scene
+from seqopt.scene.boxes import boxes
 from seqopt.sequence.schedule import OpenGrip, OpenStep
-from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import EQUATIONS, as_printed, printed, printed_steps, published_choice
@@ -67,20 +63,14 @@ class Ours:
 
 
 def ours() -> Ours:
-    engine = ComplianceEngine(build_network(load_scene("arch25")))
+    engine = arch25()
     problem = candidate_layers(engine, three_robot_loop(engine.network), EQUATIONS)
     return Ours(engine, compare(engine, EQUATIONS), problem)
 
 
 def arch_corners(scene: Scene) -> Floats:
     """Return the corners of all bricks, (8 B, 3), m."""
-    out = []
-    for brick in scene.bricks:
-        length, width = np.array(brick.length_axis), np.array(brick.width_axis)
-        frame = np.stack([length, width, np.cross(length, width)])
-        half = np.array(list(product((-0.5, 0.5), repeat=3))) * np.array(brick.dimensions)
-        out.append(np.array(brick.position) + half @ frame)
-    return np.concatenate(out)
+    return boxes(scene.bricks).corners().reshape(-1, 3)
 
 
 def geometry(own: Ours) -> Rows:
@@ -97,16 +87,13 @@ def geometry(own: Ours) -> Rows:
 def vault_dimensions(_own: Ours) -> Rows:
     """Measure every vault back from the joints of its model, which lie at half the thickness."""
     for vault in vaults():
-        made, at = chain(vault), f"test {vault.test}"
-        half = made.slope[0]
-        shift = vault.thickness / 2 * np.array([np.sin(half), 1 - np.cos(half)])
-        span = np.ptp(made.points[:, 0]) - 2 * shift[0]
-        yield Row("L [mm]", at, 1e3 * vault.span, 1e3 * float(span), 5)
-        rise = np.ptp(made.points[:, 1]) - shift[1]
-        yield Row("r [mm]", at, 1e3 * vault.rise, 1e3 * float(rise), 5)
+        made, at, half = chain(vault), f"test {vault.test}", vault.thickness / 2
+        inward, up = half * np.sin(made.slope[0]), half * (1 - np.cos(made.slope[0]))
+        wide, high = np.ptp(made.points, axis=0)
+        yield Row("L [mm]", at, 1e3 * vault.span, 1e3 * float(wide - 2 * inward), 5)
+        yield Row("r [mm]", at, 1e3 * vault.rise, 1e3 * float(high - up), 5)
         yield Row("bricks", at, vault.bricks, len(made.points) - 1)
-        place = float(made.loads[0]) - shift[0]
-        yield Row("x [mm]", at, 1e3 * vault.load_at, 1e3 * float(place), 5)
+        yield Row("x [mm]", at, 1e3 * vault.load_at, 1e3 * float(made.loads[0] - inward), 5)
 
 
 def bed_of_springs() -> Floats:
@@ -132,32 +119,31 @@ def stiffness(_own: Ours) -> Rows:
     yield Row("mean size of e_rel [%]", "all tests", mean, float(np.abs(error).mean()))
 
 
+def arches(own: Ours) -> list[Step]:
+    """Return the steps that the paper puts to discrete elements."""
+    return [METHODS["sequential"](own.engine.network)[number - 1] for number in STEPS.values()]
+
+
 def nodes_compared(own: Ours) -> Rows:
     study = printed("de_validation").set_index("bricks")["nodes"]
-    for bricks, number in STEPS.items():
-        step = METHODS["sequential"](own.engine.network)[number - 1]
-        count = len(inner_nodes(own.engine.network, step))
-        yield Row("inner nodes that no robot holds", f"{bricks} bricks", study[bricks], count)
+    for step in arches(own):
+        count, at = len(inner_nodes(own.engine.network, step)), f"{step.bricks} bricks"
+        yield Row("inner nodes that no robot holds", at, study[step.bricks], count)
 
 
 def discrete_elements(own: Ours) -> Rows:
     study = printed("de_validation").set_index("bricks")["error_percent"]
     discrete = Reading().engine(own.engine.network)
-    for bricks, number in STEPS.items():
-        step = METHODS["sequential"](own.engine.network)[number - 1]
+    for step in arches(own):
         mean = error(moved(own.engine, step), moved(discrete, step))
-        yield Row("mean error [%]", f"{bricks} bricks", study[bricks], mean)
+        yield Row("mean error [%]", f"{step.bricks} bricks", study[step.bricks], mean)
 
 
-def node_displacements(own: Ours, number: int) -> dict[str, pd.Series]:
+def node_displacements(own: Ours, step: Step) -> dict[str, pd.Series]:
     """Return displacements of the inner nodes that no robot holds, 1e-3 mm, by model."""
     net = own.engine.network
-    step = METHODS["sequential"](net)[number - 1]
     names = [int(str(net.node_name[i])) for i in inner_nodes(net, step)]
-    models: dict[str, Engine] = {
-        "double cross": own.engine,
-        "discrete elements": Reading().engine(net),
-    }
+    models = {"double cross": own.engine, "discrete elements": Reading().engine(net)}
     return {
         model: pd.Series(1e6 * moved(engine, step), names).sort_index()
         for model, engine in models.items()
@@ -168,9 +154,7 @@ TWISTING = (9, 11, 21, 23, 33, 35, 45, 47)
 CROWN = 25  # last step of the two-robot methods up to the crown brick, 13
 LOOP = (59, 60, 61, 62)
 RESPONSES = {
-    "F_rob1_N": "F_rob1 [N]",
-    "F_rob2_N": "F_rob2 [N]",
-    "F_rob3_N": "F_rob3 [N]",
+    **{f"F_rob{i}_N": f"F_rob{i} [N]" for i in (1, 2, 3)},
     "F_sup_N": "F_sup [N]",
     "M_sup_Nm": "M_sup [N m]",
     "F_min_N": "F_min [N]",
@@ -193,11 +177,9 @@ def two_robots(own: Ours) -> Rows:
         steps = method(own.engine.network)
         states[name] = [(step.bricks, frozenset(step.held)) for step in steps]
         study = printed_steps(name).set_index("step")
-        for number in range(32, 38):
-            for i in (0, 1):
-                grip = steps[number - 1].grips[i]
-                node = study.loc[number, f"rob{i + 1}_node"]
-                yield Row(f"node of rob{i + 1}", f"{name}, step {number}", cell(node), cell(grip))
+        for number, i in product(range(32, 38), (1, 2)):
+            node, grip = study.loc[number, f"rob{i}_node"], steps[number - 1].grips[i - 1]
+            yield Row(f"node of rob{i}", f"{name}, step {number}", cell(node), cell(grip))
     shared = np.mean([state in states["sequential"] for state in states["cantilever"]])
     yield Row("steps shared [%]", "both methods", 100 / 3, 100 * float(shared))
 
@@ -241,27 +223,21 @@ def cantilever_over_sequential(own: Ours) -> Rows:
     for want in read(COMPARED).to_dict("records"):
         step = int(want["step"])
         for short, column in columns.items():
-            got = {side: float(table.loc[step, column]) for side, table in sides.items()}
-            for side, value in got.items():
-                yield Row(
-                    f"{RESPONSES[column]}, {side}", f"step {step}", want[f"{short}_{side}"], value
-                )
+            got, name = {}, RESPONSES[column]
+            for side, table in sides.items():
+                got[side] = float(table.loc[step, column])
+                yield Row(f"{name}, {side}", f"step {step}", want[f"{short}_{side}"], got[side])
             ratio = round(got["C"], 1) / round(got["S"], 1)
-            rounding = 0.0501 if short == "T" else 0.00501
-            title = f"{RESPONSES[column].split(' [')[0]}, C/S"
-            yield Row(title, f"step {step}", want[f"{short}_ratio"], ratio, rounding)
+            rounding, name = 0.0501 if short == "T" else 0.00501, f"{name.split(' [')[0]}, C/S"
+            yield Row(name, f"step {step}", want[f"{short}_ratio"], ratio, rounding)
 
 
 def tension(own: Ours) -> Rows:
     study = read(TENSION).set_index("what")
     for method, start in (("sequential", 1), ("cantilever", 5)):
         largest = own.steps(method)["F_max_N"]
-        values = (
-            largest.loc[start:].mean(),
-            largest.loc[start:CROWN].mean(),
-            largest.loc[CROWN + 1 :].mean(),
-            largest.max(),
-        )
+        parts = (largest.loc[start:], largest.loc[start:CROWN], largest.loc[CROWN + 1 :])
+        values = *(part.mean() for part in parts), largest.max()
         for what, value in zip(study.index, values, strict=True):
             yield Row(f"{what} T_max [N]", method, study.loc[what, method], float(value))
 
@@ -318,8 +294,7 @@ def plan_rows(own: Ours) -> tuple[pd.DataFrame, list[Step], pd.DataFrame]:
 
 def loop(own: Ours) -> Rows:
     study, steps, ranks = plan_rows(own)
-    part = study[study["step"].isin(LOOP)]
-    yield from scheme(part, [steps[number - 1] for number in LOOP])
+    yield from scheme(study[study["step"].isin(LOOP)], [steps[number - 1] for number in LOOP])
     place = ranks.set_index("step").loc[LOOP[0], "rank_in_window"]
     yield Row("place of node O15 by the printed equations", "step 59", 1, place)
 

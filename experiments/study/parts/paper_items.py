@@ -5,8 +5,6 @@ sketches and definitions have no numbers; plots of data and drawings with dimens
 count the environments of the LaTeX source on arXiv.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 STEPS = "values (T_pct to two edges)"  # what is counted in the tables of all steps
@@ -14,41 +12,17 @@ STEPS = "values (T_pct to two edges)"  # what is counted in the tables of all st
 
 @dataclass(frozen=True)
 class Item:
-    """A figure or table of the paper.
+    """A figure or table of the paper."""
 
-    Parameters
-    ----------
-    label : str
-        As in the source, ``fig:`` or ``table:``.
-    number : str
-        As a reader counts it.
-    section : str
-        Where it stands.
-    shows : str
-        In a few words.
-    picture : str
-        Name of the counterpart's picture; empty if it has no numbers.
-    also : str
-        Another experiment that goes deeper, with its folder.
-    parts : tuple of str
-        Labels within it.
-    why : str
-        Why the counterpart disagrees, or why there are no numbers.
-    key : str
-        A quantity that its caption gives in addition to the one with the largest error.
-    counted : str
-        What its values are.
-    """
-
-    label: str
-    number: str
+    label: str  # as in the source, ``fig:`` or ``table:``
+    number: str  # as a reader counts it
     section: str
     shows: str
-    picture: str = ""
-    also: str = ""
-    parts: tuple[str, ...] = ()
-    why: str = ""
-    key: str = ""
+    picture: str = ""  # name of the counterpart's; empty if the item has no numbers
+    also: str = ""  # another experiment that goes deeper, with its folder
+    parts: tuple[str, ...] = ()  # labels within it
+    why: str = ""  # the counterpart disagrees, or there are no numbers
+    key: str = ""  # a quantity that the caption gives beside the one with the largest error
     counted: str = "values"
 
     @property
