@@ -14,7 +14,7 @@ from seqopt.arrays import Floats, FrozenValue
 from seqopt.contact._elastic_limits import face_quadrature, find_elastic_limits
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import EPOXY
-from seqopt.engines._planar import Plane
+from seqopt.engines._planar import _Plane
 from seqopt.engines.diagnosis import diagnose
 from seqopt.engines.discrete._equilibrium_path import settle
 from seqopt.engines.discrete._system import build_system
@@ -32,7 +32,7 @@ from seqopt.scene.boxes import boxes
 from seqopt.scene.imports.contacts import flat_face, touching_faces
 from seqopt.scene.library._joints import overlaps
 from seqopt.scene.shape import Surface
-from seqopt.stability._held_states import HoldingForces, Known, first_directions
+from seqopt.stability._held_states import _HoldingForces, _Known, first_directions
 from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import assess, bonded
 from tests.blocks import box
@@ -51,7 +51,7 @@ def values(arch25):
     held = _held_nodes(network, system, grips, network.node_position[network.inner.ravel()[grips]])
     parts = ungripped_system(network, 2)
     proven = Prover(assembly, _compiled())(bonded(assembly, EPOXY))
-    plane = Plane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.eye(3)[[0, 2]])
+    plane = _Plane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.eye(3)[[0, 2]])
     maps = scene_maps(network)
     shapes = boxes(arch25.bricks)
     joined = overlaps(shapes, [(0, 1)])
@@ -67,8 +67,8 @@ def values(arch25):
         *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points, held),
         *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),
         *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, EPOXY)),
-        *Known(assembly, bonded(assembly, EPOXY)).motions_of(np.ones((2, 6))),
-        *(HoldingForces(0.0, np.zeros(1)), first_directions(4, 1)),
+        *_Known(assembly, bonded(assembly, EPOXY)).motions_of(np.ones((2, 6))),
+        *(_HoldingForces(0.0, np.zeros(1)), first_directions(4, 1)),
     )
     return {type(value).__name__: value for value in every}
 

@@ -33,37 +33,26 @@ class Quadrature(FrozenValue):
 def face_quadrature(assembly: Assembly, cuts: int = _CUTS) -> Quadrature:
     """Return the bed of all contacts, in their order.
 
-    The middles of the edges of triangles, each cut into four ``cuts`` times, integrate squares
-    exactly.
+    The middles of edges of triangles, each cut into four ``cuts`` times, integrate squares exactly.
     """
-    triangles, face = [], []
-    for c in range(len(assembly.bodies)):
-        corner = assembly.corner[assembly.contact == c]
-        fan = [*corner[fans([range(len(corner))])]]
-        for _ in range(cuts):
-            fan = [part for triangle in fan for part in _quarters(triangle)]
-        triangles += fan
-        face += [c] * len(fan)
-    corners = np.array(triangles).reshape(-1, 3, 3)
+    faces = [np.flatnonzero(assembly.contact == c) for c in range(len(assembly.bodies))]
+    parts = fans([face.tolist() for face in faces])
+    corners, face = assembly.corner[parts].reshape(-1, 3, 3), assembly.contact[parts[:, 0]]
+    for _ in range(cuts):
+        a, b, c = corners.transpose(1, 0, 2)
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        quarters = np.array([(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)])
+        corners, face = quarters.transpose(2, 0, 1, 3).reshape(-1, 3, 3), np.repeat(face, 4)
     sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(sides, axis=1) / 6  # a third of the triangle
     middles = 0.5 * (corners + np.roll(corners, 1, axis=1))
-    return Quadrature(
-        middles.reshape(-1, 3), np.repeat(np.array(face, np.int64), 3), np.repeat(area, 3)
-    )
-
-
-def _quarters(triangle: Floats) -> list[Floats]:
-    a, b, c = triangle
-    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
-    return [np.array(t) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
+    return Quadrature(middles.reshape(-1, 3), np.repeat(face, 3), np.repeat(area, 3))
 
 
 def opening_maps(assembly: Assembly, points: Floats, face: Ints, center: Floats) -> Floats:
     """Return the motions (P, 3, 6) of points for unit twists of their faces' second bodies.
 
-    ``points`` (P, 3), ``face`` (P,): with their contacts; ``center`` (C, 3): where twists are
-    taken, m. The parts of a motion are along `Assembly.axes`.
+    ``center`` (C, 3): where twists are taken, m. The parts of a motion are along `Assembly.axes`.
     """
     return np.asarray(assembly.axes[face] @ point_motion(points - center[face]))
 
@@ -79,7 +68,7 @@ def quadrature_stiffness(bed: Quadrature, maps: Floats, moduli: Floats) -> Float
 
 
 def first_points(face: Ints, faces: int) -> Ints:
-    """Return the first point of every face. ``face`` (P,): of every point, ascending."""
+    """Return the first point of every face, from the ascending faces (P,) of points."""
     return np.searchsorted(face, np.arange(faces))
 
 
@@ -107,28 +96,22 @@ class ElasticLimits(FrozenValue):
         face, mortar = self.assembly.contact, self.mortar
         stress = np.einsum("kij,skj->ski", self.stress, wrench[:, face])
         shear = np.linalg.norm(stress[..., 1:], axis=2)
-        beyond = np.maximum(
-            -stress[..., 0] - mortar.tensile_strength,
-            shear - mortar.cohesion - mortar.friction * stress[..., 0],
-        )
+        sliding = shear - mortar.cohesion - mortar.friction * stress[..., 0]
+        beyond = np.maximum(-stress[..., 0] - mortar.tensile_strength, sliding)
         most = np.maximum.reduceat(beyond, first_points(face, wrench.shape[1]), axis=1)
         return np.asarray(np.where(np.any(wrench, axis=2), most, -np.inf))
 
     def exceeded(self, wrench: Floats) -> Bools:
         """Return which grip sets (S,) leave the elastic limits anywhere, beyond rounding."""
-        margin = _STRESS_MARGIN * self.assembly.stress_scale
-        if self._bound(wrench) <= margin:  # as a rule, and a tenth of the work
-            return np.zeros(len(wrench), dtype=bool)
-        return np.asarray(self.excess(wrench).max(axis=1, initial=-np.inf) > margin)
-
-    def _bound(self, wrench: Floats) -> float:
-        """Return what no wrench (S, J, 6) exceeds its limits by, Pa, from the largest of each."""
+        margin, mortar = _STRESS_MARGIN * self.assembly.stress_scale, self.mortar
         most, least = wrench.max(axis=0, initial=0.0), wrench.min(axis=0, initial=0.0)
         largest = np.maximum(most, -least)[self.assembly.contact]
         stress = (np.abs(self.stress) @ largest[:, :, None])[:, :, 0]
-        shear = np.linalg.norm(stress[:, 1:], axis=1) + self.mortar.friction * stress[:, 0]
-        tension = stress[:, 0] - self.mortar.tensile_strength
-        return float(np.maximum(tension, shear - self.mortar.cohesion).max())
+        shear = np.linalg.norm(stress[:, 1:], axis=1) + mortar.friction * stress[:, 0]
+        beyond = np.maximum(stress[:, 0] - mortar.tensile_strength, shear - mortar.cohesion)
+        if beyond.max() <= margin:  # by the largest of all; as a rule, and a tenth of the work
+            return np.zeros(len(wrench), dtype=bool)
+        return np.asarray(self.excess(wrench).max(axis=1, initial=-np.inf) > margin)
 
 
 def find_elastic_limits(network: Network, mortar: Mortar) -> ElasticLimits:
@@ -149,8 +132,7 @@ def find_elastic_limits(network: Network, mortar: Mortar) -> ElasticLimits:
     SceneError
         If the faces of a joint do not overlap.
     """
-    assembly = bare_assembly(network, len(network.inner))
-    where = network.springs.position
+    assembly, where = bare_assembly(network, len(network.inner)), network.springs.position
     bed = face_quadrature(assembly)
     maps = opening_maps(assembly, bed.point, bed.face, where)
     evenly = quadrature_stiffness(bed, maps, np.ones((len(where), 2)))

@@ -86,9 +86,9 @@ class Assembly(FrozenValue):
         area = self._sums(triangle[:, None])
         centroid = mean + np.divide(middle, area, out=np.zeros_like(middle), where=area > 0)
         _, follows, triangle = self._triangles(centroid)
-        out = 0.5 * triangle
+        out = np.asarray(0.5 * triangle)
         np.add.at(out, follows, 0.5 * triangle)
-        return frozen(np.asarray(out))
+        return frozen(out)
 
     def _triangles(self, middle: Floats) -> tuple[Floats, Ints, Floats]:
         """Return spokes from points (C, 3) to the corners, the next corners, and areas between."""
@@ -113,8 +113,7 @@ class Assembly(FrozenValue):
     @cached_property
     def axes(self) -> Floats:
         """Normal and two tangents of every contact, (C, 3, 3), rows are unit vectors."""
-        side = np.eye(3)[np.abs(self.normal).argmin(axis=1)]
-        first = np.cross(self.normal, side)
+        first = np.cross(self.normal, np.eye(3)[np.abs(self.normal).argmin(axis=1)])
         first /= np.linalg.norm(first, axis=1, keepdims=True)
         return frozen(np.stack([self.normal, first, np.cross(self.normal, first)], axis=1))
 
@@ -126,8 +125,7 @@ class Assembly(FrozenValue):
         for body in self.bodies[self.contact].T:
             real = body != GROUND
             levers.append(np.linalg.norm(self.corner[real] - self.centroid[body[real]], axis=1))
-        length = float(np.concatenate(levers).max(initial=0.0))
-        return force or 1.0, length or 1.0
+        return force or 1.0, float(np.concatenate(levers).max(initial=0.0)) or 1.0
 
     @property
     def stress_scale(self) -> float:
@@ -166,6 +164,4 @@ class Assembly(FrozenValue):
         pull = self.weight
         if direction is not None:
             pull = np.linalg.norm(self.weight, axis=1, keepdims=True) * np.array(direction)
-        out = np.zeros((len(self.centroid), 6))
-        out[:, :3] = pull / self.scales[0]
-        return out.ravel()
+        return np.pad(pull / self.scales[0], ((0, 0), (0, 3))).ravel()

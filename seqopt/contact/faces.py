@@ -31,31 +31,18 @@ def _require_touching(
     """
     size = min(min(brick.dimensions) for brick in bricks)
     apart, slack = ends[1] - ends[0], _OVERLAP * size
-    inside = max(ends[0], -ends[1])
-    most = THICKEST * size if np.isnan(thickness) else thickness + slack
-    wrong = ""
-    if apart < -slack:
-        wrong = (
-            f"its bricks interpenetrate by {-1e3 * apart:.3g} mm, more than "
-            f"{1e3 * slack:.3g} mm; move them apart"
-        )
-    elif inside > slack:
-        wrong = (
-            f"its plane lies {1e3 * inside:.3g} mm inside a brick; "
-            "move its position between the faces"
-        )
-    elif apart > most:
-        wrong = (
-            f"there are {1e3 * apart:.3g} mm between its faces, more than "
-            f"{1e3 * most:.3g} mm; move the bricks together or give the joint its thickness"
-        )
-    elif beside > _BESIDE * size:
-        wrong = (
-            f"its position lies {1e3 * beside:.3g} mm beside the faces "
-            "that it joins; move it between them"
-        )
-    if wrong:
-        raise SceneError(f"joint {name}: {wrong}")
+    thickest = THICKEST * size if np.isnan(thickness) else thickness + slack
+    inside, far = max(ends[0], -ends[1]), _BESIDE * size
+    closer = "move the bricks together or give the joint its thickness"
+    for found, most, wrong in (
+        (-apart, slack, "its bricks interpenetrate by {}, more than {}; move them apart"),
+        (inside, slack, "its plane lies {} inside a brick; move its position between the faces"),
+        (apart, thickest, f"there are {{}} between its faces, more than {{}}; {closer}"),
+        (beside, far, "its position lies {} beside the faces that it joins; move it between them"),
+    ):
+        if found > most:
+            numbers = (f"{1e3 * length:.3g} mm" for length in (found, most))
+            raise SceneError(f"joint {name}: {wrong.format(*numbers)}")
 
 
 def _face_distance(brick: Brick, normal: Floats, point: Floats) -> float:
@@ -86,7 +73,15 @@ class Contacts(dict[int, tuple[str, Floats, Floats]]):
         self._network = network
 
     def __missing__(self, spring: int) -> tuple[str, Floats, Floats]:
-        self[spring] = _contact(self._network, spring)
+        springs, placed = self._network.springs, self._network.scene.placed
+        first, second = springs.bodies[spring]
+        name = f"{'ground' if first == GROUND else placed[first].name}-{placed[second].name}"
+        axes, corners = springs.axes[spring], springs.face[spring]
+        if not len(corners):
+            between = [placed[b] for b in (first, second) if b != GROUND]
+            where, thickness = springs.position[spring], float(springs.thickness[spring])
+            axes, corners = _contact(name, between, axes, where, thickness)
+        self[spring] = name, axes[0], corners
         return self[spring]
 
 
@@ -117,8 +112,7 @@ def step_assembly(
     SceneError
         If the bricks of a joint do not touch there: see `seqopt.contact.faces`.
     """
-    placed = network.scene.placed
-    acting = network.springs.acting(bricks)
+    placed, acting = network.scene.placed, network.springs.acting(bricks)
     contacts = [*map((Contacts(network) if known is None else known).__getitem__, acting.tolist())]
     pairs = zip(grips, network.scene.robots, strict=True)
     held = [(node, r) for node, r in pairs if node is not None]
@@ -158,47 +152,31 @@ def bare_assembly(network: Network, bricks: int, known: Contacts | None = None) 
     SceneError
         If the bricks of a joint do not touch there: see `seqopt.contact.faces`.
     """
-    nobody = (None,) * len(network.scene.robots)
-    return step_assembly(network, bricks, nobody, known)
+    return step_assembly(network, bricks, (None,) * len(network.scene.robots), known)
 
 
-def _contact(network: Network, spring: int) -> tuple[str, Floats, Floats]:
-    """Return a contact's name, its normal (3,) and the corners (m, 3) of its face."""
-    springs, placed = network.springs, network.scene.placed
-    first, second = springs.bodies[spring]
-    start = "ground" if first == GROUND else str(placed[first].name)
-    name = f"{start}-{placed[second].name}"
-    if len(springs.face[spring]):
-        return name, springs.axes[spring, 0], springs.face[spring]
-    between = [placed[b] for b in (first, second) if b != GROUND]
+def _contact(
+    name: str, between: list[Brick], axes: Floats, point: Floats, thickness: float
+) -> tuple[Floats, Floats]:
+    """Return the axes (3, 3) of a contact of boxes, the normal into the last one, and its face."""
     for brick in between:
         if brick.shape is not None:
-            raise SceneError(
-                f"joint {name}: brick {brick.name} is not a box and the joint has no "
-                "face; give it one"
-            )
-    point = springs.position[spring]
-    axes = _oriented(springs.axes[spring], point, between)
+            wrong = f"brick {brick.name} is not a box and the joint has no face; give it one"
+            raise SceneError(f"joint {name}: {wrong}")
+    below = np.array(between[0].position) if len(between) > 1 else point
+    sign = np.sign(axes[0] @ (np.array(between[-1].position) - below)) or 1.0
+    axes = axes * np.array([[sign], [1.0], [sign]])
     common = _overlap(axes, point, between, name)
     middle = point + _centroid(common) @ axes[1:]
     before = -_face_distance(between[0], -axes[0], middle) if len(between) > 1 else 0.0
     ends = (before, _face_distance(between[-1], axes[0], middle))
-    _require_touching(
-        name, between, ends, _distance_beside(common), float(springs.thickness[spring])
-    )
-    return name, axes[0], np.asarray(point + common @ axes[1:])
-
-
-def _oriented(axes: Floats, point: Floats, between: list[Brick]) -> Floats:
-    """Return the axes (3, 3) of a contact with the normal into its last brick."""
-    start = np.array(between[0].position) if len(between) > 1 else point
-    sign = np.sign(axes[0] @ (np.array(between[-1].position) - start)) or 1.0
-    return np.asarray(axes * np.array([[sign], [1.0], [sign]]))
+    _require_touching(name, between, ends, _distance_beside(common), thickness)
+    return axes, point + common @ axes[1:]
 
 
 def _overlap(axes: Floats, point: Floats, between: list[Brick], name: str) -> Floats:
     """Return the corners (m, 2) of the overlap of the bricks' faces in a contact's plane."""
-    flat = [_ordered((_face(brick, axes[0], point) - point) @ axes[1:].T) for brick in between]
+    flat = [_face(brick, axes, point) for brick in between]
     common = flat[0] if len(flat) == 1 else _clip(*flat)
     size = min(map(_polygon_area, flat))
     if len(common) < 3 or not _polygon_area(common) > _SLIVER * size:
@@ -209,21 +187,17 @@ def _overlap(axes: Floats, point: Floats, between: list[Brick], name: str) -> Fl
     return common
 
 
-def _face(brick: Brick, normal: Floats, point: Floats) -> Floats:
-    """Return the corners (4, 3) of the face of a brick that looks at a plane."""
-    frame = brick.frame
+def _face(brick: Brick, axes: Floats, point: Floats) -> Floats:
+    """Return the corners (4, 2) of the face that looks at a plane, in it, counterclockwise."""
+    frame, normal, center = brick.frame, axes[0], np.array(brick.position)
     half = 0.5 * np.array(brick.dimensions)[:, None] * frame
     i = int(np.abs(frame @ normal).argmax())
-    toward = np.sign((point - np.array(brick.position)) @ normal) * np.sign(frame[i] @ normal)
+    middle = center + np.sign((point - center) @ normal) * np.sign(frame[i] @ normal) * half[i]
     side, other = half[i - 1], half[i - 2]
-    middle = np.array(brick.position) + toward * half[i]
-    return np.array([middle + a * side + b * other for a in (-1, 1) for b in (-1, 1)])
-
-
-def _ordered(points: Floats) -> Floats:
-    """Return the corners (m, 2) of a convex polygon counterclockwise."""
-    spread = points - points.mean(axis=0)
-    return np.asarray(points[np.argsort(np.arctan2(spread[:, 1], spread[:, 0]))])
+    corners = np.array([middle + a * side + b * other for a in (-1, 1) for b in (-1, 1)])
+    flat = (corners - point) @ axes[1:].T
+    spread = flat - flat.mean(axis=0)
+    return np.asarray(flat[np.argsort(np.arctan2(spread[:, 1], spread[:, 0]))])
 
 
 def _clip(polygon: Floats, other: Floats) -> Floats:

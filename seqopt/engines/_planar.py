@@ -16,15 +16,15 @@ from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.interface import Basis, Fields, NamedEngine, Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, SceneError
-from seqopt.network.build import network_of
 from seqopt.network.network import GROUND, Network
 from seqopt.scene.scene import Scene
+from seqopt.scene.shape import plane_axes
 
 _FLAT = 1e-9  # distance from the plane that counts as none, over the size of the structure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Plane(FrozenValue):
+class _Plane(FrozenValue):
     """A plane that mirrors a structure onto itself, as far as forces in it are concerned."""
 
     point: Floats  # (3,); m
@@ -37,7 +37,7 @@ class Plane(FrozenValue):
         return Basis(self.axes, self.normal[None])
 
     def distance(self, points: Floats) -> Floats:
-        """Return how far points lie from the plane. ``points`` (..., 3). Result (...): m."""
+        """Return how far points (..., 3) lie from the plane, (...), m."""
         return np.asarray(np.abs((points - self.point) @ self.normal))
 
 
@@ -48,7 +48,7 @@ class NoPlane:
     reason: str  # what lies outside, a clause that goes into a sentence
 
 
-def find_plane(network: Network) -> Plane | NoPlane:
+def find_plane(network: Network) -> _Plane | NoPlane:
     """Return the plane of a structure: bricks, springs and gravity lie in it, springs along it.
 
     Bricks may be of any width: their nodes need not lie in the plane, their centroids must.
@@ -56,17 +56,13 @@ def find_plane(network: Network) -> Plane | NoPlane:
     springs = network.springs
     points = np.vstack([network.centroid, springs.position, springs.anchor])
     normal = _normal(network, points - points.mean(axis=0))
-    plane = Plane(points.mean(axis=0), normal, _spanned(normal))
+    plane = _Plane(points.mean(axis=0), normal, plane_axes(normal)[1:])
     outside = _points_outside(network, plane) or _turned_springs(network, normal)
     return NoPlane(outside) if outside else plane
 
 
-def off_plane(network: Network, plane: Plane, columns: Ints) -> Floats:
-    """Return how far grips lie from a plane.
-
-    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. Result (S, r): m; zero
-    where a grip lies in the plane to within rounding.
-    """
+def off_plane(network: Network, plane: _Plane, columns: Ints) -> Floats:
+    """Return how far grips (S, r) lie from a plane, m; zero if it is within rounding."""
     inner = network.node_position[network.inner.ravel()]
     away = plane.distance(inner)
     away[away <= _FLAT * np.ptp(inner, axis=0).max()] = 0.0
@@ -83,28 +79,19 @@ def _normal(network: Network, spread: Floats) -> Floats:
     if np.abs(flat).max() <= _FLAT * np.abs(spread).max():
         flat = network.springs.axes[0] - np.outer(network.springs.axes[0] @ up, up)
         flat = flat[np.linalg.norm(flat, axis=1).argmax()][None]
-    longest = np.linalg.svd(flat, full_matrices=False)[2][0]
-    normal = np.cross(up, longest)
+    normal = np.cross(up, np.linalg.svd(flat, full_matrices=False)[2][0])
     return np.asarray(normal / np.linalg.norm(normal))
 
 
-def _spanned(normal: Floats) -> Floats:
-    """Return two unit vectors (2, 3) at right angles to a normal and to each other."""
-    first = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-    first /= np.linalg.norm(first)
-    return np.array([first, np.cross(normal, first)])
-
-
-def _points_outside(network: Network, plane: Plane) -> str:
+def _points_outside(network: Network, plane: _Plane) -> str:
     """Return which brick, spring or fixed point lies outside; empty if none does."""
-    scene = network.scene
+    scene, springs = network.scene, network.springs
     size = float(np.ptp(network.centroid, axis=0).max()) or max(scene.placed[0].dimensions)
     away = plane.distance(network.centroid)
     outside = "outside the scene's middle plane"
     if away.max() > _FLAT * size:
         brick = scene.placed[int(away.argmax())].name
         return f"brick {brick}: its centroid lies {1e3 * away.max():.3g} mm {outside}"
-    springs = network.springs
     away = np.maximum(plane.distance(springs.position), plane.distance(springs.anchor))
     if away.max() > _FLAT * size:
         name = _spring(network, int(away.argmax()))
@@ -144,29 +131,19 @@ class PlanarEngine(NamedEngine):
     bricks, springs or gravity leave the scene's plane.
     """
 
-    def __init__(self, network: Network | Scene, plane: Plane | None = None) -> None:
-        network = network_of(network)
-        found = find_plane(network) if plane is None else plane
+    def __init__(self, network: Network | Scene, plane: _Plane | None = None) -> None:
+        super().__init__(network)
+        found = find_plane(self.network) if plane is None else plane
         if isinstance(found, NoPlane):
             raise SceneError(f"{found.reason}; {_ELSE}")
         self.plane = found
-        self._engine = ComplianceEngine(network, found.basis)
-
-    @property
-    def network(self) -> Network:
-        """The network whose nodes and edges the fields follow."""
-        return self._engine.network
+        self._engine = ComplianceEngine(self.network, found.basis)
 
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
-        """Return the fields of a partial structure for many grip sets.
-
-        ``grips`` (S, r): node numbers.
-        """
+        """Return the fields of a partial structure for grip sets (S, r)."""
         away = off_plane(self.network, self.plane, grip_columns(self.network, bricks, grips))
         if away.any():
             node = np.asarray(grips).ravel()[away.argmax()]
-            raise GripError(
-                f"grip on node {node}: it lies {1e3 * away.max():.3g} mm outside the scene's "
-                f"plane; {_ELSE}"
-            )
+            far = f"{1e3 * away.max():.3g} mm outside the scene's plane"
+            raise GripError(f"grip on node {node}: it lies {far}; {_ELSE}")
         return self._engine.solve(bricks, grips, want)

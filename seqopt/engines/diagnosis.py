@@ -18,12 +18,12 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, eigsh
+from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.interface import Engine, Fields, Want, grip_columns
 from seqopt.engines.rigid._mechanism import free_motion, ungripped_system
-from seqopt.engines.rigid._mixed import MixedSystem, factorize, mixed_system, solve_mixed
+from seqopt.engines.rigid._mixed import MixedSystem, mixed_system, solve_mixed
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.network import GROUND, Network
 
@@ -37,12 +37,8 @@ def _spectrum(network: Network, bricks: int, columns: Ints) -> tuple[float, floa
     """Return how the constrained stiffness, scaled by its diagonal, resists motions.
 
     The inverse is applied by the mixed system, which keeps small eigenvalues that the stiffness
-    matrix has lost to rounding; a mechanism is shifted.
-
-    ``columns`` (r,): grips as indices into ``network.inner.ravel()``. Results: ``lowest``: smallest
-    eigenvalue, without unit; ``condition``: largest eigenvalue over smallest; ``mode`` (b, 6): the
-    motion that is resisted least, its largest component 1, as in
-    `seqopt.engines.diagnosis.Diagnosis`.
+    matrix has lost to rounding; a mechanism is shifted. Results: smallest eigenvalue, condition and
+    mode, as in `seqopt.engines.diagnosis.Diagnosis`.
     """
     parts = ungripped_system(network, bricks)
     root = np.sqrt(parts.stiffness)[:, None]
@@ -58,29 +54,26 @@ def _spectrum(network: Network, bricks: int, columns: Ints) -> tuple[float, floa
         lowest, motion = _lowest(shifted, scale, len(root))
         lowest = max(lowest - _SHIFT, 0.0)
     scaled = sparse.diags_array(root.ravel()) @ parts.deformation @ sparse.diags_array(1 / scale)
-    condition = _highest(scaled) / lowest if lowest else np.inf
+    condition = np.inf
+    if lowest:  # the largest eigenvalue is that of the unconstrained scaled stiffness
+        square, start = scaled.T @ scaled, _start(scaled)
+        highest = eigsh(square, k=1, tol=1e-3, return_eigenvectors=False, v0=start)
+        condition = float(highest[0]) / lowest
     return lowest, condition, (motion / motion[np.abs(motion).argmax()]).reshape(-1, 6)
-
-
-def _highest(scaled: sparse.csr_array) -> float:
-    """Return the largest eigenvalue of the unconstrained scaled stiffness."""
-    value = eigsh(scaled.T @ scaled, k=1, tol=1e-3, return_eigenvectors=False, v0=_start(scaled))
-    return float(value[0])
 
 
 def _lowest(system: MixedSystem, scale: Floats, before: int) -> tuple[float, Floats]:
     """Return the smallest eigenvalue and its motion in scaled twists, which stand after others."""
-    factors = factorize(system)
-    moves = len(scale)
-    load = np.zeros(system.matrix.shape[0])
+    factors = splu(system.matrix)
+    load, mine = np.zeros(system.matrix.shape[0]), slice(before, before + len(scale))
 
     def inverse(vector: Floats) -> Floats:
-        load[before : before + moves] = scale * vector.ravel()
+        load[mine] = scale * vector.ravel()
         answer = factors.solve(load)
         answer += factors.solve(load - system.matrix @ answer)
-        return np.asarray(scale * answer[before : before + moves])
+        return np.asarray(scale * answer[mine])
 
-    operator = LinearOperator((moves, moves), matvec=inverse, dtype=np.float64)
+    operator = LinearOperator((len(scale), len(scale)), matvec=inverse, dtype=np.float64)
     values, vectors = eigsh(operator, k=1, tol=_EIGENVALUE_TOLERANCE, v0=_start(scale))
     return float(1 / values[0]), vectors[:, 0] / scale
 
@@ -113,24 +106,23 @@ class _Residuals:
 
 
 def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> _Residuals:
-    """Return the residuals of the first grip set's fields, from the network alone.
-
-    ``columns`` (r,): grips as indices into ``network.inner.ravel()``; ``fields``: with joint
-    wrenches and brick twists.
-    """
+    """Return the residuals of the first grip set's fields, from the network alone."""
     springs, center = network.springs, network.centroid[:bricks]
     acting = springs.acting(bricks)
     bodies, at, axes = springs.bodies[acting], springs.position[acting], springs.axes[acting]
     raw = springs.stiffness[acting]
     wrench, twist = fields.joint_wrench[0, acting], fields.brick_twist[0]
     gap, moved = np.zeros_like(wrench), np.zeros_like(wrench)
+    ends = []
     for side, sign in ((0, -1.0), (1, 1.0)):
         there = np.flatnonzero(bodies[:, side] != GROUND)
         body = bodies[there, side]
+        ends.append((there, body, sign))
         parts = _moved(twist[body], at[there] - center[body])
         gap[there] += sign * parts.sum(axis=0)
         moved[there] += np.abs(parts).sum(axis=0)
-    law = _spring_force(axes, raw, gap)
+    own = np.einsum("sij,shj->shi", axes, gap.reshape(-1, 2, 3)) * raw.reshape(-1, 2, 3)
+    law = np.einsum("sij,shi->shj", axes, own).reshape(-1, 6)  # stiffness times deformation
     size = raw.reshape(-1, 2, 3).max(axis=2)[:, :, None]
     scale = (size * moved.reshape(-1, 2, 3) + np.abs(wrench).reshape(-1, 2, 3)).max(axis=2)
     heavy, least = _beside_weight(network, bricks, raw)
@@ -143,10 +135,13 @@ def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> _R
     motion = np.abs(_moved(twist[every], node - center[every])[:, :, :3]).sum(axis=0).max()
     dead = np.hstack([network.weight[:bricks], np.zeros((bricks, 3))])
     outside = [(np.arange(bricks), center, dead), (owner, node[columns], grip)]
-    left = _balance(center, [*_both(bodies, at, wrench), *outside])
-    plain = _balance(center, [*_both(bodies, at, -law), *outside])[0]
+    left, (plain, _) = (
+        _balance(center, [*((b, at[t], sign * pull[t]) for t, b, sign in ends), *outside])
+        for pull in (wrench, -law)
+    )
+    rest, most = (np.abs(part).reshape(-1, 2, 3).max(axis=(0, 2)) for part in left)
     return _Residuals(
-        equilibrium=_ratio(left[0], left[1]),
+        equilibrium=float((rest / np.maximum(most, np.finfo(float).tiny)).max()),
         joints=float((apart / np.maximum(scale, heavy)).max()),
         grips=float(np.abs(still).max(initial=0.0) / max(motion, least)),
         plain=float(np.linalg.norm(plain[:, :3]) / np.linalg.norm(dead)),
@@ -166,26 +161,11 @@ def _beside_weight(network: Network, bricks: int, stiffness: Floats) -> tuple[Fl
 _Pull = tuple[Ints, Floats, Floats]  # bricks, points and wrenches about them
 
 
-def _both(bodies: Ints, at: Floats, wrench: Floats) -> list[_Pull]:
-    """Return the wrenches of springs on both of their bodies."""
-    pulls = []
-    for side, sign in ((0, -1.0), (1, 1.0)):
-        there = np.flatnonzero(bodies[:, side] != GROUND)
-        pulls.append((bodies[there, side], at[there], sign * wrench[there]))
-    return pulls
-
-
 def _moved(twist: Floats, arm: Floats) -> Floats:
     """Return what two bricks' translation and rotation add to the motion at an arm, (2, n, 6)."""
     zero = np.zeros_like(arm)
     turning = np.hstack([np.cross(twist[:, 3:], arm), twist[:, 3:]])
     return np.stack([np.hstack([twist[:, :3], zero]), turning])
-
-
-def _spring_force(axes: Floats, stiffness: Floats, gap: Floats) -> Floats:
-    """Return stiffness times deformation in global axes, (s, 6)."""
-    own = np.einsum("sij,shj->shi", axes, gap.reshape(-1, 2, 3)) * stiffness.reshape(-1, 2, 3)
-    return np.asarray(np.einsum("sij,shi->shj", axes, own).reshape(-1, 6))
 
 
 def _balance(center: Floats, pulls: list[_Pull]) -> tuple[Floats, Floats]:
@@ -196,12 +176,6 @@ def _balance(center: Floats, pulls: list[_Pull]) -> tuple[Floats, Floats]:
         np.add.at(total, body, wrench + turn)
         np.add.at(size, body, np.abs(wrench) + np.abs(turn))
     return total, size
-
-
-def _ratio(total: Floats, size: Floats) -> float:
-    """Return the larger of forces and moments left over, each over its largest magnitude."""
-    rest, most = (np.abs(a).reshape(-1, 2, 3).max(axis=(0, 2)) for a in (total, size))
-    return float((rest / np.maximum(most, np.finfo(float).tiny)).max())
 
 
 _LOOKED_INTO = 1e-15  # a smallest scaled eigenvalue below which a motion may be free
@@ -290,18 +264,15 @@ def diagnose(source: Engine | Network, bricks: int, grips: ArrayLike) -> Diagnos
 
 
 def _judge(
-    lowest: float,
-    condition: float,
-    residuals: _Residuals | None,
-    refusal: MechanismError | SolverError | None,
+    lowest: float, condition: float, residuals: _Residuals | None, refusal: Exception | None
 ) -> tuple[Finding, str]:
     if not lowest:
-        return (Finding.MECHANISM, "neither joints nor ground nor grips resist the motion")
+        return Finding.MECHANISM, "neither joints nor ground nor grips resist the motion"
     if residuals is None:
         return Finding.ILL_CONDITIONED, f"condition {condition:.1e}; the engine refused: {refusal}"
     error = residuals.backward_error
+    most = f"{'at most' if error <= WELL else 'above'} {WELL:g}"
+    text = f"backward error {error:.1e}, {most}, at a condition of {condition:.1e}"
     if error <= WELL:
-        text = f"backward error {error:.1e}, at most {WELL:g}, at a condition of {condition:.1e}"
         return Finding.SOLVED_WELL, text
-    text = f"backward error {error:.1e}, above {WELL:g}, at a condition of {condition:.1e}"
     return Finding.ILL_CONDITIONED, f"{text}: the fields do not solve the equations"

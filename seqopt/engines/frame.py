@@ -11,12 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import (
@@ -31,7 +30,6 @@ from seqopt.engines.interface import (
 )
 from seqopt.engines.rigid._mechanism import require_resistance
 from seqopt.errors import SolverError
-from seqopt.network.build import network_of
 from seqopt.network.network import Network, PartKind
 from seqopt.scene.scene import Scene
 
@@ -42,6 +40,9 @@ _SUSPICIOUS = 1e-9  # a smallest scaled eigenvalue below this, over the contrast
 _LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: holds its joint node
 
 
+_Examine = Callable[[], None]
+
+
 class FrameEngine(NamedEngine):
     """Solves each grip set as a frame of its own.
 
@@ -50,22 +51,15 @@ class FrameEngine(NamedEngine):
     """
 
     def __init__(self, network: Network | Scene, contrast: float = CONTRAST) -> None:
-        self._network = network_of(network)
+        super().__init__(network)
         self._contrast = contrast
-
-    @property
-    def network(self) -> Network:
-        """The network whose nodes and edges the fields follow."""
-        return self._network
 
     @failing_in_a_line
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
-        """Return the fields of a partial structure for many grip sets.
+        """Return the fields of a partial structure for grip sets (S, r).
 
-        All fields are evaluated whatever is asked: the factorization dominates the cost.
-
-        ``grips`` (S, r): node numbers. Raises `SolverError` if corrections do not settle, which a
-        lower contrast may help.
+        All fields are evaluated whatever is asked: the factorization dominates the cost. Raises
+        `SolverError` if corrections do not settle, which a lower contrast may help.
         """
         network = self._network
         columns = grip_columns(network, bricks, grips)
@@ -74,62 +68,56 @@ class FrameEngine(NamedEngine):
         return require_finite(answer, bricks, grips)
 
 
-class _Frame(NamedTuple):
-    """Deformations (R, 6n) of n frame nodes and their stiffnesses (R,).
-
-    Stretches of the edges come first, deformations of the half joints last: all translations, then
-    all rotations.
-    """
-
-    nodes: int
-    halves: int
-    deformation: sparse.csr_array
-    stiffness: Floats
-
-
 def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) -> Fields:
     """Return the fields of one model."""
     edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
-    frame = _frame(network, bricks, contrast)
-    load = np.zeros((frame.nodes, 6))
+    split, deformation, stiffness = _frame(network, bricks, contrast)
+    load = np.zeros((deformation.shape[1] // 6, 6))
     load[network.inner[:bricks].ravel(), :3] = network.inner_weight[: 2 * bricks]
     held = network.inner.ravel()[columns]
     base = np.flatnonzero(network.node_kind[:nodes] == PartKind.BASE.value)
-    free = np.ones((frame.nodes, 6), dtype=bool)
+    free = np.ones(load.shape, dtype=bool)
     free[base] = False
     free[held, :3] = False
-    unknown = np.flatnonzero(free)
-    motion = np.zeros(load.size)
-    reduced = frame.deformation[:, unknown]
+    unknown, motion = np.flatnonzero(free), np.zeros(load.size)
+    reduced = deformation[:, unknown]
     examine = partial(require_resistance, network, bricks, columns)
-    motion[unknown] = _solve(reduced, frame.stiffness, load.ravel()[unknown], contrast, examine)
-    stress = frame.stiffness * (frame.deformation @ motion)
-    reaction = (frame.deformation.T @ stress).reshape(load.shape) - load
-    of_end = network.node_spring[base] == network.springs.support[:, None]  # (G, base nodes)
+    motion[unknown] = _solve(reduced, stiffness, load.ravel()[unknown], contrast, examine)
+    stress = stiffness * (deformation @ motion)
+    reaction = (deformation.T @ stress).reshape(load.shape) - load
+    springs, which = network.springs, network.edge_spring[split]
+    of_end = network.node_spring[base] == springs.support[:, None]  # (G, base nodes)
+    mine = network.edge_brick[split] == springs.bodies[which, 1]
+    mine &= springs.since[which] <= bricks
+    halves, own = stress[-6 * len(split) :].reshape(2, len(split), 3)[:, mine], which[mine]
+    wrench = np.zeros((len(springs.since), 6))
+    wrench[own] = -np.einsum("hsk,ski->shi", halves, springs.axes[own]).reshape(-1, 6)
     moved = motion.reshape(load.shape)
     return Fields(
         edge_force=stress[None, :edges],
         displacement=moved[None, :nodes, :3],
         grip_force=reaction[None, held, :3],
         support=(of_end @ reaction[base])[None],
-        joint_wrench=_joint_wrenches(network, bricks, stress[-6 * frame.halves :])[None],
+        joint_wrench=wrench[None],
         brick_twist=moved[network.inner[:bricks]].mean(axis=1)[None],
     )
 
 
-def _frame(network: Network, bricks: int, contrast: float) -> _Frame:
+def _frame(network: Network, bricks: int, contrast: float) -> tuple[Ints, sparse.csr_array, Floats]:
     """Return the frame of a partial structure: beams along the edges, springs at the joints.
 
     An edge that meets a joint ends in a frame node of its own, numbered after the network's.
+    Results: these edges; deformations (R, 6n) of n frame nodes, of the edges first, of the half
+    joints last: all translations, then all rotations; their stiffnesses (R,).
     """
     edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
     springs, kind = network.springs, network.edge_kind[:edges]
     split = np.flatnonzero(kind != PartKind.INNER.value)
     which = network.edge_spring[split]
     total = nodes + len(split)
-    ends = network.edge_nodes[:edges].copy()
-    ends[split, np.where(kind[split] == PartKind.BASE.value, 0, 1)] = nodes + np.arange(len(split))
-    pairs = np.stack([springs.node[which], nodes + np.arange(len(split))], axis=1)
+    own_node, ends = np.arange(nodes, total), network.edge_nodes[:edges].copy()
+    ends[split, np.where(kind[split] == PartKind.BASE.value, 0, 1)] = own_node
+    pairs = np.stack([springs.node[which], own_node], axis=1)
     stretch = contrast * springs.translational_stiffness.max()  # EA / L
     bend = contrast * springs.rotational_stiffness.max()  # EI / L = GJ / L
     zero, turn = np.zeros_like(springs.axes[which]), springs.axes[which]
@@ -139,14 +127,10 @@ def _frame(network: Network, bricks: int, contrast: float) -> _Frame:
         (pairs, np.dstack([-turn, zero]), np.dstack([turn, zero])),
         (pairs, np.dstack([zero, -turn]), np.dstack([zero, turn])),
     ]
-    own = [
-        2 * np.maximum(k[which], _LOOSE * k.max()).ravel()
-        for k in (springs.translational_stiffness, springs.rotational_stiffness)
-    ]
-    stiffness = np.concatenate([beam_stiffness, *own])
-    return _Frame(
-        total, len(split), sparse.vstack([_rows(total, *part) for part in parts]).tocsr(), stiffness
-    )
+    kinds = springs.translational_stiffness, springs.rotational_stiffness
+    own = [2 * np.maximum(k[which], _LOOSE * k.max()).ravel() for k in kinds]
+    rows = sparse.vstack([_rows(total, *part) for part in parts]).tocsr()
+    return split, rows, np.concatenate([beam_stiffness, *own])
 
 
 def _beams(
@@ -172,20 +156,6 @@ def _beams(
     return modes, np.repeat([stretch, bend, 3 * bend], [edges, 3 * edges, 3 * edges])
 
 
-def _joint_wrenches(network: Network, bricks: int, stress: Floats) -> Floats:
-    """Return the wrench (S, 6) of every spring on its second body from half-joint stresses."""
-    springs, edges = network.springs, network.count_edges(bricks)
-    split = np.flatnonzero(network.edge_kind[:edges] != PartKind.INNER.value)
-    which = network.edge_spring[split]
-    mine = (network.edge_brick[split] == springs.bodies[which, 1]) & (
-        springs.since[which] <= bricks
-    )
-    halves = stress.reshape(2, len(split), 3)[:, mine]
-    out = np.zeros((len(springs.since), 6))
-    out[which[mine]] = -np.einsum("hsk,ski->shi", halves, springs.axes[which[mine]]).reshape(-1, 6)
-    return out
-
-
 def _rows(nodes: int, pairs: Ints, first: Floats, second: Floats) -> sparse.coo_array:
     """Return the rows (M k, 6 nodes) of k deformations of each of M pairs of nodes."""
     blocks = np.stack([first, second], axis=2)  # (M, k, 2, 6)
@@ -196,17 +166,14 @@ def _rows(nodes: int, pairs: Ints, first: Floats, second: Floats) -> sparse.coo_
 
 
 def _solve(
-    deformation: sparse.csr_array,
-    stiffness: Floats,
-    load: Floats,
-    contrast: float,
-    examine: Callable[[], None],
+    maps: sparse.csr_array, stiffness: Floats, load: Floats, contrast: float, examine: _Examine
 ) -> Floats:
     """Return the displacements under a load, corrected until they no longer change.
 
-    A matrix that looks singular is examined: ``examine`` raises if the structure is a mechanism.
+    ``maps``: to deformations. A matrix that looks singular is examined: ``examine`` raises if the
+    structure is a mechanism.
     """
-    matrix = deformation.T @ sparse.diags_array(stiffness) @ deformation
+    matrix = maps.T @ sparse.diags_array(stiffness) @ maps
     scale = 1 / np.sqrt(np.maximum(matrix.diagonal(), np.finfo(float).tiny))
     scaled = (sparse.diags_array(scale) @ matrix @ sparse.diags_array(scale)).tocsc()
     failure = SolverError(
@@ -218,24 +185,17 @@ def _solve(
     except RuntimeError as error:  # SuperLU met an exactly zero pivot
         examine()
         raise failure from error
-    if _smallest_eigenvalue(factor, len(load)) < _SUSPICIOUS / contrast:
+    vector = np.random.default_rng(0).standard_normal(len(load))
+    for _ in range(4):  # inverse iteration, for the smallest eigenvalue
+        vector = factor.solve(vector / np.linalg.norm(vector))
+    if 1 / np.linalg.norm(vector) < _SUSPICIOUS / contrast:
         examine()
     answer = scale * factor.solve(scale * load)
     for _ in range(_FRAME_CORRECTIONS):
-        residual = load - deformation.T @ (stiffness * (deformation @ answer))
+        residual = load - maps.T @ (stiffness * (maps @ answer))
         correction = scale * factor.solve(scale * residual)
         answer += correction
-    if (
-        not np.abs(correction / scale).max()
-        <= _LAST_FRAME_CORRECTION * np.abs(answer / scale).max()
-    ):
+    last, most = (np.abs(part / scale).max() for part in (correction, answer))
+    if not last <= _LAST_FRAME_CORRECTION * most:
         raise failure
     return np.asarray(answer)
-
-
-def _smallest_eigenvalue(factor: SuperLU, size: int) -> float:
-    """Estimate the smallest eigenvalue of a factored symmetric matrix by inverse iteration."""
-    vector = np.random.default_rng(0).standard_normal(size)
-    for _ in range(4):
-        vector = factor.solve(vector / np.linalg.norm(vector))
-    return float(1 / np.linalg.norm(vector))

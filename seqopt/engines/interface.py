@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
 from functools import cache, cached_property, wraps
 from itertools import combinations
-from typing import TYPE_CHECKING, ParamSpec, Protocol, SupportsIndex, TypeVar
+from typing import ParamSpec, Protocol, SupportsIndex, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,20 +18,20 @@ from threadpoolctl import ThreadpoolController
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import GripError, MemoryShortError, SolverError
+from seqopt.network.build import network_of
 from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
 from seqopt.work._workers import free_memory
 
 _BUFFERS = 100e6  # bytes; taken at once: OpenBLAS waits without end for buffers it does not get
-_SOME = 200  # rows of a matrix whose product and factors need them
 
 
 def one_thread() -> AbstractContextManager[object]:
     """Return a context in which BLAS uses one thread; on leaving, it uses as many as before.
 
     The matrices of a partial structure are small enough for one core. Threads that share them spend
-    their time waiting, without end where another process wants the second core.
-
-    Result: entered for a whole operator or pass of grip sets, it costs some 10 µs.
+    their time waiting, without end where another process wants the second core. Entered for a whole
+    operator or pass of grip sets, it costs some 10 µs.
     """
     limited: AbstractContextManager[object] = _libraries().limit(limits=1, user_api="blas")
     return limited
@@ -48,7 +48,7 @@ def _libraries() -> ThreadpoolController:
         )
     found = ThreadpoolController()
     with found.limit(limits=1, user_api="blas"):
-        some = np.eye(_SOME)
+        some = np.eye(200)  # large enough for its product and factors to need them
         _ = some @ some, np.linalg.inv(some)  # of NumPy's library, and
         _ = blas.dgemm(1.0, some, some), lapack.dgetrf(some)  # of SciPy's
     return found
@@ -75,10 +75,7 @@ class Basis(FrozenValue):
         return frozen(linalg.block_diag(self.force, self.moment))
 
     def levers(self, arms: Floats) -> Floats:
-        """Return the moments of unit forces at the ends of arms.
-
-        ``arms`` (..., 3). Result (..., m, d).
-        """
+        """Return the moments (..., m, d) of unit forces at the ends of arms (..., 3)."""
         sizes = len(self.moment), len(self.force)
         return np.asarray((arms @ self._turns.T).reshape(*arms.shape[:-1], *sizes))
 
@@ -190,15 +187,8 @@ FLAGS = {
     "joint_wrench": Want.JOINTS,
     "brick_twist": Want.BRICKS,
 }
-
-
-SHAPES: dict[str, tuple[int, ...]] = {
-    "edge_force": (),
-    "displacement": (3,),
-    "support": (6,),
-    "joint_wrench": (6,),
-    "brick_twist": (6,),
-}  # of what each has for an edge, node, end, spring or brick
+SHAPES = dict.fromkeys(FLAGS, (6,)) | {"edge_force": (), "displacement": (3,)}
+"""Of what each has for an edge, node, end, spring or brick."""
 
 
 @cache
@@ -214,11 +204,7 @@ def keep_wanted(answer: Fields, want: Want) -> Fields:
 
 
 def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
-    """Return fields if all of their numbers are finite.
-
-    ``grips`` (S, r). Raises `SolverError` if one is not: NaN elsewhere means that a robot holds
-    nothing.
-    """
+    """Return fields if all of their numbers are finite; raise `SolverError` if one is not."""
     for name in _NAMES:
         values = getattr(answer, name)
         if values.size and not np.isfinite(values.sum()) and not np.isfinite(values).all():
@@ -232,10 +218,10 @@ def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
 
 
 def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
-    """Return grip sets as indices into ``network.inner.ravel()``, checked.
+    """Return grip sets (S, r) of node numbers as the ``columns`` that functions of engines take.
 
-    ``grips`` (S, r): node numbers. Result (S, r). Raises `GripError` if there are fewer bricks, the
-    shape is another, or a set names an unknown, blocked, unplaced or repeated node.
+    These are indices into ``network.inner.ravel()``. Raises `GripError` if there are fewer bricks,
+    the shape is another, or a set names an unknown, blocked, unplaced or repeated node.
     """
     total = len(network.inner)
     if not 1 <= bricks <= total:
@@ -247,9 +233,8 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
             "grip sets have different sizes; give as many nodes in each, or solve them by size"
         ) from None
     if numbers.ndim != 2 or (numbers.size and not np.issubdtype(numbers.dtype, np.integer)):
-        raise GripError(
-            f"grips have shape {numbers.shape}; give integer node numbers, (sets, grips)"
-        )
+        shape = numbers.shape
+        raise GripError(f"grips have shape {shape}; give integer node numbers, (sets, grips)")
     known, index = network.index_of_grip
     last = len(known) - 1
     at = (numbers.astype(np.int64, copy=False) - known[0]).clip(0, last)
@@ -262,37 +247,28 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
             f"grip on node {numbers[wrong][0]}: with {bricks} bricks the free nodes are "
             f"{known[index < 2 * bricks].tolist()}"
         )
-    _require_different(columns, numbers)
-    return np.asarray(columns, dtype=np.int64)
-
-
-def _require_different(columns: Ints, numbers: Ints) -> None:
-    """Require that no set (S, r) holds a node twice; the message has its number."""
     for i, j in combinations(range(columns.shape[1]), 2):
         twice = columns[:, i] == columns[:, j]
         if twice.any():
-            raise GripError(
-                f"grip set {numbers[twice][0].tolist()}: a node is held twice; name it once"
-            )
+            named = numbers[twice][0].tolist()
+            raise GripError(f"grip set {named}: a node is held twice; name it once")
+    return np.asarray(columns, dtype=np.int64)
 
 
 _Asked = ParamSpec("_Asked")
 _Answer = TypeVar("_Answer")
-_NOT_FINITE = "infs or NaNs"  # what SciPy says of arrays that it does not take
 
 
 def failing_in_a_line(solve: Callable[_Asked, _Answer]) -> Callable[_Asked, _Answer]:
-    """Return a function whose numerical failures are a `SolverError`.
-
-    ``solve``: that of an engine. Result: the same, but for what it raises.
-    """
+    """Return a function whose numerical failures are a `SolverError`."""
 
     @wraps(solve)
     def solved(*arguments: _Asked.args, **named: _Asked.kwargs) -> _Answer:
         try:
             return solve(*arguments, **named)
         except (np.linalg.LinAlgError, ValueError) as error:
-            if not isinstance(error, np.linalg.LinAlgError) and _NOT_FINITE not in str(error):
+            # SciPy says so of arrays that it does not take
+            if not isinstance(error, np.linalg.LinAlgError) and "infs or NaNs" not in str(error):
                 raise
             raise SolverError(
                 f"the equations have no answer in numbers ({error}); correct lengths, masses or "
@@ -303,58 +279,49 @@ def failing_in_a_line(solve: Callable[_Asked, _Answer]) -> Callable[_Asked, _Ans
 
 
 def no_sets(network: Network, bricks: int, held: int) -> Fields:
-    """Return the fields of no grip set at all: their shapes.
+    """Return the fields of no grip set at all that would hold some nodes: their shapes."""
+    counts = counts_of_fields(network, bricks)
+    empty = {name: np.empty((0, count, *SHAPES[name])) for name, count in counts.items()}
+    return Fields(grip_force=np.empty((0, held, 3)), **empty)
 
-    ``held``: how many nodes each set would hold. Result: arrays with a first axis of length zero.
-    """
-    return Fields(
-        edge_force=np.empty((0, network.count_edges(bricks))),
-        displacement=np.empty((0, network.count_nodes(bricks), 3)),
-        grip_force=np.empty((0, held, 3)),
-        support=np.empty((0, len(network.springs.support), 6)),
-        joint_wrench=np.empty((0, len(network.springs.since), 6)),
-        brick_twist=np.empty((0, bricks, 6)),
-    )
+
+def counts_of_fields(network: Network, bricks: int) -> dict[str, int]:
+    """Return of how many edges, nodes, ends, springs or bricks each field tells."""
+    edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
+    ends, springs = len(network.springs.support), len(network.springs.since)
+    return dict(zip(FLAGS, (edges, nodes, ends, springs, bricks), strict=True))
 
 
 def select_sets(answer: Fields, which: Bools | Ints) -> Fields:
-    """Return the fields of some grip sets. ``which`` (S,), (s,)."""
+    """Return the fields of some grip sets."""
     return Fields(**{name: getattr(answer, name)[which] for name in _NAMES})
 
 
-def join_sets(parts: Sequence[Fields], which: Sequence[Bools | slice] | None = None) -> Fields:
-    """Return the fields of the grip sets of several answers.
-
-    ``parts``: alike in everything but the number of sets. ``which`` (S,): which of all sets are
-    those of each part, in their order; by default one part's come after another's.
-    """
-    after = np.cumsum([len(part.grip_force) for part in parts])
-    total = int(after[-1])
-    if which is None:
-        which = [slice(b - len(a.grip_force), b) for a, b in zip(parts, after, strict=True)]
-    whole = {name: np.empty((total, *getattr(parts[0], name).shape[1:])) for name in _NAMES}
-    for part, mine in zip(parts, which, strict=True):
-        for name in _NAMES:
-            whole[name][mine] = getattr(part, name)
-    return Fields(**whole)
+def join_sets(parts: Sequence[Fields]) -> Fields:
+    """Return the fields of the grip sets of several answers, one after the other."""
+    return Fields(**{n: np.concatenate([getattr(part, n) for part in parts]) for n in _NAMES})
 
 
 def merge_sets(which: Bools, inside: Fields, outside: Fields) -> Fields:
-    """Return the fields of grip sets, some from one answer and the rest from another.
-
-    ``which`` (S,): the sets that the first answer is about, in their order.
-    """
-    return join_sets([inside, outside], [which, ~which])
+    """Return the fields of grip sets, those of ``which`` (S,) from one answer, the rest not."""
+    whole = {}
+    for name in _NAMES:
+        first = getattr(inside, name)
+        whole[name] = np.empty((len(which), *first.shape[1:]))
+        whole[name][which], whole[name][~which] = first, getattr(outside, name)
+    return Fields(**whole)
 
 
 class NamedEngine:
     """Base of engines: they say what they are and which structure they compute."""
 
-    if TYPE_CHECKING:
+    def __init__(self, network: Network | Scene) -> None:
+        self._network = network_of(network)
 
-        @property
-        def network(self) -> Network:
-            """The network whose nodes and edges the fields follow."""
+    @property
+    def network(self) -> Network:
+        """The network whose nodes and edges the fields follow."""
+        return self._network
 
     def __repr__(self) -> str:
         scene = self.network.scene

@@ -72,9 +72,7 @@ def _arithmetic() -> str:
     """Return a mark of the code that answers come from: its text, NumPy and SciPy."""
     home = Path(__file__).parents[1]
     found = (home / name for name in _ARITHMETIC)
-    files = [
-        f for path in found for f in ([path] if path.is_file() else sorted(path.rglob("*.py")))
-    ]
+    files = [f for p in found for f in ([p] if p.is_file() else sorted(p.rglob("*.py")))]
     mark = hashlib.sha256(f"{np.__version__} {scipy.__version__}".encode())
     for file in files:
         mark.update(file.relative_to(home).as_posix().encode() + file.read_bytes())
@@ -82,11 +80,7 @@ def _arithmetic() -> str:
 
 
 def recipe_of(engine: object) -> Recipe | None:
-    """Return how an engine was made.
-
-    Result: None where it was not made by name; an engine of one's own may have an attribute
-    ``recipe``.
-    """
+    """Return how an engine was made, if by name, or what one of one's own has as ``recipe``."""
     found = getattr(engine, "recipe", None)
     return found if isinstance(found, Recipe) else None
 
@@ -99,10 +93,10 @@ ENGINES: dict[str, Callable[[Network], Engine]] = {
     "discrete": DiscreteEngine,
 }
 USUAL = "compliance"  # the engine where none is asked for
-_LIMITED: dict[str, Callable[[Network, Mortar], Engine]] = {
+_LIMITED: dict[str, Callable[[Network, Mortar], Engine]] = {  # whose joints hold what mortar does
     "auto": AutoEngine,
     "discrete": DiscreteEngine,
-}  # engines whose joints hold only what their mortar does
+}
 
 
 def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None = None) -> Engine:
@@ -136,32 +130,26 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
     """
     if name not in ENGINES:
         raise SceneError(f"engine {name} does not exist; known are {', '.join(ENGINES)}")
-    network = network_of(network)
+    network, options = network_of(network), dict[str, object]()
     if mortar is None:
-        return _known_by(ENGINES[name](network), Recipe(name, network.scene))
-    if name not in _LIMITED:
+        engine = ENGINES[name](network)
+    elif name in _LIMITED:
+        options["mortar"] = mortar = find_mortar(mortar)
+        engine = _LIMITED[name](network, mortar)
+    else:
         raise SceneError(
             f"engine {name}: its joints never fail, so a mortar changes nothing; "
             f"use the engine {' or '.join(_LIMITED)}"
         )
-    mortar = find_mortar(mortar)
-    return _known_by(
-        _LIMITED[name](network, mortar), Recipe(name, network.scene, {"mortar": mortar})
-    )
-
-
-def _known_by(engine: Engine, recipe: Recipe) -> Engine:
-    """Return an engine that says how it was made, so that others can make it again."""
-    vars(engine)["recipe"] = recipe
+    vars(engine)["recipe"] = Recipe(name, network.scene, options)
     return engine
 
 
 def provenance(engine: Engine) -> dict[str, object]:
-    """Return what a summary says of the engine that computed it, and of packages.
+    """Return what a summary says of the engine, after it computed, and of packages.
 
-    ``engine``: after it computed. Result: ``engine`` with its ``name``, the ``reason`` for it, the
-    ``mortar`` if one was given, and of an automatic one the ``levels`` that it took, for how many
-    grip ``sets``, and why each; ``versions`` as of `versions`.
+    ``engine``: its ``name``, the ``reason`` for it, the ``mortar`` if one was given, and of an
+    automatic one the ``levels`` that it took, for how many grip ``sets``, and why each.
     """
     recipe = recipe_of(engine)
     said: dict[str, object] = {"name": type(engine).__name__, "reason": "given as an object"}
@@ -180,17 +168,12 @@ def provenance(engine: Engine) -> dict[str, object]:
 
 @cache
 def versions() -> Mapping[str, str]:
-    """Return the versions of Python, of seqopt and of the packages that it needs.
-
-    Result: by name.
-    """
+    """Return the versions of Python, of seqopt and of the packages that it needs, by name."""
+    found = {"python": platform.python_version()}
     lines = (line for line in requires("seqopt") or () if "extra ==" not in line)
-    names = ["seqopt", *(re.split(r"[^\w.-]", line)[0] for line in lines)]
-    return {"python": platform.python_version()} | {name: _version(name) for name in names}
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "not installed"
+    for name in ("seqopt", *(re.split(r"[^\w.-]", line)[0] for line in lines)):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found

@@ -16,13 +16,11 @@ from seqopt.network.network import GROUND, Network, PartKind
 
 
 def point_motion(arm: Floats) -> Floats:
-    """Return the displacements (..., 3, 6) of points of a body for its unit twists.
+    """Return the displacements (..., 3, 6) of points for unit twists of their body.
 
-    ``arm`` (..., 3): from the body's reference point, m. The transpose takes forces at the points
-    to wrenches.
+    ``arm`` (..., 3): from its reference point, m. The transpose takes forces to wrenches.
     """
-    shift = np.broadcast_to(np.eye(3), (*arm.shape, 3))
-    return np.concatenate([shift, -skew(arm)], axis=-1)
+    return np.concatenate([np.broadcast_to(np.eye(3), (*arm.shape, 3)), -skew(arm)], axis=-1)
 
 
 def node_motion(network: Network, bricks: int) -> sparse.csr_array:
@@ -43,26 +41,19 @@ def node_motion(network: Network, bricks: int) -> sparse.csr_array:
     (3n, 6b) sparse
         Of the n nodes of the partial structure.
     """
-    node, brick, share = _followers(network, bricks)
-    block = point_motion(network.node_position[node] - network.centroid[brick])
-    shape = (network.count_nodes(bricks), bricks)
-    return spread(node, brick, share[:, None, None] * block, shape)
-
-
-def _followers(network: Network, bricks: int) -> tuple[Ints, Ints, Floats]:
-    """Return which node follows which brick by which share."""
     springs = network.springs
     kind = network.node_kind[: network.count_nodes(bricks)]
     inner = np.flatnonzero(kind == PartKind.INNER.value)
     joint = np.flatnonzero(kind == PartKind.JOINT.value)
     spring = network.node_spring[joint]
     bodies = springs.bodies[spring]
-    there = (bodies != GROUND) & (bodies < bricks)
-    share = np.where(springs.since[spring] <= bricks, 0.5, 1.0)[:, None] * there
-    row, side = np.nonzero(there)
+    row, side = np.nonzero((bodies != GROUND) & (bodies < bricks))
     node = np.concatenate([inner, joint[row]])
     brick = np.concatenate([network.node_brick[inner], bodies[row, side]])
-    return node, brick, np.concatenate([np.ones(len(inner)), share[row, side]])
+    share = np.where(springs.since[spring[row]] <= bricks, 0.5, 1.0)
+    block = point_motion(network.node_position[node] - network.centroid[brick])
+    block[len(inner) :] *= share[:, None, None]
+    return spread(node, brick, block, (len(kind), bricks))
 
 
 def deformation(
@@ -70,9 +61,8 @@ def deformation(
 ) -> sparse.csr_array:
     """Return the twists (6s, 6n) of second bodies against first ones for unit twists of all.
 
-    ``bodies`` (s, 2): of every spring; `GROUND` does not move. ``at`` (s, 3): where each twist is
-    taken; ``center`` (n, 3): reference points of bodies, m; ``axes`` (s, 3, 3): rows in which
-    twists are given, by default those of the scene.
+    ``bodies`` (s, 2): `GROUND` does not move. ``at`` (s, 3): where each twist is taken; ``center``
+    (n, 3): reference points of bodies, m; ``axes`` (s, 3, 3): rows, by default the scene's.
     """
     spring, side = np.nonzero(bodies != GROUND)
     body = bodies[spring, side]
@@ -89,22 +79,20 @@ def deformation(
 def spring_stiffness(network: Network, which: Ints) -> Floats:
     """Return the stiffness (s, 6, 6) of springs (s,) in the scene's axes, N/m and N m/rad."""
     springs = network.springs
-    stiffness = np.zeros((len(which), 6, 6))
-    for row, s in enumerate(which):
-        axes = springs.axes[s]
-        stiffness[row, :3, :3] = axes.T * springs.translational_stiffness[s] @ axes
-        stiffness[row, 3:, 3:] = axes.T * springs.rotational_stiffness[s] @ axes
+    stiffness, axes = np.zeros((len(which), 6, 6)), springs.axes[which]
+    parts = springs.translational_stiffness, springs.rotational_stiffness
+    for own, part in zip((slice(3), slice(3, 6)), parts, strict=True):
+        stiffness[:, own, own] = axes.transpose(0, 2, 1) * part[which][:, None] @ axes
     return stiffness
 
 
 def spring_maps(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
     """Return which springs act (s,), their `deformation` (s, 6, 6b) and stiffness (s, 6, 6)."""
-    springs = network.springs
+    springs, center = network.springs, network.centroid[:bricks]
     acting = springs.acting(bricks)
-    center = network.centroid[:bricks]
     gap = deformation(springs.bodies[acting], springs.position[acting], center)
-    stiffness = spring_stiffness(network, acting)
-    return acting, gap.toarray().reshape(len(acting), 6, 6 * bricks), stiffness
+    gaps = gap.toarray().reshape(len(acting), 6, 6 * bricks)
+    return acting, gaps, spring_stiffness(network, acting)
 
 
 def spread(row: Ints, column: Ints, block: Floats, shape: tuple[int, int]) -> sparse.csr_array:
@@ -156,8 +144,7 @@ def build_statics(network: Network) -> Statics:
     outer = np.flatnonzero(kind != PartKind.INNER.value)
     half = kind[outer] == PartKind.JOINT.value
     brick = network.edge_brick[outer]
-    on_first = half & (springs.bodies[spring[outer], 0] == brick)
-    sign = np.where(on_first, -1.0, 1.0)[:, None]
+    sign = np.where(half & (springs.bodies[spring[outer], 0] == brick), -1.0, 1.0)[:, None]
     inner_edge = np.empty(len(network.inner), dtype=np.int64)
     inner_edge[network.edge_brick[inner]] = inner
     arrives = half & (network.edge_nodes[outer, 0] == network.inner[brick, 1])
@@ -165,12 +152,9 @@ def build_statics(network: Network) -> Statics:
     rows = np.concatenate([outer, through])
     columns = np.concatenate([spring[outer], spring[outer[arrives]]])
     values = np.vstack([sign * axis[outer], sign[arrives] * axis[through]])
-    second = 2 * network.edge_brick[inner] + 1
-    support = springs.support
+    second, support = 2 * network.edge_brick[inner] + 1, springs.support
     moment = np.tile(np.eye(6), (len(support), 1, 1))
     moment[:, 3:, :3] = skew(springs.position[support] - springs.anchor[support])
-    return Statics(
-        edge_of_spring=spread(rows, columns, values[:, None], (len(axis), len(springs.since))),
-        edge_of_load=spread(inner, second, axis[inner][:, None], (len(axis), network.inner.size)),
-        support_of_spring=moment,
-    )
+    of_spring = spread(rows, columns, values[:, None], (len(axis), len(springs.since)))
+    of_load = spread(inner, second, axis[inner][:, None], (len(axis), network.inner.size))
+    return Statics(of_spring, of_load, moment)

@@ -16,6 +16,9 @@ from seqopt.scene.scene import Scene, in_order
 _EQUALLY_FAR = 1e-6  # inner nodes whose distances from a joint differ by no larger share
 
 
+_Springs = list[tuple[Joint | Ground, int]]  # with the brick counts from which they act
+
+
 class _Node(NamedTuple):
     name: object
     kind: PartKind
@@ -59,9 +62,13 @@ def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Net
     >>> build_network(load_scene("arch25"))
     <Network arch25: 25 bricks, 26 springs, 78 nodes, 77 edges>
     """
-    scene = in_order(_checked(scene), order)
+    if not isinstance(scene, Scene):
+        kind = type(scene).__name__
+        raise SceneError(f"a {kind} is not a scene; give one, as load_scene('arch25') returns it")
+    scene = in_order(scene, order)
     index_of = {brick.name: i for i, brick in enumerate(scene.placed)}
-    springs = _springs(scene, index_of)
+    every: list[Joint | Ground] = [*scene.grounds, *scene.joints]
+    springs = sorted(((s, _since(s, index_of)) for s in every), key=lambda entry: entry[1])
     names = _joint_names(springs)
     nodes, edges = _of_bricks(scene)
     for s, (spring, since) in enumerate(springs):
@@ -97,28 +104,13 @@ def network_of(given: Network | Scene) -> Network:
     raise SceneError(f"a {kind} is not a network; give build_network(scene), or the scene itself")
 
 
-def _checked(scene: Scene) -> Scene:
-    if not isinstance(scene, Scene):
-        kind = type(scene).__name__
-        raise SceneError(f"a {kind} is not a scene; give one, as load_scene('arch25') returns it")
-    return scene
-
-
-def _springs(scene: Scene, index_of: dict[int, int]) -> list[tuple[Joint | Ground, int]]:
-    """Return joints and ground ends with the brick count from which each acts, in that order."""
-    springs: list[Joint | Ground] = [*scene.grounds, *scene.joints]
-    since = [_since(spring, index_of) for spring in springs]
-    return sorted(zip(springs, since, strict=True), key=lambda entry: entry[1])
-
-
 def _since(spring: Joint | Ground, index_of: dict[int, int]) -> int:
     """Return the brick count from which a spring acts."""
     closes = spring.closes_with if isinstance(spring, Ground) else None
-    ends = spring.ends if closes is None else (*spring.ends, closes)
-    return max(index_of[b] for b in ends) + 1
+    return max(index_of[b] for b in (*spring.ends, closes) if b is not None) + 1
 
 
-def _joint_names(springs: list[tuple[Joint | Ground, int]]) -> list[tuple[object, ...]]:
+def _joint_names(springs: _Springs) -> list[tuple[object, ...]]:
     """Return a name for the joint node of every spring."""
     names: list[tuple[object, ...]] = []
     for spring, _ in springs:
@@ -130,16 +122,15 @@ def _joint_names(springs: list[tuple[Joint | Ground, int]]) -> list[tuple[object
 
 def _nearest(brick: Brick, spring: Joint | Ground) -> int:
     """Return the inner node through which the brick meets the spring: the nearer, or the first."""
-    first, second = (
-        np.linalg.norm(np.subtract(brick.node_position(n), spring.position)) for n in brick.nodes
-    )
+    ways = [np.subtract(brick.node_position(node), spring.position) for node in brick.nodes]
+    first, second = map(np.linalg.norm, ways)
     return brick.nodes[0] if first <= second * (1 + _EQUALLY_FAR) else brick.nodes[1]
 
 
 def _arrays(
     scene: Scene,
     index_of: dict[int, int],
-    springs: list[tuple[Joint | Ground, int]],
+    springs: _Springs,
     nodes: list[_Node],
     edges: list[_Edge],
 ) -> Network:
@@ -147,7 +138,9 @@ def _arrays(
     return Network(
         scene=scene,
         springs=Springs(
-            bodies=np.array([_bodies(spring, index_of) for spring, _ in springs]),
+            bodies=np.array(  # the ground or the lower one first
+                [sorted([GROUND, *(index_of[b] for b in s.ends)][-2:]) for s, _ in springs]
+            ),
             since=np.array([since for _, since in springs]),
             node=np.array([index[name] for name in _joint_names(springs)]),
             position=np.array([spring.position for spring, _ in springs]),
@@ -175,7 +168,7 @@ def _arrays(
     )
 
 
-def _axes(springs: list[tuple[Joint | Ground, int]], index_of: dict[int, int]) -> Floats:
+def _axes(springs: _Springs, index_of: dict[int, int]) -> Floats:
     """Return the axes (S, 3, 3) of springs; of one with a face the first is into its last body."""
     along = np.array([spring.along for spring, _ in springs])
     across = np.array([spring.across for spring, _ in springs])
@@ -186,15 +179,8 @@ def _axes(springs: list[tuple[Joint | Ground, int]], index_of: dict[int, int]) -
     return np.stack([along, across, np.cross(along, across)], axis=1)
 
 
-def _support(
-    scene: Scene, index_of: dict[int, int], springs: list[tuple[Joint | Ground, int]]
-) -> Ints:
+def _support(scene: Scene, index_of: dict[int, int], springs: _Springs) -> Ints:
     """Return the places of the scene's ground ends among springs sorted by when they act."""
     order = np.argsort([_since(ground, index_of) for ground in scene.grounds], kind="stable")
     found = [i for i, (spring, _) in enumerate(springs) if isinstance(spring, Ground)]
     return np.array(found, dtype=np.int64)[np.argsort(order)]
-
-
-def _bodies(spring: Joint | Ground, index_of: dict[int, int]) -> list[int]:
-    """Return the two bodies of a spring, the ground or the lower one first."""
-    return sorted([GROUND, *(index_of[b] for b in spring.ends)][-2:])

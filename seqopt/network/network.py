@@ -97,7 +97,7 @@ class Springs(FrozenValue):
     face: tuple[Floats, ...]
 
     def acting(self, bricks: int) -> Ints:
-        """Return the springs that act on a partial structure. Result (s,): ascending."""
+        """Return the springs (s,) that act on a partial structure, ascending."""
         return np.flatnonzero(self.since <= bricks)
 
     @cached_property
@@ -163,11 +163,9 @@ class Network(Shown, FrozenValue):
     weight: Floats
 
     def __repr__(self) -> str:
-        counts = (
-            f"{len(self.inner)} bricks, {len(self.springs.since)} springs, "
-            f"{len(self.node_kind)} nodes, {len(self.edge_kind)} edges"
-        )
-        return f"<Network {self.scene.name}: {counts}>"
+        bricks = f"{len(self.inner)} bricks, {len(self.springs.since)} springs"
+        nodes = f"{len(self.node_kind)} nodes, {len(self.edge_kind)} edges"
+        return f"<Network {self.scene.name}: {bricks}, {nodes}>"
 
     @cached_property
     def centroid(self) -> Floats:
@@ -196,11 +194,7 @@ class Network(Shown, FrozenValue):
     @cached_property
     def index_of_node(self) -> dict[int, int]:
         """Index of every inner node by its number in the scene."""
-        return {
-            int(name): i  # type: ignore[call-overload]
-            for i, name in enumerate(self.node_name)
-            if self.node_kind[i] == PartKind.INNER.value
-        }
+        return {name: i for i, name in enumerate(self.node_name) if isinstance(name, int)}
 
     @cached_property
     def index_of_grip(self) -> tuple[Ints, Ints]:

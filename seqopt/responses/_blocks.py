@@ -24,7 +24,6 @@ import time
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
-from enum import Enum
 from functools import cached_property, partial, reduce
 from itertools import groupby
 from operator import or_
@@ -71,10 +70,7 @@ class Block(FrozenValue):
 
 def work(states: int, bricks: int) -> float:
     """Return about how long states take, in no unit."""
-    return float(states * (bricks + _APART))
-
-
-_APART = 20  # bricks whose share of the work is what every state costs, however small it is
+    return float(states * (bricks + 20))  # 20: what every state costs, however small it is
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -92,23 +88,15 @@ class Answers(FrozenValue):
 
 
 def answer(engine: Engine, block: Block) -> Answers:
-    """Return the responses of a block of states.
-
-    Raises `MechanismError`, `SolverError` as the engine does.
-    """
+    """Return the responses of a block of states. Raises what the engine does."""
     asked = [CHOSEN_BY[name] for name in block.names]
-    digits = Want.SCREEN if block.screen else Want(0)
-    want = reduce(or_, (response.needs for response in asked), digits)
+    want = reduce(or_, (r.needs for r in asked), Want.SCREEN if block.screen else Want(0))
     before = Counter(tally_of(engine))
     with one_thread():  # as many threads everywhere: sums in other orders differ in the last bit
         fields = engine.solve(block.bricks, block.grips, want)
     forces = require_finite("grip force", lengths(fields.grip_force), block.bricks)
-    values = {
-        response.name: require_finite(
-            response.name, response.of(engine.network, fields), block.bricks
-        )
-        for response in asked
-    }
+    network, bricks = engine.network, block.bricks
+    values = {r.name: require_finite(r.name, r.of(network, fields), bricks) for r in asked}
     return Answers(values, forces, tuple((Counter(tally_of(engine)) - before).items()))
 
 
@@ -138,10 +126,7 @@ class Shipment:
 
 
 def pack(engine: Engine) -> Shipment:
-    """Return an engine as it is sent.
-
-    Raises `SceneError` if it is an engine of one's own that cannot be sent.
-    """
+    """Return an engine as it is sent. Raises `SceneError` if it is one's own and cannot be."""
     recipe = _known_recipe(engine)
     try:
         content = pickle.dumps(engine if recipe is None else recipe)
@@ -154,35 +139,18 @@ def pack(engine: Engine) -> Shipment:
 
 
 def _known_recipe(engine: Engine) -> Recipe | None:
-    """Return how an engine can be made again with the same answers.
-
-    Result: None for an engine that is not made by name, or of a network that its scene does not
-    have.
-    """
+    """Return how to make an engine again; None if not by name, or not of its scene's network."""
     recipe = recipe_of(engine)
     return recipe if recipe is not None and recipe.network == engine.network else None
 
 
 def worker_for(engine: Engine, *, elsewhere: bool) -> Callable[[Blocks], list[Answers]]:
-    """Return the function that answers blocks of states.
-
-    ``elsewhere``: whether it is to be sent to other processes. Result: takes blocks, returns their
-    answers.
-    """
-    return partial(_answer_sent, pack(engine)) if elsewhere else partial(_answer_here, engine)
+    """Return the function that answers blocks. ``elsewhere``: whether in other processes."""
+    return partial(_answer_all, pack(engine) if elsewhere else engine)
 
 
-def _answer_here(engine: Engine, blocks: Blocks) -> list[Answers]:
-    return [answer(engine, block) for block in blocks]
-
-
-def _answer_sent(shipment: Shipment, blocks: Blocks) -> list[Answers]:
-    return _answer_here(engine_of(shipment), blocks)
-
-
-def engine_of(shipment: Shipment) -> Engine:
-    """Return an engine that was sent; a worker keeps the last few that it made."""
-    return _shelf.engine(shipment)
+def _answer_all(engine: Engine | Shipment, blocks: Blocks) -> list[Answers]:
+    return [answer(engine_of(engine), block) for block in blocks]
 
 
 class _Shelf(threading.local):
@@ -195,16 +163,21 @@ class _Shelf(threading.local):
     def __init__(self) -> None:
         self.engines: OrderedDict[str, Engine] = OrderedDict()
 
-    def engine(self, shipment: Shipment) -> Engine:
-        if shipment.key not in self.engines:
-            while len(self.engines) >= _HELD:
-                self.engines.popitem(last=False)
-            self.engines[shipment.key] = shipment.unpack()
-        self.engines.move_to_end(shipment.key)
-        return self.engines[shipment.key]
-
 
 _shelf = _Shelf()
+
+
+def engine_of(engine: Engine | Shipment) -> Engine:
+    """Return an engine, one that was sent newly made; a worker keeps the last few."""
+    if not isinstance(engine, Shipment):
+        return engine
+    kept = _shelf.engines
+    if engine.key not in kept:
+        while len(kept) >= _HELD:
+            kept.popitem(last=False)
+        kept[engine.key] = engine.unpack()
+    kept.move_to_end(engine.key)
+    return kept[engine.key]
 
 
 _LEFT = 3600.0  # s after which a file that is not complete is one that was given up
@@ -243,18 +216,15 @@ class Store:
         try:
             with self.path(block).open("rb") as file:
                 content = file.read(words + _WORDS + 1)
-        except OSError:
-            return None
-        whole = words <= len(content) <= words + _WORDS
-        if not whole or content[:_DIGEST] != self._checksum(block, content[_DIGEST:]):
-            return None
-        numbers = np.frombuffer(content[_DIGEST:words], "<f8").reshape(columns, sets).astype(float)
-        if not np.isfinite(numbers).all():
-            return None
-        try:
+            whole = words <= len(content) <= words + _WORDS
+            if not whole or content[:_DIGEST] != self._checksum(block, content[_DIGEST:]):
+                return None
             rows = json.loads(content[words:])
             tally = tuple((LevelChoice(Level(level), why), int(n)) for level, why, n in rows)
-        except (ArithmeticError, RecursionError, TypeError, ValueError):  # checked, and yet false
+        except (ArithmeticError, OSError, RecursionError, TypeError, ValueError):
+            return None  # not there, or checked and yet false
+        numbers = np.frombuffer(content[_DIGEST:words], "<f8").reshape(columns, sets).astype(float)
+        if not np.isfinite(numbers).all():
             return None
         values = dict(zip(block.names, numbers, strict=False))
         return Answers(values, numbers[len(values) :].T.copy(), tally)
@@ -262,8 +232,13 @@ class Store:
     def keep(self, block: Block, answers: Answers) -> None:
         """Write the answers to a block. Raises `FileError` if the file cannot be written."""
         numbers = np.array([*(answers.values[name] for name in block.names), *answers.forces.T])
-        words = json.dumps([_words(what, count) for what, count in answers.tally])
-        content = numbers.astype("<f8").tobytes() + words.encode()
+        rows = []
+        for what, count in answers.tally:
+            if not isinstance(what, LevelChoice):
+                known = f"cache: an engine that counts {what!r} cannot be kept"
+                raise SceneError(f"{known}; take no cache")
+            rows.append([what.level.value, what.reason, count])
+        content = numbers.astype("<f8").tobytes() + json.dumps(rows).encode()
         write_bytes(self.path(block), self._checksum(block, content) + content)
 
     def _checksum(self, block: Block, content: bytes) -> bytes:
@@ -276,12 +251,6 @@ def open_store(folder: Path | str | None, engine: Engine) -> Store | None:
     return None if folder is None else Store(Path(folder), engine)
 
 
-def _words(what: object, count: int) -> list[str | int]:
-    if not isinstance(what, LevelChoice):
-        raise SceneError(f"cache: an engine that counts {what!r} cannot be kept; take no cache")
-    return [what.level.value, what.reason, count]
-
-
 def _tidy(folder: Path) -> None:
     """Take away what runs that were killed left half-written."""
     for path in folder.glob(f"{HIDDEN}*"):
@@ -291,9 +260,8 @@ def _tidy(folder: Path) -> None:
         except FileNotFoundError:  # another run was faster
             continue
         except OSError as error:
-            raise FileError(
-                f"cannot tidy {folder}: {error.strerror}; name another cache"
-            ) from error
+            why = error.strerror
+            raise FileError(f"cannot tidy {folder}: {why}; name another cache") from error
 
 
 BLOCK = 2048  # grip sets whose fields are held at once: few enough to stay in the cache
@@ -372,56 +340,47 @@ class Batch(FrozenValue):
             found = {name: answer[index] for name, answer in values.items() if name in mine}
             held = np.take_along_axis(forces[index], by_robot, axis=1)
             found |= _robot_forces(self.schedule, step, held)
-            spread = {name: _spread(found.get(name), ok) for name in sorted(mine)}
-            shape = tuple(len(self.schedule.moves[m].candidates) for m in step.moves)
-            shaped = {name: each.reshape(shape) for name, each in spread.items()}
+            shaped = {}
+            for name in sorted(mine):  # NaN for what is impossible and for a robot that holds none
+                spread = np.full(ok.shape, np.nan)
+                if name in found:
+                    spread[ok] = found[name]
+                shaped[name] = spread.reshape(_shape(self.schedule, step))
             out.append(StepChoices(step, step.moves, shaped))
         return out
 
 
 def steps_of_batches(schedule: Schedule) -> list[list[list[OpenStep]]]:
-    """Return the open steps of a schedule by brick count and, within it, by how many grips.
+    """Return the open steps by brick count and, within it, by how many grips, ascending."""
 
-    Result: ascending.
-    """
-    keyed = sorted(
-        (
-            (step.bricks, len(_robots_holding(step)), step.number, step)
-            for step in schedule.steps
-            if step.moves
-        ),
-        key=lambda item: item[:3],
-    )
+    def key(step: OpenStep) -> tuple[int, int, int]:
+        return step.bricks, len(_robots_holding(step)), step.number
+
+    steps = sorted((step for step in schedule.steps if step.moves), key=key)
     return [
-        [[item[3] for item in same] for _, same in groupby(level, key=lambda item: item[1])]
-        for _, level in groupby(keyed, key=lambda item: item[0])
+        [[*same] for _, same in groupby(level, key=lambda step: key(step)[:2])]
+        for _, level in groupby(steps, key=lambda step: step.bricks)
     ]
+
+
+def _shape(schedule: Schedule, step: OpenStep) -> tuple[int, ...]:
+    """Return how many candidates each open move of a step has."""
+    return tuple(len(schedule.moves[m].candidates) for m in step.moves)
 
 
 def choices_of(schedule: Schedule, step: OpenStep) -> int:
     """Return how many choices a step has, impossible ones among them."""
-    return math.prod(len(schedule.moves[m].candidates) for m in step.moves)
+    return math.prod(_shape(schedule, step))
 
 
 def batch_of(schedule: Schedule, steps: Sequence[OpenStep], wanted: Wanted) -> Batch:
-    """Return what open steps with as many bricks and as many grips have in common.
-
-    ``wanted``: which responses every move needs.
-    """
+    """Return what open steps with as many bricks and as many grips have in common."""
     names = tuple(frozenset(wanted(schedule.moves[step.moves[-1]].bricks)) for step in steps)
     choices = [combinations(schedule, step) for step in steps]
     possible = tuple(no_node_twice(rows) for rows in choices)
     rows = np.concatenate([rows[ok] for rows, ok in zip(choices, possible, strict=True)])
     states, state = distinct(np.sort(rows, axis=1))
     return Batch(schedule, tuple(steps), names, rows, possible, states, state)
-
-
-def _spread(values: Floats | None, possible: Bools) -> Floats:
-    """Return values over all choices, NaN for impossible ones and for a robot that holds none."""
-    out = np.full(possible.shape, np.nan)
-    if values is not None:
-        out[possible] = values
-    return out
 
 
 def distinct(rows: Ints) -> tuple[Ints, Ints]:
@@ -446,20 +405,15 @@ def _robots_holding(step: OpenStep) -> list[int]:
 
 
 def combinations(schedule: Schedule, step: OpenStep) -> Ints:
-    """Return the nodes held for all combinations of the open moves of a step.
-
-    Result (choices, grips).
-    """
+    """Return the nodes held for all combinations of the open moves of a step (choices, grips)."""
     candidates = [np.array(schedule.moves[m].candidates, dtype=np.int64) for m in step.moves]
-    grid = np.meshgrid(*candidates, indexing="ij")
-    columns = []
-    for robot in _robots_holding(step):
-        grip = step.grips[robot]
-        if isinstance(grip, OpenGrip):
-            columns.append(grid[step.moves.index(grip.move)].ravel())
-        else:
-            columns.append(np.full(grid[0].size, grip))
-    return np.stack(columns, axis=1).astype(np.int64)
+    grid = dict(zip(step.moves, np.meshgrid(*candidates, indexing="ij"), strict=True))
+    columns = [
+        grid[grip.move] if isinstance(grip, OpenGrip) else np.full(_shape(schedule, step), grip)
+        for grip in step.grips
+        if grip is not None
+    ]
+    return np.stack([column.ravel() for column in columns], axis=1).astype(np.int64)
 
 
 def no_node_twice(rows: Ints) -> Bools:
@@ -483,58 +437,42 @@ _AT_ONCE = 24  # numbers per choice of the brick count that is being evaluated
 _SHARE = 0.8  # of the free memory that responses and costs may take
 
 
-class Keeping(Enum):
-    """What is kept of the choices of a schedule."""
-
-    RESPONSES = "responses"
-    COSTS = "costs"  # responses come step by step, and go
-
-
-def bytes_of_choices(schedule: Schedule, wanted: Callable[[int], Set[str]]) -> int:
-    """Return what the responses of all choices of a schedule take, about.
-
-    ``wanted``: which responses every move needs. Result: bytes.
-    """
-    total = 0
-    for step in schedule.steps:
-        moves = [schedule.moves[m] for m in step.moves]
-        if moves:
-            kept = len(wanted(moves[-1].bricks)) + _BESIDE
-            total += _NUMBER * kept * math.prod(len(move.candidates) for move in moves)
-    return total
-
-
-def bytes_of_costs(schedule: Schedule) -> int:
-    """Return what the costs of all choices take, about, while responses come step by step.
-
-    Result: bytes.
-    """
-    of_moves: dict[tuple[int, ...], int] = {}
-    of_bricks: dict[int, int] = {}
-    for step in schedule.steps:
-        if step.moves:
-            choices = choices_of(schedule, step)
-            of_moves[step.moves] = choices
-            of_bricks[step.bricks] = of_bricks.get(step.bricks, 0) + choices
-    return _NUMBER * (
-        _COSTS * sum(of_moves.values()) + _AT_ONCE * max(of_bricks.values(), default=0)
+def _bytes_of_choices(schedule: Schedule, wanted: Wanted) -> int:
+    """Return about how many bytes the responses of all choices of a schedule take."""
+    return sum(
+        _NUMBER * (len(wanted(schedule.moves[step.moves[-1]].bricks)) + _BESIDE) * choices
+        for step, choices in _open_steps(schedule)
     )
 
 
-def require_memory(
-    schedule: Schedule, wanted: Callable[[int], Set[str]], most: float | None = None
-) -> Keeping:
-    """Return what can be kept of all choices; raise an error if not even their costs can be.
+def _bytes_of_costs(schedule: Schedule) -> int:
+    """Return about how many bytes all costs take while responses come step by step."""
+    of_moves: dict[tuple[int, ...], int] = {}
+    of_bricks = Counter[int]()
+    for step, choices in _open_steps(schedule):
+        of_moves[step.moves] = choices
+        of_bricks[step.bricks] += choices
+    at_once = _AT_ONCE * max(of_bricks.values(), default=0)
+    return _NUMBER * (_COSTS * sum(of_moves.values()) + at_once)
 
-    ``wanted``: which responses every move needs. ``most``: bytes that may be used; by default
-    `_SHARE` of what is free.
+
+def _open_steps(schedule: Schedule) -> Iterator[tuple[OpenStep, int]]:
+    """Yield the open steps and how many choices each has."""
+    return ((step, choices_of(schedule, step)) for step in schedule.steps if step.moves)
+
+
+def require_memory(schedule: Schedule, wanted: Wanted, most: float | None = None) -> bool:
+    """Return whether the responses of all choices can be kept, and not only their costs.
+
+    ``most``: bytes that may be used; by default `_SHARE` of what is free. Raises
+    `MemoryShortError` if not even the costs can be kept.
     """
     most = _SHARE * free_memory() if most is None else most
-    if bytes_of_choices(schedule, wanted) <= most:
-        return Keeping.RESPONSES
-    needed = bytes_of_costs(schedule)
+    if _bytes_of_choices(schedule, wanted) <= most:
+        return True
+    needed = _bytes_of_costs(schedule)
     if needed <= most:
-        return Keeping.COSTS
+        return False
     largest = max(len(move.candidates) for move in schedule.moves)
     raise MemoryShortError(
         f"the costs of all choices take about {needed / 1e9:.3g} GB, and {most / 1e9:.3g} GB may "

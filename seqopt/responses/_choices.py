@@ -16,7 +16,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import count, zip_longest
+from itertools import chain, count, islice, zip_longest
 from typing import TypeVar
 
 import numpy as np
@@ -29,7 +29,6 @@ from seqopt.responses._blocks import (
     Batch,
     Block,
     Blocks,
-    Keeping,
     StepChoices,
     Store,
     Wanted,
@@ -50,6 +49,10 @@ from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.work._workers import Crew, Lanes, hire, map_ordered
 from seqopt.work.progress import Progress
 
+CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest")  # and one per robot
+
+__all__ = ["CHOICE_RESPONSES", "Evaluation", "StepChoices", "Wanted", "evaluate_choices"]
+
 _Each = TypeVar("_Each")
 _SEVERAL = 4  # portions' work that states of one brick count may be before they are parted
 _PREPARED = 0.15  # of all work, that every process does for itself on the vault of 338 bricks
@@ -57,7 +60,7 @@ _PORTIONS = 32  # tasks for every worker: one that is slow, or dies, leaves litt
 
 
 @dataclass(frozen=True)
-class Portion:
+class _Portion:
     """Blocks that are answered together."""
 
     blocks: tuple[Block, ...]
@@ -70,13 +73,8 @@ class Portion:
         return sum(block.work for block in self.blocks)
 
 
-def answer_blocks(
-    engine: Engine,
-    blocks: Iterable[Block],
-    total: float,
-    resources: Resources,
-    *,
-    apart: bool = False,
+def _answer_blocks(
+    engine: Engine, blocks: Iterable[Block], total: float, resources: Resources, *, apart: bool
 ) -> Generator[Answers, None, None]:
     """Return the answers to blocks of states, in their order.
 
@@ -84,29 +82,26 @@ def answer_blocks(
     it gets neighboring ones only, and answers to later ones wait for those to earlier ones.
 
     ``blocks``: taken as they are needed; ``total``: about how much work they are; ``apart``:
-    whether there is room for all answers, and no hurry for the next one. Raises `MechanismError`,
-    `SolverError`, `WorkerError` as the engine does, and the workers.
+    whether there is room for all answers, and no hurry for the next one.
     """
     store = open_store(resources.cache, engine)
     progress = Progress("responses", total, resources.progress)
     with hire(resources.executor, resources.workers, lanes=apart) as crew:
-        course = _Course(engine, store, progress, elsewhere=crew is not None)
-        portions = share_out(blocks, store, total, crew)
-        lanes = crew.workers if isinstance(crew, Lanes) else 0
-        places, portions = take_turns([*portions], lanes) if lanes else (count(), portions)
-        results = map_ordered(
-            partial(_answer_portion, worker_for(engine, elsewhere=crew is not None)),
-            portions,
-            crew,
-            course.stored,
-            course.done,
-        )
-        with closing(results):
-            for answers in in_places(places, results):
+        elsewhere = crew is not None
+        course = _Course(engine, store, progress, elsewhere)
+        places: Iterable[int] = count()
+        portions = _share_out(blocks, store, total, crew)
+        if isinstance(crew, Lanes):
+            places, portions = _take_turns([*portions], crew.workers)
+        work = partial(_answer_portion, worker_for(engine, elsewhere=elsewhere))
+        with closing(map_ordered(work, portions, crew, course.stored, course.done)) as results:
+            for answers in _in_places(places, results):
                 yield from answers
 
 
-def take_turns(portions: Sequence[Portion], lanes: int) -> tuple[Iterator[int], Iterator[Portion]]:
+def _take_turns(
+    portions: Sequence[_Portion], lanes: int
+) -> tuple[Iterator[int], Iterator[_Portion]]:
     """Return portions with their lanes, which take turns, and the places where they stood.
 
     ``lanes``: each gets neighboring ones. Later lanes get fewer, since they prepare all that comes
@@ -117,14 +112,14 @@ def take_turns(portions: Sequence[Portion], lanes: int) -> tuple[Iterator[int], 
     work = np.array([portion.work for portion in portions])
     middle = (np.cumsum(work) - work / 2) / max(float(work.sum()), 1.0)
     lane_of = np.searchsorted(before[:-1] / before[-1], middle).tolist()
-    mine: list[list[tuple[int, Portion]]] = [[] for _ in range(lanes)]
+    mine: list[list[tuple[int, _Portion]]] = [[] for _ in range(lanes)]
     for place, (portion, lane) in enumerate(zip(portions, lane_of, strict=True)):
         mine[lane].append((place, replace(portion, lane=lane)))
     turns = [pair for turn in zip_longest(*mine) for pair in turn if pair is not None]
     return iter([place for place, _ in turns]), iter([portion for _, portion in turns])
 
 
-def in_places(places: Iterable[int], results: Iterable[_Each]) -> Iterator[_Each]:
+def _in_places(places: Iterable[int], results: Iterable[_Each]) -> Iterator[_Each]:
     """Yield results in the order of their places, each as soon as those before it are there.
 
     ``places``: from 0, each once, in the order of the results.
@@ -138,9 +133,9 @@ def in_places(places: Iterable[int], results: Iterable[_Each]) -> Iterator[_Each
             following += 1
 
 
-def share_out(
+def _share_out(
     blocks: Iterable[Block], store: Store | None, total: float, crew: Crew | None
-) -> Iterator[Portion]:
+) -> Iterator[_Portion]:
     """Return portions of about equal work, each of neighboring blocks; stored ones apart.
 
     Engines that grow with the structure serve ascending brick counts best, and what all states of
@@ -152,26 +147,20 @@ def share_out(
     enough = 0.0 if crew is None else total / (_PORTIONS * crew.workers)
     mine: list[Block] = []
     for block in blocks:
-        if _complete(mine, block, enough):
-            yield Portion(tuple(mine))
-            mine = []
         found = None if store is None else store.find(block)
-        if found is None:
-            mine.append(block)
-        if mine and (found is not None or crew is None):
-            yield Portion(tuple(mine))
-            mine = []
+        if mine:
+            several = 1 if block.bricks != mine[-1].bricks else _SEVERAL
+            if found is not None or sum(each.work for each in mine) >= several * enough:
+                yield _Portion(tuple(mine))
+                mine = []
         if found is not None:
-            yield Portion((block,), [found])
+            yield _Portion((block,), [found])
+        elif crew is None:
+            yield _Portion((block,))
+        else:
+            mine.append(block)
     if mine:
-        yield Portion(tuple(mine))
-
-
-def _complete(mine: Sequence[Block], coming: Block, enough: float) -> bool:
-    """Return whether blocks are a portion before another one comes."""
-    work = sum(block.work for block in mine)
-    between = bool(mine) and coming.bricks != mine[-1].bricks
-    return work >= (enough if between else _SEVERAL * enough) and bool(mine)
+        yield _Portion(tuple(mine))
 
 
 @dataclass(frozen=True)
@@ -183,13 +172,13 @@ class _Course:
     progress: Progress
     elsewhere: bool
 
-    def stored(self, portion: Portion) -> list[Answers] | None:
+    def stored(self, portion: _Portion) -> list[Answers] | None:
         if portion.stored is not None:
             self._count(portion.stored)
             self.progress.add(portion.work)
         return portion.stored
 
-    def done(self, portion: Portion, answers: list[Answers]) -> None:
+    def done(self, portion: _Portion, answers: list[Answers]) -> None:
         if self.store is not None:
             for block, found in zip(portion.blocks, answers, strict=True):
                 self.store.keep(block, found)
@@ -199,18 +188,12 @@ class _Course:
 
     def _count(self, answers: list[Answers]) -> None:
         tally = tally_of(self.engine)
-        for found in answers:
-            for what, sets in found.tally:
-                tally[what] = tally.get(what, 0) + sets
+        for what, sets in chain.from_iterable(found.tally for found in answers):
+            tally[what] = tally.get(what, 0) + sets
 
 
-def _answer_portion(answer: Callable[[Blocks], list[Answers]], portion: Portion) -> list[Answers]:
+def _answer_portion(answer: Callable[[Blocks], list[Answers]], portion: _Portion) -> list[Answers]:
     return answer(portion.blocks)
-
-
-CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest")  # and one per robot
-
-__all__ = ["CHOICE_RESPONSES", "Evaluation", "StepChoices", "Wanted", "evaluate_choices"]
 
 
 @dataclass(frozen=True, repr=False)
@@ -240,8 +223,7 @@ class Evaluation(Terse):
 
         Raises `MemoryShortError` if there is not even that.
         """
-        most = self.resources.max_memory
-        return require_memory(self.schedule, self.wanted, most) is Keeping.COSTS
+        return not require_memory(self.schedule, self.wanted, self.resources.max_memory)
 
     @property
     def steps(self) -> tuple[StepChoices, ...]:
@@ -311,14 +293,7 @@ class _Found(Terse):
 def evaluate_choices(
     engine: Engine, schedule: Schedule, wanted: Wanted, resources: Resources = HERE
 ) -> tuple[tuple[StepChoices, ...], int]:
-    """Solve every distinct model that the open steps of a schedule contain, once.
-
-    ``engine``: what solves them; ``schedule``: whose open steps are evaluated; ``wanted``: which
-    responses every move needs. Results: ``steps``: all open steps, in order; ``models``: how many
-    different models there were: a model is a brick count and the nodes held. Raises
-    `MechanismError`, `SolverError`, `WorkerError` as the engine does, and the workers;
-    `MemoryShortError` if there is not the memory for them.
-    """
+    """Return the steps and the number of models of an `Evaluation`."""
     evaluation = Evaluation(engine, schedule, wanted, resources)
     return evaluation.steps, evaluation.models
 
@@ -338,33 +313,18 @@ def _by_level(
             for group in groups:
                 yield from group.blocks()
 
-    total = sum(
-        work(choices_of(schedule, step), step.bricks)
-        for level in levels
-        for steps in level
-        for step in steps
-    )
-    found: list[Answers] = []
-    resources = evaluation.resources
-    with closing(
-        answer_blocks(evaluation.engine, blocks(), total, resources, apart=apart)
-    ) as answers:
-        for each in answers:
-            found.append(each)
-            if len(found) == sum(group.count for group in under_way[0]):
-                groups = under_way.popleft()
-                yield _joined(groups, found), sum(len(group.states) for group in groups)
-                found = []
-
-
-def _joined(groups: Sequence[Batch], answers: Sequence[Answers]) -> list[StepChoices]:
-    """Return the choices of all steps with as many bricks, in order."""
-    out: list[StepChoices] = []
-    start = 0
-    for group in groups:
-        out += group.choices(answers[start : start + group.count])
-        start += group.count
-    return sorted(out, key=lambda choices: choices.step.number)
+    total = sum(work(choices_of(schedule, step), step.bricks) for step in chain(*chain(*levels)))
+    engine, resources = evaluation.engine, evaluation.resources
+    with closing(_answer_blocks(engine, blocks(), total, resources, apart=apart)) as answers:
+        for first in answers:  # blocks, and so `under_way`, are taken no earlier
+            groups, here = under_way.popleft(), chain([first], answers)
+            yield (  # in no variable: what is not kept is free while the next ones are computed
+                sorted(
+                    [each for g in groups for each in g.choices([*islice(here, g.count)])],
+                    key=lambda choices: choices.step.number,
+                ),
+                sum(len(group.states) for group in groups),
+            )
 
 
 def window_models(schedule: Schedule, choice: Sequence[int]) -> int:
@@ -375,12 +335,10 @@ def window_models(schedule: Schedule, choice: Sequence[int]) -> int:
 
     ``choice``: the chosen candidate of every move.
     """
-    models = 0
-    for level in steps_of_batches(schedule):
-        for steps in level:
-            rows = np.concatenate([_window_states(schedule, step, choice) for step in steps])
-            models += len(distinct(rows)[0])
-    return models
+    return sum(
+        len(distinct(np.concatenate([_window_states(schedule, step, choice) for step in steps]))[0])
+        for steps in chain(*steps_of_batches(schedule))
+    )
 
 
 def _window_states(schedule: Schedule, step: OpenStep, choice: Sequence[int]) -> np.ndarray:
@@ -388,7 +346,6 @@ def _window_states(schedule: Schedule, step: OpenStep, choice: Sequence[int]) ->
     if len(step.moves) == 2:
         first = step.moves[0]
         node = schedule.moves[first].candidates[choice[first]]
-        grips = tuple(node if grip == OpenGrip(first) else grip for grip in step.grips)
-        step = replace(step, grips=grips)
+        step = replace(step, grips=tuple(node if g == OpenGrip(first) else g for g in step.grips))
     rows = combinations(schedule, step)
     return np.sort(rows[no_node_twice(rows)], axis=1)

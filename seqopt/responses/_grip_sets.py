@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -31,9 +31,7 @@ from seqopt.work._workers import hire, map_ordered
 
 
 class KnownRows:
-    """Rows of values by a key and a code, each computed once.
-
-    ``count``: how many rows were computed.
+    """Rows of values by a key and a code, each computed once; ``count``: how many were.
 
     Examples
     --------
@@ -52,10 +50,7 @@ class KnownRows:
     @property
     def nbytes(self) -> int:
         """How much memory the rows take."""
-        return sum(
-            codes.nbytes + (0 if values is None else values.nbytes)
-            for codes, values in self._known.values()
-        )
+        return sum(codes.nbytes + values.nbytes for codes, values in self._known.values())
 
     def of(self, key: object, codes: Ints, compute: Callable[[Ints], Floats]) -> Floats:
         """Return the rows of codes, those that are new computed now, all together.
@@ -104,20 +99,17 @@ class GripSets:
         *,
         screen: bool = False,
     ) -> None:
-        self._engine, self._resources = engine, resources
-        self._names, self._screen = tuple(names), screen
-        self._store: Store | None = None
-        self._known = KnownRows()
-        scene = engine.network.scene
-        self._number = np.array([0, *(node for brick in scene.placed for node in brick.nodes)])
+        self._engine, self._resources, self._screen = engine, resources, screen
+        self.names, self._known = tuple(names), KnownRows()
+        placed = engine.network.scene.placed
+        self._number = np.array([0, *(node for brick in placed for node in brick.nodes)])
 
     def __repr__(self) -> str:
         return f"<GripSets of {self._engine}: {self.solved} solved>"
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The responses that are wanted."""
-        return self._names
+    @cached_property
+    def _store(self) -> Store | None:
+        return open_store(self._resources.cache, self._engine)
 
     @property
     def solved(self) -> int:
@@ -138,38 +130,26 @@ class GripSets:
         robot that holds none.
         """
         held = np.asarray(held)
-        out = np.zeros((len(held), len(self._names) + held.shape[1]))
+        responses, forces = np.zeros((len(held), len(self.names))), np.zeros(held.shape)
         grips = (held > 0).sum(axis=1)
         for count in np.unique(grips).tolist():
             rows = np.flatnonzero(grips == count)
-            nodes = held[rows, held.shape[1] - count :]
-            found = self._found(bricks, count, nodes)
-            out[rows, : len(self._names)] = found[:, : len(self._names)]
-            out[rows, out.shape[1] - count :] = found[:, len(self._names) :]
-        return out[:, : len(self._names)], out[:, len(self._names) :]
+            found = self._found(bricks, held[rows, held.shape[1] - count :])
+            responses[rows] = found[:, : len(self.names)]
+            forces[rows, held.shape[1] - count :] = found[:, len(self.names) :]
+        return responses, forces
 
-    def _found(self, bricks: int, count: int, nodes: Ints) -> Floats:
-        """Return responses and forces of sets (S, count), those that are new solved now."""
-        return self._known.of(
-            (bricks, count), self._codes(nodes), lambda new: self._solve(bricks, nodes[new])
-        )
+    def _found(self, bricks: int, nodes: Ints) -> Floats:
+        """Return responses and forces of sets (S, r), those that are new solved now: (S, R + r)."""
 
-    def _codes(self, nodes: Ints) -> Ints:
-        """Return a number for every set (S, r) that no other one has."""
-        out = np.zeros(len(nodes), dtype=np.int64)
+        def solve(new: Ints) -> Floats:
+            sets = Block(bricks, self._number[nodes[new]], self.names, self._screen)
+            return solve_sets(self._engine, sets, self._resources, self._store)
+
+        codes = np.zeros(len(nodes), dtype=np.int64)  # a number for every set of its own
         for column in nodes.T:
-            out = out * len(self._number) + column
-        return out
-
-    def _solve(self, bricks: int, nodes: Ints) -> Floats:
-        """Return responses and forces of sets, (S, R + r)."""
-        if self._store is None:
-            self._store = open_store(self._resources.cache, self._engine)
-        sets = Block(bricks, self._number[nodes], self._names, self._screen)
-        return solve_sets(self._engine, sets, self._resources, self._store)
-
-
-_SHARED = 64  # least sets of a task
+            codes = codes * len(self._number) + column
+        return self._known.of((bricks, nodes.shape[1]), codes, solve)
 
 
 def solve_sets(
@@ -181,7 +161,8 @@ def solve_sets(
     (S, R + r): SI units. Raises `SolverError`, `WorkerError`.
     """
     grips, alone = sets.grips, resources.executor is None and resources.workers == 1
-    most = BLOCK if alone and store is None else min(BLOCK, max(_SHARED, len(grips) // 32))
+    shared = max(64, len(grips) // 32)  # sets of a task
+    most = BLOCK if alone and store is None else min(BLOCK, shared)
     parts = [replace(sets, grips=grips[at : at + most]) for at in range(0, len(grips), most)]
     workers = (resources.executor, resources.workers) if len(parts) > 1 else (None, 1)
 
@@ -191,24 +172,19 @@ def solve_sets(
 
     def done(part: Block, rows: Floats) -> None:
         if store is not None and np.isfinite(rows).all():
-            columns = rows.T
-            values = dict(zip(part.names, columns, strict=False))
-            store.keep(part, Answers(values, columns[len(values) :].T))
+            values = dict(zip(part.names, rows.T, strict=False))
+            store.keep(part, Answers(values, rows[:, len(values) :]))
 
     with hire(*workers) as crew:
-        solved = partial(_sent, pack(engine)) if crew is not None else partial(_solved, engine)
+        solved = partial(_solved, engine if crew is None else pack(engine))
         rows = [*map_ordered(solved, parts, crew, known, done)]
     return np.concatenate([np.zeros((0, len(sets.names) + grips.shape[1])), *rows])
 
 
-def _sent(shipment: Shipment, part: Block) -> Floats:
-    return _solved(engine_of(shipment), part)
-
-
-def _solved(engine: Engine, part: Block) -> Floats:
+def _solved(engine: Engine | Shipment, part: Block) -> Floats:
     """Return what is known of a few sets; those that leave something loose are found by halving."""
     try:
-        return _columns(part, answer(engine, part))
+        return _columns(part, answer(engine_of(engine), part))
     except MechanismError:
         count = len(part.grips)
         if count == 1:

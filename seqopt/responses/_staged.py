@@ -22,11 +22,11 @@ from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.interface import Fields, grip_columns
 from seqopt.engines.rigid._mechanism import Ungripped, ungripped_system
 from seqopt.engines.rigid._mixed import edge_forces, reactions, solve_load, split_pairs
-from seqopt.errors import MechanismError, SolverError, StepError
+from seqopt.errors import StepError
 from seqopt.network._mechanics import spring_maps
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
-from seqopt.responses.table import response_table
+from seqopt.responses.table import response_table, step_named
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, check_sequence, require_steps
@@ -92,44 +92,39 @@ def analyze_staged(
     [66.3, 72.5]
     """
     network = network_of(network)
-    fields = staged_fields(network, steps, placing)
-    return response_table(network, zip(steps, fields, strict=True))
+    return response_table(network, zip(steps, staged_fields(network, steps, placing), strict=True))
 
 
 def staged_fields(
     network: Network, steps: Sequence[Step], placing: Placing | str = Placing.FITTED
 ) -> Iterator[Fields]:
-    """Yield the full fields of every step with everything that earlier steps lock in.
-
-    ``steps``: from the first brick on, with every grip given; ``placing``: where a brick is set
-    down. Result: of one grip set. Raises `MechanismError`, `SolverError` as an engine does, the
-    step named; `StepError` if the steps are not the whole of a build up to its last one.
-    """
+    """Yield the full fields of every step, of one grip set each; see `analyze_staged`."""
     check_sequence(network.scene, require_steps(steps))
-    way = _way(placing)
+    try:
+        placing = Placing(placing)
+    except ValueError:
+        known = ", ".join(way.value for way in Placing)
+        raise StepError(f"placing {short(placing)} does not exist; give {known}") from None
     state = StagedState(0, np.zeros(0), np.zeros((len(network.springs.since), 6)), np.zeros(0))
     parts: Ungripped | None = None
     for step in steps:
         if parts is None or parts.bricks != step.bricks:
             parts = ungripped_system(network, step.bricks)
-        try:
-            state = next_state(parts, state, step, way)
-        except MechanismError as error:
-            raise MechanismError(f"step {step.number}: {error}", error.mode) from error
-        except SolverError as error:
-            raise SolverError(f"step {step.number}: {error}") from error
+        with step_named(step):
+            state = next_state(parts, state, step, placing)
         yield state_fields(parts, state)
 
 
 def next_state(parts: Ungripped, before: StagedState, step: Step, placing: Placing) -> StagedState:
-    """Return the state that a step leads to.
+    """Return the state that a step leads to, its grips in the order of the robots.
 
-    ``parts``: of the structure after the step; ``step``: that places one brick at most. Result: its
-    grips in the order of the robots. Raises `MechanismError`, `SolverError` as an engine does.
+    ``parts``: of the structure after the step; ``step``: that places one brick at most.
     """
     network, bricks = parts.network, step.bricks
     load = np.zeros((2 * bricks, 3))
-    state = replace(before, bricks=bricks, carried=_longer(before.carried, network, bricks))
+    new_edges = network.count_edges(bricks) - len(before.carried)
+    carried = np.concatenate([before.carried, np.zeros(new_edges)])
+    state = replace(before, bricks=bricks, carried=carried)
     if bricks > before.bricks:
         load[-2:] = network.inner_weight[2 * bricks - 2 : 2 * bricks]
         new = _fitted(network, before) if placing is Placing.FITTED else np.zeros(6)
@@ -137,10 +132,8 @@ def next_state(parts: Ungripped, before: StagedState, step: Step, placing: Placi
     held = grip_columns(network, bricks, np.array([step.held], dtype=np.int64))[0].tolist()
     for grip in set(before.grips) - set(held):
         load[grip] -= before.grips[grip]
-    grips = {grip: before.grips.get(grip, np.zeros(3)) for grip in held}
-    if not load.any():
-        return replace(state, grips=grips)
-    return _loaded(parts, replace(state, grips=grips), load)
+    state = replace(state, grips={grip: before.grips.get(grip, np.zeros(3)) for grip in held})
+    return _loaded(parts, state, load) if load.any() else state
 
 
 def state_fields(parts: Ungripped, state: StagedState) -> Fields:
@@ -156,14 +149,6 @@ def state_fields(parts: Ungripped, state: StagedState) -> Fields:
     )
 
 
-def _way(placing: Placing | str) -> Placing:
-    try:
-        return Placing(placing)
-    except ValueError:
-        known = ", ".join(way.value for way in Placing)
-        raise StepError(f"placing {short(placing)} does not exist; give {known}") from None
-
-
 def _loaded(parts: Ungripped, state: StagedState, load: Floats) -> StagedState:
     """Return a state with a further load (2b, 3) at the inner nodes, those held kept still."""
     network = parts.network
@@ -175,21 +160,10 @@ def _loaded(parts: Ungripped, state: StagedState, load: Floats) -> StagedState:
     load[columns] += force[0]
     carried = edge_forces(network, parts.statics, solution.wrench, load[None])
     split_pairs(network, columns[None], force, carried)
-    return StagedState(
-        bricks=state.bricks,
-        twist=state.twist + solution.twist[0],
-        wrench=state.wrench + solution.wrench[0],
-        carried=state.carried + carried[0],
-        grips={
-            grip: before + more
-            for (grip, before), more in zip(state.grips.items(), force[0], strict=True)
-        },
-    )
-
-
-def _longer(carried: Floats, network: Network, bricks: int) -> Floats:
-    """Return what edges carry with zeros for those that a brick brings."""
-    return np.concatenate([carried, np.zeros(network.count_edges(bricks) - len(carried))])
+    twist, wrench = state.twist + solution.twist[0], state.wrench + solution.wrench[0]
+    pairs = zip(state.grips.items(), force[0], strict=True)
+    grips = {grip: before + more for (grip, before), more in pairs}
+    return StagedState(state.bricks, twist, wrench, state.carried + carried[0], grips)
 
 
 def _fitted(network: Network, state: StagedState) -> Floats:

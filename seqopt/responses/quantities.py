@@ -45,9 +45,7 @@ def length_text(length: float) -> str:
 
 
 def steps_in_words(steps: Sequence[int]) -> str:
-    """Return which steps these are; of many the first.
-
-    ``steps``: their numbers.
+    """Return which steps these are, by their numbers; of many the first.
 
     Examples
     --------
@@ -89,10 +87,7 @@ class Response:
 
 
 def lengths(vectors: Floats) -> Floats:
-    """Return the lengths of vectors.
-
-    ``vectors`` (..., 3). Result (...): in the unit of the vectors.
-    """
+    """Return the lengths (...) of vectors (..., 3)."""
     return np.asarray(np.sqrt(_squared(vectors)))
 
 
@@ -106,8 +101,6 @@ def robot_response(robot: str) -> str:
     It is ``F_`` and the robot's name; where that means something else already, or cannot be read
     back from a list, the name stands in brackets.
 
-    ``robot``: its name.
-
     Examples
     --------
     >>> robot_response("rob1"), robot_response("sup"), robot_response("a,b")
@@ -119,10 +112,9 @@ def robot_response(robot: str) -> str:
 
 
 def require_finite(name: str, values: Floats, bricks: int) -> Floats:
-    """Return values of a response if all are finite.
+    """Return values of a response if all are finite: NaN elsewhere means that a robot holds none.
 
-    ``values`` (...). Result (...). Raises `SolverError` if one is not: NaN elsewhere means that a
-    robot holds nothing.
+    Raises `SolverError` if one is not.
     """
     if not np.isfinite(values).all():
         raise SolverError(
@@ -133,29 +125,20 @@ def require_finite(name: str, values: Floats, bricks: int) -> Floats:
 
 
 def grip_forces(network: Network, fields: Fields) -> Floats:
-    """Return the size of every grip force, negative where it points down.
-
-    ``network``: of a scene that says where up is; ``fields``: of S grip sets with r grips each.
-    Result (S, r): N; F_rob of Bruun et al.
-    """
+    """Return the size (S, r) of every grip force, N, negative down; F_rob of Bruun et al."""
     return _signed(network, fields.grip_force)
 
 
 def support_forces(network: Network, fields: Fields) -> Floats:
-    """Return the size of the reaction at every ground end, negative where it points down.
+    """Return the size (S, G) of the reaction at every ground end, N, negative down.
 
-    ``network``: of a scene that says where up is; ``fields``: of S grip sets, with the supports.
-    Result (S, G): N; zero where the end does not act yet. Ends in the scene's order.
+    Zero where the end does not act yet. Ends in the scene's order.
     """
     return _signed(network, fields.support[..., :3])
 
 
 def support_moments(fields: Fields) -> Floats:
-    """Return the size of the moment at every ground end about its fixed point.
-
-    ``fields``: of S grip sets, with the supports. Result (S, G): N m; zero where the end does not
-    act yet. Ends in the scene's order.
-    """
+    """Return the size (S, G) of the moment at every ground end about its fixed point, N m."""
     return lengths(fields.support[..., 3:])
 
 
@@ -177,42 +160,29 @@ def _largest_force(network: Network, fields: Fields) -> Floats:
     return np.asarray(np.where(up >= -down, up, down))
 
 
+def _largest_shift(_: Network, fields: Fields) -> Floats:
+    return np.asarray(np.sqrt(_squared(fields.displacement).max(axis=1)))
+
+
 def _in_tension(network: Network, fields: Fields) -> Floats:
     weight = float(np.linalg.norm(network.weight, axis=1).mean())
     return np.asarray(100 * (fields.edge_force > _SLACK * weight).mean(axis=1))
 
 
-_EDGES, _MOTION, _SUPPORT = Want.EDGES, Want.DISPLACEMENTS, Want.SUPPORT
+_EDGES, _SUPPORT = (1.0, Want.EDGES), (1.0, Want.SUPPORT)
+_MOTION = (TO_1E_3MM, Want.DISPLACEMENTS)
 RESPONSES: dict[str, Response] = {
     response.name: response
     for response in (
-        Response("F_sup", "F_sup_N", 1.0, _SUPPORT, _largest_force),
-        Response("M_sup", "M_sup_Nm", 1.0, _SUPPORT, lambda _, f: support_moments(f).max(axis=1)),
-        Response("F_min", "F_min_N", 1.0, _EDGES, lambda _, f: f.edge_force.min(axis=1)),
-        Response("T_max", "F_max_N", 1.0, _EDGES, lambda _, f: f.edge_force.max(axis=1)),
-        Response("F_avg", "F_avg_N", 1.0, _EDGES, lambda _, f: f.edge_force.mean(axis=1)),
-        Response("T_pct", "T_pct", 1.0, _EDGES, _in_tension),
-        Response(
-            "D_max",
-            "D_max_1e-3mm",
-            TO_1E_3MM,
-            _MOTION,
-            lambda _, f: np.sqrt(_squared(f.displacement).max(axis=1)),
-        ),
-        Response(
-            "D_avg",
-            "D_avg_1e-3mm",
-            TO_1E_3MM,
-            _MOTION,
-            lambda _, f: lengths(f.displacement).mean(axis=1),
-        ),
-        Response(
-            "D_std",
-            "D_std_1e-3mm",
-            TO_1E_3MM,
-            _MOTION,
-            lambda _, f: lengths(f.displacement).std(axis=1),
-        ),
+        Response("F_sup", "F_sup_N", *_SUPPORT, _largest_force),
+        Response("M_sup", "M_sup_Nm", *_SUPPORT, lambda _, f: support_moments(f).max(axis=1)),
+        Response("F_min", "F_min_N", *_EDGES, lambda _, f: f.edge_force.min(axis=1)),
+        Response("T_max", "F_max_N", *_EDGES, lambda _, f: f.edge_force.max(axis=1)),
+        Response("F_avg", "F_avg_N", *_EDGES, lambda _, f: f.edge_force.mean(axis=1)),
+        Response("T_pct", "T_pct", *_EDGES, _in_tension),
+        Response("D_max", "D_max_1e-3mm", *_MOTION, _largest_shift),
+        Response("D_avg", "D_avg_1e-3mm", *_MOTION, lambda _, f: lengths(f.displacement).mean(1)),
+        Response("D_std", "D_std_1e-3mm", *_MOTION, lambda _, f: lengths(f.displacement).std(1)),
     )
 }
 """By name, in the order of the columns of Table A.1.
@@ -225,10 +195,8 @@ displacements of all nodes.
 """
 
 
-_COMPRESSION = Response(
-    "C_max", "C_max_N", 1.0, _EDGES, lambda _, f: np.maximum(0.0, -f.edge_force.min(axis=1))
-)
-CHOSEN_BY: dict[str, Response] = {**RESPONSES, _COMPRESSION.name: _COMPRESSION}
+_C_MAX = Response("C_max", "C_max_N", *_EDGES, lambda _, f: np.maximum(0.0, -f.edge_force.min(1)))
+CHOSEN_BY: dict[str, Response] = {**RESPONSES, _C_MAX.name: _C_MAX}
 """Responses that criteria and limits can name: those of the tables, and ``C_max``, the largest
 compression of any edge as a size, N (``F_min`` without its sign; zero if no edge is compressed).
 """

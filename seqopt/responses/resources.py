@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -56,10 +55,7 @@ class Resources:
         if not (self.cache is None or (isinstance(self.cache, str | Path) and str(self.cache))):
             raise ProblemError(f"cache is {self.cache!r}; give the path of a folder")
         most = self.max_memory
-        known = most is None or (
-            isinstance(most, int | float) and most > 0 and not math.isnan(most)
-        )
-        if not known:
+        if not (most is None or (isinstance(most, int | float) and most > 0)):  # NaN is not
             raise ProblemError(f"max_memory is {most!r}; give a number of bytes above zero")
 
     def alone(self) -> Resources:

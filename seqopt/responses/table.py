@@ -6,7 +6,8 @@ Also its grips: who holds what, from when to when, and with which force.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,12 +35,11 @@ from seqopt.responses.quantities import (
 )
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
-from seqopt.sequence.schedule import Hold, holds
+from seqopt.sequence.schedule import holds
 from seqopt.sequence.steps import Step, require_steps
 
 _TURN = 0.1  # rad; sine and angle differ by 0.2 %, cosine and one by 0.5 %
 _STRAIN = 0.1  # of a joint, over its thickness; true strain differs by 5 %
-_DEFORMED = f"{{:.3g}} times its thickness, more than {_STRAIN:g} times"
 _STRESSED = (
     f"{{:.3g}} MPa beyond what epoxy holds, {EPOXY.tensile_strength / 1e6:g} MPa in tension, "
     f"{EPOXY.cohesion / 1e6:g} MPa and friction in shear"
@@ -75,12 +75,13 @@ class LinearRange:
         self._breaks = isinstance(engine, AutoEngine | DiscreteEngine)
         self._engine = engine.rigid if isinstance(engine, AutoEngine) else engine
         self._known: dict[tuple[int, tuple[int, ...]], Floats] = {}
-        self._limits: ElasticLimits | None = None
         thickness = engine.network.springs.thickness
         self._thickness = np.where(np.isnan(thickness) | self._breaks, np.inf, thickness)
         self.unchecked: tuple[str, ...] = ()
+        self._limits: ElasticLimits | None = None
         try:
-            self._limits = None if self._breaks else find_elastic_limits(engine.network, EPOXY)
+            if not self._breaks:
+                self._limits = find_elastic_limits(engine.network, EPOXY)
         except SceneError as error:
             self.unchecked = (f"stresses in joints are not checked: {error}",)
 
@@ -89,8 +90,7 @@ class LinearRange:
     ) -> tuple[Departure, ...]:
         """Return the limits that the steps of a build leave.
 
-        ``table``: responses of the steps, from `seqopt.analyze`. ``fields``: of every step, with
-        all fields; by default the engine computes them.
+        ``table``: of `seqopt.analyze`; ``fields``: of every step; by default the engine's.
 
         Examples
         --------
@@ -106,25 +106,21 @@ class LinearRange:
         moved = table[shift.column].to_numpy(float) / shift.scale
         turned, strained, stressed = self._measured(table, fields).T
         within = f", more than {length_text(far)}, a tenth of the smallest side of a brick"
+        deformed = f"{{:.3g}} times its thickness, more than {_STRAIN:g} times".format
         found = (
             ("displacement", moved, far, lambda most: length_text(most) + within),
             ("rotation", turned, _TURN, f"{{:.3g}} rad, more than {_TURN:g} rad".format),
-            ("deformation of a joint", strained, _STRAIN, _DEFORMED.format),
+            ("deformation of a joint", strained, _STRAIN, deformed),
             ("stress in a joint", stressed, 0.0, lambda most: _STRESSED.format(most / 1e6)),
         )
-        out = []
-        for what, values, most, say in found:
-            over = ~(values <= most)  # what is not a number is not within
-            if over.any():
-                steps = tuple(int(number) for number in table["step"][over])
-                out.append(Departure(what, say(float(values[over].max())), steps))
-        return tuple(out)
+        return tuple(
+            Departure(what, say(float(values[over].max())), tuple(map(int, table["step"][over])))
+            for what, values, most, say in found
+            if (over := ~(values <= most)).any()  # what is not a number is not within
+        )
 
     def of_builds(self, tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[Departure, ...]]:
-        """Return the limits that builds leave, for those that leave any.
-
-        ``tables``: responses of the steps of each, by name.
-        """
+        """Return the limits that builds leave, for those that leave any, by name."""
         return {name: left for name, each in tables.items() if (left := self.departures(each))}
 
     def _measured(self, table: pd.DataFrame, fields: Iterable[Fields] | None) -> Floats:
@@ -136,12 +132,11 @@ class LinearRange:
         nodes = table[[f"{robot.name}_node" for robot in self._network.scene.robots]]
         held = (tuple(int(n) for n in row if pd.notna(n)) for row in nodes.to_numpy(object))
         keys = [*zip(map(int, table["bricks"]), held, strict=True)]
-        for bricks, grips in dict.fromkeys(keys):  # in order: engines grow with the build
-            if (bricks, grips) in self._known:
-                continue
-            asked = np.array([grips], dtype=np.int64).reshape(1, -1)
-            found = self._engine.solve(bricks, asked, Want.BRICKS | Want.JOINTS)
-            self._known[bricks, grips] = self._of(found)
+        for key in keys:  # in order: engines grow with the build
+            if key not in self._known:
+                asked = np.array([key[1]], dtype=np.int64).reshape(1, -1)
+                found = self._engine.solve(key[0], asked, Want.BRICKS | Want.JOINTS)
+                self._known[key] = self._of(found)
         return np.array([self._known[key] for key in keys])
 
     def _of(self, fields: Fields) -> Floats:
@@ -151,19 +146,17 @@ class LinearRange:
         stiffness = springs.stiffness.reshape(-1, 2, 3)
         given = np.divide(wrench, stiffness, out=np.zeros_like(wrench), where=stiffness > 0)
         shift, turn = lengths(given).T
-        turns = np.concatenate([turn, lengths(fields.brick_twist[0][:, 3:])])
+        turned = np.concatenate([turn, lengths(fields.brick_twist[0][:, 3:])]).max()
         if self._limits is None:
-            return np.array([turns.max(), (shift / self._thickness).max(), -np.inf])
+            return np.array([turned, (shift / self._thickness).max(), -np.inf])
         face = self._limits.assembly.contact
         lever = lengths(self._limits.assembly.corner - springs.position[face])
         strain = (shift[face] + turn[face] * lever) / self._thickness[face]
-        return np.array([turns.max(), strain.max(), self._limits.excess(fields.joint_wrench).max()])
+        return np.array([turned, strain.max(), self._limits.excess(fields.joint_wrench).max()])
 
 
 def builds_in_words(departures: Mapping[str, Sequence[Departure]]) -> tuple[str, ...]:
-    """Return which builds leave the linear range, and by what.
-
-    ``departures``: by the name of the build. Result: of one line, or none.
+    """Return which builds leave the linear range, and by what: one line, or none.
 
     Examples
     --------
@@ -216,17 +209,12 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     if not isinstance(getattr(engine, "network", None), Network):
         kind = type(engine).__name__
         raise SceneError(f"a {kind} is not an engine; give make_engine('compliance', network)")
-    return response_table(
-        engine.network, ((step, step_fields(engine, step)) for step in require_steps(steps))
-    )
+    answers = ((step, step_fields(engine, step)) for step in require_steps(steps))
+    return response_table(engine.network, answers)
 
 
 def response_table(network: Network, answers: Iterable[tuple[Step, Fields]]) -> pd.DataFrame:
-    """Return a row of responses for every step, as `analyze` does, from the fields of each.
-
-    ``answers`` (Step, Fields): steps with every grip given, and the full fields of one grip set
-    each. Raises `SolverError` if a response is not finite.
-    """
+    """Return a row of responses for every step, as `analyze` does, from the fields of each."""
     return pd.DataFrame([_row(network, step, fields) for step, fields in answers])
 
 
@@ -236,11 +224,9 @@ def force_column(robot: Robot) -> str:
 
 
 def support_columns(scene: Scene) -> list[tuple[str, str]]:
-    """Return the columns of a table that hold what a scene's ground ends carry one by one.
+    """Return the columns for the force, N, and the moment, N m, of a scene's ground ends.
 
-    Result (str, str): of the force, N, and the moment, N m, of every ground end in the scene's
-    order, named after the end's brick, and counted from its second end on; none where the scene has
-    one end.
+    They are named after the end's brick, counted from its second end on; none for one end.
 
     Examples
     --------
@@ -257,13 +243,16 @@ def support_columns(scene: Scene) -> list[tuple[str, str]]:
 
 
 def step_fields(engine: Engine, step: Step) -> Fields:
-    """Return the full fields of one step.
-
-    Result: of one grip set, S = 1. Raises `MechanismError`, `SolverError` as the engine does, the
-    step named.
-    """
-    try:
+    """Return the full fields of one step, of one grip set; errors of the engine name the step."""
+    with step_named(step):
         return engine.solve(step.bricks, np.array([step.held], dtype=np.int64).reshape(1, -1))
+
+
+@contextmanager
+def step_named(step: Step) -> Iterator[None]:
+    """Let errors of an engine name the step."""
+    try:
+        yield
     except MechanismError as error:
         raise MechanismError(f"step {step.number}: {error}", error.mode) from error
     except SolverError as error:
@@ -277,9 +266,6 @@ def archive(network: Network, answers: Iterable[tuple[Step, Fields]]) -> bytes:
     ``step1_support`` and so on, as in `Fields` without its first axis; ``edge_nodes`` (E, 2),
     ``node_position`` (N, 3), ``node_name`` (N,), and of the ground ends ``support_brick`` (G,) and
     ``support_point`` (G, 3), the fixed points, say what they run over.
-
-    ``answers`` (Step, Fields): steps and the full fields of one grip set each. Result: the content
-    of the archive; SI units.
     """
     arrays: dict[str, np.ndarray] = {
         "edge_nodes": network.edge_nodes,
@@ -298,8 +284,7 @@ def archive(network: Network, answers: Iterable[tuple[Step, Fields]]) -> bytes:
 
 def _row(network: Network, step: Step, fields: Fields) -> dict[str, object]:
     scene = network.scene
-    held = require_finite("grip force", grip_forces(network, fields), step.bricks)
-    forces = iter(held[0])
+    forces = iter(require_finite("grip force", grip_forces(network, fields), step.bricks)[0])
     row: dict[str, object] = {"step": step.number, "type": step.kind.value, "bricks": step.bricks}
     for robot, node in zip(scene.robots, step.grips, strict=True):
         row[f"{robot.name}_brick"] = pd.NA if node is None else scene.brick_of_node[node].name
@@ -309,27 +294,19 @@ def _row(network: Network, step: Step, fields: Fields) -> dict[str, object]:
     for response in RESPONSES.values():
         values = require_finite(response.name, response.of(network, fields), step.bricks)
         row[response.column] = values[0] * response.scale
-    return row | _supports(network, step, fields)
-
-
-def _supports(network: Network, step: Step, fields: Fields) -> dict[str, float]:
-    """Return the cells of every ground end where there are several; NaN where one does not act."""
     acts = network.springs.since[network.springs.support] <= step.bricks
-    forces = np.where(acts, support_forces(network, fields)[0], np.nan)
-    moments = np.where(acts, support_moments(fields)[0], np.nan)
-    cells: dict[str, float] = {}
-    for columns, *values in zip(support_columns(network.scene), forces, moments, strict=False):
-        cells |= dict(zip(columns, values, strict=True))
-    return cells
+    carried = np.array([support_forces(network, fields)[0], support_moments(fields)[0]])
+    cells = np.where(acts, carried, np.nan).T  # of ground ends; NaN where one does not act yet
+    for columns, values in zip(support_columns(scene), cells, strict=False):  # none of a single one
+        row |= dict(zip(columns, values, strict=True))
+    return row
 
 
 def grips_table(scene: Scene, steps: Sequence[Step], responses: pd.DataFrame) -> pd.DataFrame:
-    """Return every grip of a build, for as long as it lasts.
+    """Return a row for every grip of a build, by first step, from the responses of `analyze`.
 
-    ``responses``: of these steps, as `seqopt.analyze` makes them. Result: a row per grip, by first
-    step. Columns: ``robot``, ``from_step``, ``to_step``, ``brick``, ``node``, ``places`` (whether
-    the robot places the brick with it), ``largest_force_N`` and ``at_step``, the step of that
-    force.
+    ``places`` says whether the robot places the brick with it, ``at_step`` when its force is
+    ``largest_force_N``.
 
     Examples
     --------
@@ -343,24 +320,20 @@ def grips_table(scene: Scene, steps: Sequence[Step], responses: pd.DataFrame) ->
     0  rob1          1        2      1     1    True
     1  rob2          2        4      2     2    True
     """
-    rows = [
-        _grip_row(scene, hold, responses[force_column(scene.robots[hold.robot])].to_numpy(float))
-        for hold in sorted(holds(scene, steps), key=lambda hold: (hold.first, hold.robot))
-    ]
+    rows = []
+    for hold in sorted(holds(scene, steps), key=lambda hold: (hold.first, hold.robot)):
+        assert hold.node is not None  # steps have no open grips
+        robot = scene.robots[hold.robot]
+        own = responses[force_column(robot)].to_numpy(float)[hold.first - 1 : hold.last]
+        row = {
+            "robot": robot.name,
+            "from_step": hold.first,
+            "to_step": hold.last,
+            "brick": scene.brick_of_node[hold.node].name,
+            "node": hold.node,
+            "places": hold.places is not None,
+            "largest_force_N": float(own.max()),
+            "at_step": hold.first + int(own.argmax()),
+        }
+        rows.append(row)
     return pd.DataFrame(rows)
-
-
-def _grip_row(scene: Scene, hold: Hold, forces: np.ndarray) -> dict[str, object]:
-    """Return the row of a hold, from the forces of its robot's grips in all steps, N."""
-    assert hold.node is not None  # steps have no open grips
-    own = forces[hold.first - 1 : hold.last]
-    return {
-        "robot": scene.robots[hold.robot].name,
-        "from_step": hold.first,
-        "to_step": hold.last,
-        "brick": scene.brick_of_node[hold.node].name,
-        "node": hold.node,
-        "places": hold.places is not None,
-        "largest_force_N": float(own.max()),
-        "at_step": hold.first + int(own.argmax()),
-    }

@@ -25,8 +25,8 @@ from seqopt.stability.limit_analysis import (
     Answer,
     Case,
     Sense,
+    contact_work,
     is_finite,
-    limits,
     violation,
 )
 
@@ -44,18 +44,16 @@ CompileHeld = Callable[[Assembly, Case], HeldProgram]
 
 
 def compile_held(assembly: Assembly, case: Case) -> HeldProgram:
-    """Return the registered linear program (entry points ``seqopt.limit_analysis``).
-
-    ``assembly``: its grips are all that may ever be held.
-    """
-    entry = plugins("seqopt.limit_analysis")["lp"]
-    compiled: CompileHeld = entry.load()
+    """Return the registered linear program (entry points ``seqopt.limit_analysis``)."""
+    compiled: CompileHeld = plugins("seqopt.limit_analysis")["lp"].load()
     return compiled(assembly, case)
 
 
 _SIDES = 8  # of a cone to start with, the axes of its contact among them
 _SPREAD = np.array([p for p in product((-1.0, 0.0, 1.0), repeat=3) if any(p)])
 _GAIN = 1e-7  # least gain for which a direction joins, over the largest entry of the motion
+_TIGHT = 1e-8  # largest violation of forces that prove, over the force scale and max(1, z)
+_IDLE = 1e-10  # a grip's force treated as zero, over the force scale
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,15 +69,12 @@ class Directions(FrozenValue):
 
     def joined(self, other: Directions) -> Directions:
         """Return these directions and others after them."""
-        return Directions(
-            np.concatenate([self.owner, other.owner]), np.concatenate([self.unit, other.unit])
-        )
+        owner = np.concatenate([self.owner, other.owner])
+        return Directions(owner, np.concatenate([self.unit, other.unit]))
 
 
 def first_directions(corners: int, grips: int) -> Directions:
     """Return directions to start with, the same ones for every corner and for every grip.
-
-    ``corners``, ``grips``: how many there are.
 
     Examples
     --------
@@ -89,12 +84,9 @@ def first_directions(corners: int, grips: int) -> Directions:
     angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
     flat = np.stack([np.zeros(_SIDES), np.cos(angle), np.sin(angle)], axis=1)
     space = _SPREAD / np.linalg.norm(_SPREAD, axis=1, keepdims=True)
-    owner = np.concatenate(
-        [np.repeat(np.arange(corners), _SIDES), corners + np.repeat(np.arange(grips), len(space))]
-    )
-    return Directions(
-        owner, np.concatenate([np.tile(flat, (corners, 1)), np.tile(space, (grips, 1))])
-    )
+    of_corners = Directions(np.repeat(np.arange(corners), _SIDES), np.tile(flat, (corners, 1)))
+    of_grips = corners + np.repeat(np.arange(grips), len(space))
+    return of_corners.joined(Directions(of_grips, np.tile(space, (grips, 1))))
 
 
 def better_directions(known: Directions, along: Floats, wanted: Bools) -> Directions:
@@ -110,12 +102,8 @@ def better_directions(known: Directions, along: Floats, wanted: Bools) -> Direct
     return Directions(which, along[which] / size[which, None])
 
 
-_TIGHT = 1e-8  # largest violation of forces that prove, over the force scale and max(1, z)
-_IDLE = 1e-10  # a grip's force treated as zero, over the force scale
-
-
 @dataclass(frozen=True, eq=False, repr=False)
-class HoldingForces(FrozenValue):
+class _HoldingForces(FrozenValue):
     """Forces with which a structure is in equilibrium."""
 
     value: float  # their z
@@ -137,15 +125,12 @@ class _FallingMotion(FrozenValue):
     speed: Floats
 
 
-class Known:
-    """What is proven of one structure and case, whoever holds it.
-
-    ``assembly``: its grips are all that may ever be held.
-    """
+class _Known:
+    """What is proven of one structure, with all grips that may ever be held, and case."""
 
     def __init__(self, assembly: Assembly, case: Case) -> None:
         self._assembly, self._case = assembly, case
-        self._forces: list[HoldingForces] = []
+        self._forces: list[_HoldingForces] = []
         self._motions: list[_FallingMotion] = []
 
     def bracket(self, places: Ints, payload: Floats) -> Floats:
@@ -156,119 +141,76 @@ class Known:
         that suffices is no smaller and no larger; of a largest z, the one proven to be survived
         (less than none, if nothing is) and the one that is not exceeded.
         """
-        out = self._nothing(len(places))
-        return self._tightened(out, self._forces, self._motions, places, payload)
+        nothing = (0.0, np.inf) if self._case.sense is Sense.SMALLEST else (-np.inf, CAP)
+        return self.tightened(np.tile(nothing, (len(places), 1)), places, payload)
 
-    def learn(self, answer: Answer, held: Floats) -> Known:
+    def learn(self, answer: Answer, held: Floats) -> _Known:
         """Keep what an answer proves by itself; a solver's claim is not believed.
 
         ``held`` (G,): payload of every grip for which it was found, N; zero for one not held.
         Result: of this answer alone.
         """
-        new = Known(self._assembly, self._case)
+        new = _Known(self._assembly, self._case)
         new._forces += self._proven_forces(answer, held)
         new._motions += self.motions_of(answer.motion)
         self._forces += new._forces
         self._motions += new._motions
         return new
 
-    def joined(self, other: Known) -> Known:
-        """Return what is known by either. ``other``: of the same structure and case."""
-        out = Known(self._assembly, self._case)
+    def joined(self, other: _Known) -> _Known:
+        """Return what is known by either of the same structure and case."""
+        out = _Known(self._assembly, self._case)
         out._forces = self._forces + other._forces
         out._motions = self._motions + other._motions
         return out
 
     def motions_of(self, motion: Floats) -> list[_FallingMotion]:
-        """Return what counts of a motion, at most one; none if it is not finite or none.
-
-        ``motion`` (B, 6): as of `seqopt.stability.limit_analysis.Answer`.
-        """
+        """Return what counts of a motion (B, 6), at most one; none if it is not finite or none."""
         assembly, case = self._assembly, self._case
         size = np.abs(motion).max(initial=0.0)
         if motion.shape != (len(assembly.centroid), 6) or not 0 < size < np.inf:
             return []
         flat = np.ldexp(motion, -np.frexp(size)[1]).ravel()
-        parting = (assembly.contact_map.T @ flat).reshape(-1, 3)
-        sliding = np.linalg.norm(parting[:, 1:], axis=1)
-        opening = parting[:, 0] - case.friction * sliding
-        nobody = np.zeros(len(assembly.payload))
-        taken = []
-        for z in (0.0, 1.0):
-            tension, cohesion, _ = limits(assembly, case, z, nobody)
-            if z == 0.0:
-                tip = case.friction * tension > cohesion
-            cut = np.where(tip, cohesion / (case.friction or 1.0), tension)
-            taken.append(float(cohesion @ sliding + cut @ np.maximum(opening, 0)))
+        ((low, _), (high, _)), opening = contact_work(assembly, case, flat, (0.0, 1.0))
+        work = float(assembly.load() @ flat) - low
+        growth = float(assembly.load(case.pull) @ flat) - (high - low)
+        closing = LARGEST_FORCE * float(np.maximum(-opening, 0).sum())
         speed = np.linalg.norm((assembly.grip_map.T @ flat).reshape(-1, 3), axis=1)
-        return [
-            _FallingMotion(
-                work=float(assembly.load() @ flat) - taken[0],
-                growth=float(assembly.load(case.pull) @ flat) - (taken[1] - taken[0]),
-                closing=LARGEST_FORCE * float(np.maximum(-opening, 0).sum()),
-                speed=speed,
-            )
-        ]
+        return [_FallingMotion(work, growth, closing, speed)]
 
     def tightened(self, bracket: Floats, places: Ints, payload: Floats) -> Floats:
-        """Return brackets no wider than others, by what is known here.
-
-        ``bracket`` (S, 2); ``places`` (S, r); ``payload`` (S, r): as of `bracket`. Result (S, 2).
-        """
-        return self._tightened(bracket.copy(), self._forces, self._motions, places, payload)
-
-    def _nothing(self, count: int) -> Floats:
-        least = 0.0 if self._case.sense is Sense.SMALLEST else -np.inf
-        most = np.inf if self._case.sense is Sense.SMALLEST else CAP
-        return np.tile([least, most], (count, 1))
-
-    def _tightened(
-        self,
-        out: Floats,
-        forces: list[HoldingForces],
-        motions: list[_FallingMotion],
-        places: Ints,
-        payload: Floats,
-    ) -> Floats:
-        smallest = self._case.sense is Sense.SMALLEST
-        for known in forces:
+        """Return brackets (S, 2) no wider than others, by what is known here; see `bracket`."""
+        out, smallest = bracket.copy(), self._case.sense is Sense.SMALLEST
+        forced, moved = out[:, int(smallest)], out[:, int(not smallest)]
+        of_forces, of_motion = (np.minimum, np.maximum) if smallest else (np.maximum, np.minimum)
+        for known in self._forces:
             holds = self._hold(known, places, payload)
-            side = out[holds, int(smallest)]
-            better = np.minimum if smallest else np.maximum
-            out[holds, int(smallest)] = better(side, known.value)
-        for motion in motions:
-            value = self._proven_by(motion, places, payload)
-            if smallest:
-                out[:, 0] = np.maximum(out[:, 0], value)
-            else:
-                out[:, 1] = np.minimum(out[:, 1], value)
+            forced[holds] = of_forces(forced[holds], known.value)
+        for motion in self._motions:
+            of_motion(moved, self._proven_by(motion, places, payload), out=moved)
         return out
 
-    def _proven_forces(self, answer: Answer, held: Floats) -> list[HoldingForces]:
+    def _proven_forces(self, answer: Answer, held: Floats) -> list[_HoldingForces]:
         """Return the forces of an answer if they hold what is held, by the assembly's own data."""
         if not is_finite(self._assembly, answer):
             return []
-        case = self._case
-        idle = np.linalg.norm(answer.grip_force, axis=1) <= _IDLE
-        grip = np.where(idle[:, None], 0.0, answer.grip_force)
+        idle = np.linalg.norm(answer.grip_force, axis=1, keepdims=True) <= _IDLE
+        grip = np.where(idle, 0.0, answer.grip_force)
         value = max(answer.value, 0.0)
-        clean = Answer(answer.claim, value, answer.contact_force, grip, answer.motion)
-        if not violation(self._assembly, case, clean, held) <= _TIGHT * max(1.0, value):
+        clean = replace(answer, value=value, grip_force=grip)
+        tight = violation(self._assembly, self._case, clean, held) <= _TIGHT * max(1.0, value)
+        if not tight or grip[held <= 0].any():
             return []
-        if grip[held <= 0].any():
-            return []
-        return [HoldingForces(value, np.linalg.norm(grip, axis=1))]
+        return [_HoldingForces(value, np.linalg.norm(grip, axis=1))]
 
-    def _hold(self, known: HoldingForces, places: Ints, payload: Floats) -> Floats:
+    def _hold(self, known: _HoldingForces, places: Ints, payload: Floats) -> Floats:
         """Return which grips can exert the forces."""
-        needed = np.flatnonzero(known.needed)
         own, common = self._case.payload
         most = own * payload / self._assembly.scales[0] + known.value * common * (payload > 0)
         out = np.ones(len(places), dtype=bool)
-        for grip in needed.tolist():
-            able = (places == grip) & (payload > 0)
-            able &= most >= known.needed[grip] - _TIGHT * max(1.0, known.value)
-            out &= able.any(axis=1)
+        for grip in np.flatnonzero(known.needed).tolist():
+            enough = most >= known.needed[grip] - _TIGHT * max(1.0, known.value)
+            out &= ((places == grip) & (payload > 0) & enough).any(axis=1)
         return out
 
     def _proven_by(self, motion: _FallingMotion, places: Ints, payload: Floats) -> Floats:
@@ -294,10 +236,7 @@ _Settled = Callable[[Floats], Bools]
 
 
 def node_assembly(network: Network, bricks: int, known: Contacts | None = None) -> Assembly:
-    """Return a partial structure with a grip without payload at every inner node, in build order.
-
-    As of `seqopt.contact.faces.step_assembly`.
-    """
+    """Return a partial structure with a grip without payload at every inner node."""
     bare = bare_assembly(network, bricks, known)
     nodes = network.inner[:bricks].ravel()
     return replace(
@@ -311,62 +250,50 @@ def node_assembly(network: Network, bricks: int, known: Contacts | None = None) 
 class HeldStates:
     """One question about one structure, asked of any number of grip sets.
 
-    ``assembly``: its grips are all that may ever be held; ``case``: what is bracketed;
-    ``compiled``: makes the program to solve; ``easier``: what a program is asked before that, as
-    forces for a z of zero. ``assembly``: whose grips are all that may ever be held; ``solved``: how
-    many times the program was called.
+    ``assembly``: its grips are all that may ever be held; ``case``: what is bracketed; ``easier``:
+    what a program is asked before that, as forces for a z of zero; ``solved``: how many times the
+    program was called.
     """
 
     def __init__(
         self, assembly: Assembly, case: Case, compiled: CompileHeld, easier: Case | None = None
     ) -> None:
-        self.assembly = assembly
-        self._case = case
+        self.assembly, self._case, self._compile = assembly, case, compiled
         self._asked = [case] if easier is None else [easier, case]
-        self._compile = compiled
         self._programs: list[HeldProgram] = []
-        self._known = Known(assembly, case)
+        self._known = _Known(assembly, case)
         self._tried: set[bytes] = set()
         self.solved = 0
 
     def bracket(self, places: Ints, payload: Floats, settled: _Settled) -> Floats:
         """Return proven brackets of z, as narrow as needed where the solver's answers allow it.
 
-        ``places`` (S, r): grips of the assembly that are held, from 0; as many as it has for none.
-        ``payload`` (S, r): of those that hold them, N; zero for none. ``settled``: says which
-        brackets are narrow enough. Result (S, 2): as of
-        `seqopt.stability._held_states.Known.bracket`.
+        ``settled``: says which are narrow enough. The others, and the result: as of
+        `seqopt.stability._held_states._Known.bracket`.
         """
         out = self._known.bracket(places, payload)
         open_ = ~settled(out)
         for row in np.argsort((payload > 0).sum(axis=1), kind="stable").tolist():
             if not open_[row]:
                 continue
-            held = self._held(places[row], payload[row])
+            held = np.zeros(len(self.assembly.payload) + 1)  # payload of every grip, and of none
+            np.maximum.at(held, places[row], payload[row])
+            key, rows = held[:-1].tobytes(), np.flatnonzero(open_)
+            if key not in self._tried:
+                self._tried.add(key)
+                new = self._solve(held[:-1], settled)
+                out[rows] = new.tightened(out[rows], places[rows], payload[rows])
+                open_[rows] = ~settled(out[rows])
             open_[row] = False
-            if held.tobytes() in self._tried:
-                continue
-            self._tried.add(held.tobytes())
-            rest = np.flatnonzero(open_)
-            new = self._solve(held, settled)
-            out[row] = new.tightened(out[[row]], places[[row]], payload[[row]])[0]
-            out[rest] = new.tightened(out[rest], places[rest], payload[rest])
-            open_[rest] = ~settled(out[rest])
         return out
 
-    def _held(self, places: Ints, payload: Floats) -> Floats:
-        """Return the payload of every grip, (G,), N."""
-        out = np.zeros(len(self.assembly.payload) + 1)
-        np.maximum.at(out, places, payload)
-        return out[:-1]
-
-    def _solve(self, held: Floats, settled: _Settled) -> Known:
+    def _solve(self, held: Floats, settled: _Settled) -> _Known:
         """Return what answers prove for those grips."""
         places, payload = np.flatnonzero(held)[None], held[held > 0][None]
-        new = Known(self.assembly, self._case)
+        new = _Known(self.assembly, self._case)
 
         def enough(answer: Answer) -> bool:
-            only = Known(self.assembly, self._case).learn(answer, held)
+            only = _Known(self.assembly, self._case).learn(answer, held)
             return bool(settled(only.bracket(places, payload))[0])
 
         for i in range(len(self._asked)):

@@ -27,6 +27,7 @@ from seqopt.stability.assessment import ROUGHEST, bonded
 from seqopt.stability.limit_analysis import CAP, GAP, Case
 
 _Cases = Callable[[Assembly], list[Case]]
+_Grips = tuple[ArrayLike, ArrayLike | None]  # held, payload
 
 
 class Margins:
@@ -57,10 +58,8 @@ class Margins:
     def __init__(
         self, network: Network | Scene, mortar: Mortar | str, compiled: CompileHeld = compile_held
     ) -> None:
-        self.network = network_of(network)
-        self.mortar = find_mortar(mortar)
-        self._compile = compiled
-        self._contacts = Contacts(self.network)
+        self.network, self.mortar = network_of(network), find_mortar(mortar)
+        self._compile, self._contacts = compiled, Contacts(self.network)
         self._levels: dict[tuple[str, int], tuple[HeldStates, ...]] = {}
         self.screens = {self.mortar.friction: Screen(self.network, self.mortar, 0.0, compiled)}
 
@@ -73,43 +72,31 @@ class Margins:
     def bond(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
         """Return the least bond of grip sets at the mortar's friction.
 
-        ``bricks``: how many bricks stand, in build order. ``held`` (S, r): nodes held, as places in
-        build order counted from 1; zero for none. ``payload`` (r,), (S, r): N. Result (S, 2):
-        between which values the strength lies, Pa, in tension and at once in shear; infinite if
-        none is enough.
+        Result (S, 2): between which values the strength lies, Pa, in tension and at once in shear;
+        infinite if none is enough.
         """
         bare = Mortar(friction=self.mortar.friction)
-
-        def cases(assembly: Assembly) -> list[Case]:
-            return [bonded(assembly, bare)]
-
-        (bracket,) = self._brackets("bond", cases, bricks, (held, payload))
-        level = self._levels["bond", bricks][0]
-        return _or_inf(bracket) * level.assembly.stress_scale
+        bracket = self._least("bond", lambda each: [bonded(each, bare)], bricks, (held, payload))
+        return bracket * self._levels["bond", bricks][0].assembly.stress_scale
 
     def grip(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
         """Return the least payload, the same for all who hold, with the mortar.
 
-        ``bricks``: how many bricks stand, in build order. ``held`` (S, r): nodes held, as places in
-        build order counted from 1; zero for none. ``payload`` (r,), (S, r): N; counts only in what
-        a motion's rounding is charged with. Result (S, 2): between which values it lies, N;
-        infinite if none is enough.
+        ``payload`` counts only in what a motion's rounding is charged with. Result (S, 2): between
+        which values it lies, N; infinite if none is enough.
         """
 
         def cases(assembly: Assembly) -> list[Case]:
-            return [replace(self._fixed(assembly), payload=(0.0, 1.0))]
+            return [replace(bonded(assembly, self.mortar).fixed(), payload=(0.0, 1.0))]
 
-        (bracket,) = self._brackets("grip", cases, bricks, (held, payload))
-        level = self._levels["grip", bricks][0]
-        return _or_inf(bracket) * level.assembly.scales[0]
+        bracket = self._least("grip", cases, bricks, (held, payload))
+        return bracket * self._levels["grip", bricks][0].assembly.scales[0]
 
     def tilt(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
         """Return the tilt that grip sets survive in every direction.
 
-        ``bricks``: how many bricks stand, in build order. ``held`` (S, r): nodes held, as places in
-        build order counted from 1; zero for none. ``payload`` (r,), (S, r): N. Result (S, 2):
-        between which values it lies, rad; NaN where it is not proven that the structure stands. As
-        `seqopt.stability.assessment.Stability.tilt`.
+        Result (S, 2): between which values it lies, rad; NaN where it is not proven that the
+        structure stands. As `seqopt.stability.assessment.Stability.tilt`.
         """
         screen = self.screens[self.mortar.friction]
         out = np.full((len(np.asarray(held)), 2), np.nan)
@@ -127,7 +114,7 @@ class Margins:
         """Return brackets (n, 2) of the tilt of some grip sets, by a number of directions."""
 
         def pulls(assembly: Assembly) -> list[Case]:
-            return sideways(self._fixed(assembly), self.network.scene.up, count)
+            return sideways(bonded(assembly, self.mortar).fixed(), self.network.scene.up, count)
 
         grips = np.asarray(held)[rows], _of_rows(payload, rows)
         brackets = np.array(self._brackets(f"tilt {count}", pulls, bricks, grips))
@@ -142,53 +129,42 @@ class Margins:
     ) -> Floats:
         """Return the least coefficient of friction at the mortar's bond, by halving intervals.
 
-        ``bricks``: how many bricks stand, in build order. ``held`` (S, r): nodes held, as places in
-        build order counted from 1; zero for none. ``payload`` (r,), (S, r): N. ``step``: how narrow
-        the brackets shall be. Result (S, 2): between which values it lies; infinite above where
-        none up to `ROUGHEST` is proven to be enough.
+        ``step``: how narrow the brackets shall be. Result (S, 2): between which values it lies;
+        infinite above where none up to `ROUGHEST` is proven to be enough.
         """
         sets = np.asarray(held)
         out = np.tile([0.0, np.inf], (len(sets), 1))
         open_ = np.ones(len(sets), dtype=bool)
+
+        def narrow_by(friction: float, rows: Ints) -> None:
+            """Narrow some brackets by whether sets stand with a friction."""
+            if friction not in self.screens:
+                mortar = replace(self.mortar, friction=friction)
+                self.screens[friction] = Screen(self.network, mortar, 0.0, self._compile)
+            found = self.screens[friction].stands(bricks, sets[rows], _of_rows(payload, rows))
+            stand, fall = rows[found == STANDS], rows[found == FALLS]
+            out[stand, 1] = np.minimum(out[stand, 1], friction)
+            out[fall, 0] = np.maximum(out[fall, 0], friction)
+
         for friction in (0.0, 1.0, ROUGHEST):
-            self._narrow(out, open_, friction, (bricks, sets, payload))
+            narrow_by(friction, np.arange(len(sets)))
         while True:
             open_ &= (out[:, 1] - out[:, 0] > step) & np.isfinite(out[:, 1])
             if not open_.any():
                 return out
             middle = out.mean(axis=1)
             for friction in np.unique(middle[open_]).tolist():
-                rows = open_ & (middle == friction)
+                rows = np.flatnonzero(open_ & (middle == friction))
                 before = out[rows]
-                self._narrow(out, rows, friction, (bricks, sets, payload))
+                narrow_by(friction, rows)
                 open_[rows] = (out[rows] != before).any(axis=1)
 
-    def _narrow(
-        self,
-        out: Floats,
-        which: Bools,
-        friction: float,
-        question: tuple[int, ArrayLike, ArrayLike | None],
-    ) -> None:
-        """Narrow some brackets by whether sets stand with a friction, in place."""
-        bricks, held, payload = question
-        if friction not in self.screens:
-            mortar = replace(self.mortar, friction=friction)
-            self.screens[friction] = Screen(self.network, mortar, 0.0, self._compile)
-        rows = np.flatnonzero(which)
-        loads = _of_rows(payload, rows)
-        found = self.screens[friction].stands(bricks, np.asarray(held)[rows], loads)
-        stand, fall = rows[found == STANDS], rows[found == FALLS]
-        out[stand, 1] = np.minimum(out[stand, 1], friction)
-        out[fall, 0] = np.maximum(out[fall, 0], friction)
+    def _least(self, name: str, cases: _Cases, bricks: int, grips: _Grips) -> Floats:
+        """Return the brackets (S, 2) of a least z; infinite where none up to `CAP` is enough."""
+        (bracket,) = self._brackets(name, cases, bricks, grips)
+        return np.where(bracket[:, [0]] >= CAP, np.inf, bracket)
 
-    def _fixed(self, assembly: Assembly) -> Case:
-        case = bonded(assembly, self.mortar)
-        return replace(case, tension=(case.tension[0], 0.0), cohesion=(case.cohesion[0], 0.0))
-
-    def _brackets(
-        self, name: str, cases: _Cases, bricks: int, grips: tuple[ArrayLike, ArrayLike | None]
-    ) -> list[Floats]:
+    def _brackets(self, name: str, cases: _Cases, bricks: int, grips: _Grips) -> list[Floats]:
         """Return the brackets (S, 2) of z of every case."""
         places, loads = held_places(self.network, bricks, *grips)
         if (name, bricks) not in self._levels:
@@ -196,18 +172,14 @@ class Margins:
             self._levels[name, bricks] = tuple(
                 HeldStates(assembly, case, self._compile) for case in cases(assembly)
             )
-        level = self._levels[name, bricks]
-        return [states.bracket(places, loads, narrow) for states in level]
+        return [s.bracket(places, loads, _narrow) for s in self._levels[name, bricks]]
 
 
-def narrow(bracket: Floats) -> Bools:
-    """Return which brackets are as narrow as proofs of a margin have to be.
-
-    ``bracket`` (S, 2). Result (S,).
-    """
+def _narrow(bracket: Floats) -> Bools:
+    """Return which brackets (S, 2) are as narrow as proofs of a margin have to be."""
     scale = np.maximum(1.0, np.where(np.isfinite(bracket[:, 0]), np.abs(bracket[:, 0]), 0.0))
-    gap = bracket[:, 1] - bracket[:, 0] <= GAP * scale
-    return np.asarray(gap | (bracket[:, 0] >= CAP))
+    near = bracket[:, 1] - bracket[:, 0] <= GAP * scale
+    return np.asarray(near | (bracket[:, 0] >= CAP))
 
 
 def _of_rows(payload: ArrayLike | None, rows: Ints) -> ArrayLike | None:
@@ -215,8 +187,3 @@ def _of_rows(payload: ArrayLike | None, rows: Ints) -> ArrayLike | None:
     if payload is None or np.ndim(payload) < 2:
         return payload
     return np.asarray(payload)[rows]
-
-
-def _or_inf(bracket: Floats) -> Floats:
-    """Return brackets of a least z; infinite where none up to `CAP` is enough."""
-    return np.where(bracket[:, [0]] >= CAP, np.inf, bracket)

@@ -53,16 +53,15 @@ class Proven(FrozenValue):
 class Prover:
     """Solves cases of one assembly and proves the answers; counts what the solver claims.
 
-    ``compiled``: makes the program to solve. ``claims``: how the solver said it ended, over all
-    cases; ``unproven``: cases of which nothing was proven.
+    ``claims``: how the solver said it ended, over all cases; ``unproven``: cases of which nothing
+    was proven.
     """
 
     def __init__(self, assembly: Assembly, compiled: Compile) -> None:
         self.assembly = assembly
         self.claims: Counter[Claim] = Counter()
         self.unproven = 0
-        self._compile = compiled
-        self._program = compiled(assembly)
+        self._compile, self._program = compiled, compiled(assembly)
 
     def __call__(self, case: Case) -> Proven:
         """Return the proven answer of a case."""
@@ -70,7 +69,7 @@ class Prover:
         for attempt in range(ATTEMPTS):
             answer = self._program(case, attempt)
             self.claims[answer.claim] += 1
-            value = proven_value(self.assembly, case, answer)
+            value = _proven_value(self.assembly, case, answer)
             best = np.fmin if case.sense is Sense.SMALLEST else np.fmax
             held = float(best(held, _held_value(self.assembly, case, answer)))
             if answer.claim is Claim.INFEASIBLE or not np.isnan(value):
@@ -97,33 +96,22 @@ class Prover:
             grip_position=np.concatenate([assembly.grip_position, reach.reshape(-1, 3)]),
             payload=np.concatenate([payload, np.zeros(4 * blocks)]),
         )
-        strongest = replace(
-            case,
-            tension=(case.tension[0] + CAP * case.tension[1], 0.0),
-            cohesion=(case.cohesion[0] + CAP * case.cohesion[1], 0.0),
-            payload=(1.0, 1.0),
-        )
+        strongest = replace(case.fixed(CAP), payload=(1.0, 1.0))
         answer = self._compile(helped)(strongest, 0)
         self.claims[answer.claim] += 1
         known = is_finite(helped, answer)
         return replace(answer, value=bound(helped, strongest, answer) if known else np.nan)
 
 
-def proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
-    """Return the z of an answer if its forces and its motion prove it.
-
-    Result: NaN if they do not, or a number of the answer is not finite.
-    """
+def _proven_value(assembly: Assembly, case: Case, answer: Answer) -> float:
+    """Return the z of an answer if its forces and its motion prove it, else NaN."""
     gap = abs(answer.value - bound(assembly, case, answer))
-    small = gap <= GAP * max(1.0, abs(answer.value))
-    return _held_value(assembly, case, answer) if small else np.nan
+    near = gap <= GAP * max(1.0, abs(answer.value))
+    return _held_value(assembly, case, answer) if near else np.nan
 
 
 def _held_value(assembly: Assembly, case: Case, answer: Answer) -> float:
-    """Return the z of an answer if its forces alone prove that it will do.
-
-    Result: NaN if they do not, or a number of the answer is not finite.
-    """
+    """Return the z of an answer if its forces alone prove that it will do, else NaN."""
     if not is_finite(assembly, answer):
         return np.nan
     proven = violation(assembly, case, answer) <= EXACT * max(1.0, abs(answer.value))
@@ -137,10 +125,9 @@ NEAR = 5e-3  # share of the least pull by which the bound may fall short before 
 
 
 def sideways(fixed: Case, up: Vector, count: int = DIRECTIONS) -> list[Case]:
-    """Return the cases of the largest sideways acceleration.
+    """Return the cases of the largest sideways acceleration in directions, evenly spread.
 
-    ``fixed``: whose strengths do not grow with z; ``up``: unit vector against gravity; ``count``:
-    of directions, evenly spread. Result: one per direction.
+    ``fixed``: whose strengths do not grow with z; ``up``: unit vector against gravity.
     """
     return [_pulled(fixed, up, angle) for angle in 2 * np.pi * np.arange(count) / count]
 
@@ -149,10 +136,8 @@ def safe_pull(prove: Prover, fixed: Case, up: Vector) -> tuple[list[Proven], flo
     """Return the largest sideways accelerations, and one that is survived in every direction.
 
     Where the bound is least a direction is added, until it falls short of the least pull found by
-    no more than `NEAR`, or `_MORE` have been.
-
-    ``fixed``: whose strengths do not grow with z; ``up``: unit vector against gravity. Results:
-    ``pulls``: of `sideways`, then of the directions added; ``worst``: NaN if forces prove too few.
+    no more than `NEAR`, or `_MORE` have been. Results: ``pulls``: of `sideways`, then of the
+    directions added; ``worst``: NaN if forces prove too few.
     """
     angles = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     pulls = [prove(case) for case in sideways(fixed, up)]
@@ -179,16 +164,16 @@ def in_every_direction(angles: Floats, pulls: Floats) -> tuple[float, float]:
     >>> round(pull, 4), round(angle, 4)
     (0.7071, 0.7854)
     """
-    order = np.argsort(angles[np.isfinite(pulls)])
-    angles, pulls = (part[np.isfinite(pulls)][order] for part in (angles, pulls))
+    known = np.isfinite(pulls)
+    order = np.argsort(angles[known])
+    angles, pulls = angles[known][order], pulls[known][order]
     turns = np.diff(angles, append=angles[:1] + 2 * np.pi)
     if len(angles) < 3 or turns.max() >= np.pi:
         return np.nan, np.nan
     ends = pulls[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     along = np.roll(ends, -1, axis=0) - ends
     size = np.maximum(np.square(along).sum(axis=1), np.finfo(float).tiny)
-    share = np.clip(-(ends * along).sum(axis=1) / size, 0.0, 1.0)
-    nearest = ends + share[:, None] * along
+    nearest = ends + np.clip(-(ends * along).sum(axis=1) / size, 0.0, 1.0)[:, None] * along
     distance = np.linalg.norm(nearest, axis=1)
     worst = int(distance.argmin())
     x, y = nearest[worst]

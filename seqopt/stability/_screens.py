@@ -27,6 +27,7 @@ from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import EXACT
 
 STANDS, FALLS, OPEN = 1, -1, 0
+_Level = tuple[int, int, bool]  # bricks, directions, and whether corners are around them all
 
 
 class Screen:
@@ -59,12 +60,10 @@ class Screen:
         tilt: float = 0.0,
         compiled: CompileHeld = compile_held,
     ) -> None:
-        self.network = network_of(network)
-        self.mortar = find_mortar(mortar)
+        self.network, self.mortar = network_of(network), find_mortar(mortar)
         self.tilt = tilt
-        self._compile = compiled
-        self._contacts = Contacts(self.network)
-        self._levels: dict[tuple[int, int, bool], tuple[HeldStates, ...]] = {}
+        self._compile, self._contacts = compiled, Contacts(self.network)
+        self._levels: dict[_Level, tuple[HeldStates, ...]] = {}
 
     @property
     def solved(self) -> int:
@@ -80,73 +79,56 @@ class Screen:
         build order counted from 1; zero for a robot that holds none. ``payload`` (r,), (S, r):
         largest force of those that hold them, N; by default of the scene's robots, if all have the
         same. Result (S,): 1 where it is proven that the structure stands, -1 where it is proven
-        that it falls, and 0 where neither is. Raises `GripError` if there are no such nodes, or
-        payloads are missing or not numbers.
+        that it falls, and 0 where neither is. Raises `GripError` as `held_places` does.
         """
         places, loads = held_places(self.network, bricks, held, payload)
         out = self._verdicts((bricks, DIRECTIONS, True), places, loads)
         if not self.tilt:
             return out
         out[out != STANDS] = OPEN
-        for count, around, sure in (
-            (DIRECTIONS, False, FALLS),
-            (FINE, True, STANDS),
-            (FINE, False, FALLS),
-        ):
+        tries = (DIRECTIONS, False, FALLS), (FINE, True, STANDS), (FINE, False, FALLS)
+        for count, around, sure in tries:
             rows = np.flatnonzero(out == OPEN)
             found = self._verdicts((bricks, count, around), places[rows], loads[rows])
             out[rows[found == sure]] = sure
         return out
 
-    def _verdicts(
-        self, level: tuple[int, int, bool], places: Ints, loads: Floats
-    ) -> NDArray[np.int8]:
+    def _verdicts(self, level: _Level, places: Ints, loads: Floats) -> NDArray[np.int8]:
         """Return which sets stand in all directions of a level."""
         out = np.full(len(places), STANDS, dtype=np.int8)
         for states in self._level(level):
             rows = np.flatnonzero(out != FALLS)
-            bracket = states.bracket(places[rows], loads[rows], decided)
+            bracket = states.bracket(places[rows], loads[rows], _decided)
             fall, stand = bracket[:, 0] > EXACT, bracket[:, 1] <= EXACT
             out[rows[fall]] = FALLS
             out[rows[~fall & ~stand]] = OPEN
         return out
 
-    def _level(self, level: tuple[int, int, bool]) -> tuple[HeldStates, ...]:
+    def _level(self, level: _Level) -> tuple[HeldStates, ...]:
         if level not in self._levels:
             bricks, count, around = level
             upright = node_assembly(self.network, bricks, self._contacts)
             pull = np.tan(self.tilt) / (np.cos(np.pi / count) if around else 1.0)
             self._levels[level] = tuple(
-                lacking(assembly, self.mortar, self._compile)
+                _lacking(assembly, self.mortar, self._compile)
                 for assembly in _pulled(upright, pull, self.network.scene.up, count)
             )
         return self._levels[level]
 
 
-def lacking(assembly: Assembly, mortar: Mortar, compiled: CompileHeld) -> HeldStates:
-    """Return the question whether a structure stands: whether it lacks any bond.
-
-    ``assembly``: its grips are all that may ever be held; ``compiled``: makes the program to solve.
-    """
+def _lacking(assembly: Assembly, mortar: Mortar, compiled: CompileHeld) -> HeldStates:
+    """Return the question whether a structure stands: whether it lacks any bond."""
     case = bonded(assembly, mortar)
-    fixed = replace(case, tension=(case.tension[0], 0.0), cohesion=(case.cohesion[0], 0.0))
-    return HeldStates(assembly, case, compiled, fixed)
+    return HeldStates(assembly, case, compiled, case.fixed())
 
 
-def decided(bracket: Floats) -> Bools:
-    """Return where it is proven that no bond is lacking, or that some is.
-
-    ``bracket`` (S, 2): of the bond that is lacking. Result (S,).
-    """
+def _decided(bracket: Floats) -> Bools:
+    """Return where brackets (S, 2) prove that no bond is lacking, or that some is."""
     return np.asarray((bracket[:, 1] <= EXACT) | (bracket[:, 0] > EXACT))
 
 
 def _pulled(assembly: Assembly, pull: float, up: Vector, count: int) -> tuple[Assembly, ...]:
-    """Return the assemblies to which sideways pulls turn one.
-
-    ``pull``: over gravity; for none it is the assembly itself. ``up``: unit vector against gravity.
-    ``count``: of directions, evenly spread. Result: one per direction.
-    """
+    """Return the assemblies to which sideways pulls, over gravity, turn one; itself for none."""
     if not pull:
         return (assembly,)
     weight = np.linalg.norm(assembly.weight, axis=1, keepdims=True)
@@ -158,37 +140,28 @@ def _pulled(assembly: Assembly, pull: float, up: Vector, count: int) -> tuple[As
 def held_places(
     network: Network, bricks: int, held: ArrayLike, payload: ArrayLike | None
 ) -> tuple[Ints, Floats]:
-    """Return grip sets as grips of `seqopt.stability._held_states.node_assembly`.
+    """Return grip sets, as `Screen.stands` takes them, as grips of `node_assembly`.
 
-    ``held`` (S, r): nodes held, as places in build order counted from 1; zero for a robot that
-    holds none. ``payload`` (r,), (S, r): N; by default of the scene's robots, if all have the same.
     Results: ``places`` (S, r): from 0; the number of nodes for none. ``payload`` (S, r): N; zero
     for none. Raises `GripError` if there are no such nodes, or payloads are missing or not numbers.
     """
-    sets = np.asarray(held)
-    most = 2 * bricks
+    sets, most = np.asarray(held), 2 * bricks
     if sets.ndim != 2 or (sets.size and sets.dtype.kind not in "iu"):
         raise GripError(f"held: an array of shape {sets.shape}; give a row of nodes per grip set")
     if not 1 <= bricks <= len(network.inner):
         raise GripError(f"{bricks} bricks: give from 1 to {len(network.inner)}")
     if sets.size and not 0 <= sets.min() <= sets.max() <= most:
         bad = sets.min() if sets.min() < 0 else sets.max()
-        raise GripError(
-            f"held: node {bad} of {bricks} bricks; give from 1 to {most}, or 0 for none"
-        )
-    loads = np.broadcast_to(_payload(network, payload), sets.shape)
+        known = f"give from 1 to {most}, or 0 for none"
+        raise GripError(f"held: node {bad} of {bricks} bricks; {known}")
+    if payload is None:
+        own = {robot.payload for robot in network.scene.robots}
+        if len(own) != 1:
+            known = f"scene {network.scene.name}: its robots have no payload in common"
+            raise GripError(f"{known}; give one per grip")
+        payload = own.pop()
+    loads = np.broadcast_to(np.asarray(payload, dtype=float), sets.shape)
     if not (np.isfinite(loads).all() and (loads >= 0).all()):
         raise GripError("payload: it is negative or no number; give N")
     free = sets == 0
     return np.where(free, most, sets - 1).astype(np.int64), np.where(free, 0.0, loads)
-
-
-def _payload(network: Network, payload: ArrayLike | None) -> Floats:
-    if payload is not None:
-        return np.asarray(payload, dtype=float)
-    own = {robot.payload for robot in network.scene.robots}
-    if len(own) != 1:
-        raise GripError(
-            f"scene {network.scene.name}: its robots have no payload in common; give one per grip"
-        )
-    return np.array(own.pop())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -32,25 +33,6 @@ from seqopt.stability.limit_analysis import (
 from seqopt.work.progress import Tell, with_progress
 
 _STILL = 1e-6  # motion slower than this, beside the fastest, is none
-
-
-def _first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
-    """Return what goes first in a motion.
-
-    ``motion`` (B, 6): as of `seqopt.stability.limit_analysis.Answer`. Results: ``block``,
-    ``contact``: the fastest block and the contact that parts fastest; empty where nothing moves.
-    """
-    speed = np.linalg.norm(motion, axis=1)
-    if not speed.max(initial=0.0) > 0:
-        return "", ""
-    block = str(assembly.block_name[int(speed.argmax())])
-    parting = (assembly.contact_map.T @ motion.ravel()).reshape(-1, 3)
-    apart = np.linalg.norm(parting, axis=1)
-    if not apart.max(initial=0.0) > _STILL:
-        return block, ""
-    return block, assembly.contact_name[int(assembly.contact[int(apart.argmax())])]
-
-
 ROUGHEST = 10.0  # largest coefficient of friction that is tried
 _LITTLE = 1e-3  # friction that holds nothing but what is jammed
 _FRICTION_STEP = 1e-4  # to which the least one is found
@@ -156,14 +138,12 @@ def assess(
     -------
     Stability
     """
-    prove = Prover(assembly, compiled)
-    growing = bonded(assembly, mortar)
+    prove, growing = Prover(assembly, compiled), bonded(assembly, mortar)
     stand = prove(growing)
     verdict = _verdict_of(stand)
     bare = bonded(assembly, Mortar(friction=mortar.friction))
     bond = stand if bare == growing else prove(bare)
-    fixed = replace(growing, tension=(growing.tension[0], 0.0), cohesion=(growing.cohesion[0], 0.0))
-    stands = verdict is Verdict.STANDS
+    fixed, stands = growing.fixed(), verdict is Verdict.STANDS
     pulls, worst = safe_pull(prove, fixed, up) if stands else ([], np.nan)
     failure = min(pulls, key=lambda pull: np.nan_to_num(pull.held, nan=CAP), default=stand)
     known = failure.value < CAP if stands else verdict is Verdict.FALLS
@@ -171,13 +151,15 @@ def assess(
     motion = motion / (np.abs(motion).max(initial=0.0) or 1.0)
     block, contact = _first_to_fail(assembly, motion)
     friction = _least_friction(prove, mortar)
+    least = replace(fixed, sense=Sense.SMALLEST, payload=(0.0, 1.0))
+    grip = prove(least).value if len(assembly.payload) else 0.0
     return Stability(
         verdict=verdict,
         bond=_amount(bond.value) * assembly.stress_scale,
         friction=friction,
         pull=np.array([pull.held for pull in pulls[:DIRECTIONS]] or [np.nan] * DIRECTIONS),
         tilt=float(np.arctan(worst)),
-        grip=_amount(_grip(prove, fixed)) * assembly.scales[0],
+        grip=_amount(grip) * assembly.scales[0],
         motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
         first_block=block,
         first_contact=contact,
@@ -219,13 +201,28 @@ def _verdict_of(stand: Proven) -> Verdict:
     return Verdict.STANDS if stand.value <= EXACT else Verdict.UNDECIDED
 
 
+def _first_to_fail(assembly: Assembly, motion: Floats) -> tuple[str, str]:
+    """Return the fastest block and the contact that parts fastest in a motion (B, 6).
+
+    Empty where nothing moves.
+    """
+    speed = np.linalg.norm(motion, axis=1)
+    if not speed.max(initial=0.0) > 0:
+        return "", ""
+    block = str(assembly.block_name[int(speed.argmax())])
+    parting = (assembly.contact_map.T @ motion.ravel()).reshape(-1, 3)
+    apart = np.linalg.norm(parting, axis=1)
+    if not apart.max(initial=0.0) > _STILL:
+        return block, ""
+    return block, assembly.contact_name[int(assembly.contact[int(apart.argmax())])]
+
+
 def _least_friction(prove: Prover, mortar: Mortar) -> float:
     """Return the least coefficient of friction with which no bond is lacking, to `_FRICTION_STEP`.
 
     The lacking bond falls with the friction. A line through two points where some is lacking aims
-    at where none is; where that does not help, the middle is tried.
-
-    Result: infinite if none up to `ROUGHEST` is enough, NaN if nothing is proven.
+    at where none is; where that does not help, the middle is tried. It is infinite if none up to
+    `ROUGHEST` is enough, NaN if nothing is proven.
     """
 
     def lacking(friction: float) -> float:
@@ -239,14 +236,12 @@ def _least_friction(prove: Prover, mortar: Mortar) -> float:
     enough = [f for f, lack in tried.items() if lack <= EXACT]
     if not enough:
         return np.nan if np.isnan(list(tried.values())).any() else np.inf
-    high = enough[0]
-    before: tuple[float, float] | None = None
-    step = _FRICTION_STEP
-    while high - low[0] > step:
+    high, before = enough[0], (0.0, -np.inf)
+    while high - low[0] > _FRICTION_STEP:
         middle = 0.5 * (low[0] + high)
-        if before is not None and before[1] > low[1] < np.inf:
+        if before[1] > low[1] < np.inf:
             slope = (before[1] - low[1]) / (low[0] - before[0])
-            middle = min(middle, low[0] + low[1] / slope + 0.4 * step)
+            middle = min(middle, low[0] + low[1] / slope + 0.4 * _FRICTION_STEP)
         value = lacking(middle)
         if np.isnan(value):
             return np.nan
@@ -258,10 +253,9 @@ def _least_friction(prove: Prover, mortar: Mortar) -> float:
 
 
 def _is_jammed(prove: Prover, mortar: Mortar) -> bool:
-    """Return whether hardly any friction is enough, by contact forces far above all loads.
+    """Return whether forces prove hardly any friction enough, but far above all loads.
 
-    ``prove``: of an assembly that stands with the mortar, and not without friction. Result: only
-    where that is proven by forces.
+    ``prove``: of an assembly that stands with the mortar, and not without friction.
     """
     assembly, case = prove.assembly, bonded(prove.assembly, mortar)
     proven = prove(replace(case, friction=min(_LITTLE, mortar.friction)))
@@ -273,13 +267,6 @@ def _is_jammed(prove: Prover, mortar: Mortar) -> bool:
 def _amount(value: float) -> float:
     """Return a proven z, zero where it is no more than what proofs leave open."""
     return 0.0 if value <= EXACT else value
-
-
-def _grip(prove: Prover, fixed: Case) -> float:
-    """Return the least largest grip force over the force scale."""
-    if not len(prove.assembly.payload):
-        return 0.0
-    return prove(replace(fixed, sense=Sense.SMALLEST, payload=(0.0, 1.0))).value
 
 
 def assess_steps(
@@ -317,10 +304,11 @@ def assess_steps(
     ['stands', 'stands']
     """
     network, mortar = network_of(network), find_mortar(mortar)
-    known, up, out = Contacts(network), network.scene.up, []
-    for step in with_progress("assessing steps", require_steps(steps), progress):
-        out.append(assess(step_assembly(network, step.bricks, step.grips, known), mortar, up))
-    return tuple(out)
+    known, up = Contacts(network), network.scene.up
+    return tuple(
+        assess(step_assembly(network, step.bricks, step.grips, known), mortar, up)
+        for step in with_progress("assessing steps", require_steps(steps), progress)
+    )
 
 
 def step_verdicts(network: Network, steps: Sequence[Step], mortar: Mortar) -> tuple[Verdict, ...]:
@@ -351,50 +339,39 @@ def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.D
         ``jammed``, as in `seqopt.stability.assessment.Stability`; ``almost_solved``, ``stalled``
         and ``unproven`` count cases.
     """
-    rows = []
-    for step, result in zip(steps, results, strict=True):
-        rows.append(
-            {
-                "step": step.number,
-                "type": step.kind.value,
-                "bricks": step.bricks,
-                "verdict": result.verdict.value,
-                "bond_needed_Pa": result.bond,
-                "friction_needed": result.friction,
-                "tilt_survived_deg": np.degrees(result.tilt),
-                "largest_grip_force_N": result.grip,
-                "first_brick": result.first_block,
-                "first_joint": result.first_contact,
-                "jammed": result.jammed,
-                "almost_solved": result.claims.get(Claim.ALMOST, 0),
-                "stalled": result.claims.get(Claim.STALLED, 0),
-                "unproven": result.unproven,
-            }
-        )
+    rows = [
+        {
+            "step": step.number,
+            "type": step.kind.value,
+            "bricks": step.bricks,
+            "verdict": result.verdict.value,
+            "bond_needed_Pa": result.bond,
+            "friction_needed": result.friction,
+            "tilt_survived_deg": np.degrees(result.tilt),
+            "largest_grip_force_N": result.grip,
+            "first_brick": result.first_block,
+            "first_joint": result.first_contact,
+            "jammed": result.jammed,
+            "almost_solved": result.claims.get(Claim.ALMOST, 0),
+            "stalled": result.claims.get(Claim.STALLED, 0),
+            "unproven": result.unproven,
+        }
+        for step, result in zip(steps, results, strict=True)
+    ]
     return pd.DataFrame(rows)
 
 
 def format_verdicts(results: Sequence[Stability]) -> str:
-    """Return how many steps stand, do not stand and are undecided, and how the solver ended.
-
-    Result: one line.
-    """
-    words = {
-        Verdict.STANDS: "stand",
-        Verdict.FALLS: "do not stand",
-        Verdict.UNDECIDED: "are undecided",
-    }
-    verdicts = ", ".join(
-        f"{sum(result.verdict is verdict for result in results)} {word}"
-        for verdict, word in words.items()
-    )
+    """Return in a line how many steps stand, fall and are undecided, and how the solver ended."""
+    found = Counter(result.verdict for result in results)
+    words = zip(Verdict, ("stand", "do not stand", "are undecided"), strict=True)
+    verdicts = ", ".join(f"{found[verdict]} {word}" for verdict, word in words)
     jammed = sum(result.jammed for result in results)
     verdicts += f" ({jammed} only jammed: do not trust these)" if jammed else ""
-    claims = {
-        claim: sum(result.claims.get(claim, 0) for result in results)
-        for claim in (Claim.ALMOST, Claim.STALLED)
-    }
-    cases = sum(sum(result.claims.values()) for result in results)
-    ends = ", ".join(f"{count} {claim.value}" for claim, count in claims.items())
+    claims = Counter[Claim]()
+    for result in results:
+        claims.update(result.claims)
+    ends = ", ".join(f"{claims[end]} {end.value}" for end in (Claim.ALMOST, Claim.STALLED))
     unproven = sum(result.unproven for result in results)
-    return f"{len(results)} steps: {verdicts}; {cases} cases: {ends}, {unproven} unproven"
+    cases = f"{claims.total()} cases: {ends}, {unproven} unproven"
+    return f"{len(results)} steps: {verdicts}; {cases}"

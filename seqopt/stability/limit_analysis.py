@@ -16,7 +16,7 @@ the assembly's own data; a solver's status is never the verdict.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -56,6 +56,11 @@ class Case:
     payload: tuple[float, float] = (1.0, 0.0)
     pull: Vector = (0.0, 0.0, 0.0)
 
+    def fixed(self, z: float = 0.0) -> Case:
+        """Return the case with strengths as they are at a z, which do not grow."""
+        tension, cohesion = (part[0] + z * part[1] for part in (self.tension, self.cohesion))
+        return replace(self, tension=(tension, 0.0), cohesion=(cohesion, 0.0))
+
 
 class Claim(Enum):
     """How a solver says that it ended."""
@@ -93,31 +98,28 @@ Compile = Callable[[Assembly], Program]
 
 def compile_equilibrium(assembly: Assembly) -> Program:
     """Return the registered program of an assembly (entry points ``seqopt.limit_analysis``)."""
-    entry = plugins("seqopt.limit_analysis")["socp"]
-    compiled: Compile = entry.load()
+    compiled: Compile = plugins("seqopt.limit_analysis")["socp"].load()
     return compiled(assembly)
 
 
 def limits(
     assembly: Assembly, case: Case, z: float, own: Floats | None = None
 ) -> tuple[Floats, Floats, Floats]:
-    """Return what corners and grips can bear at a z, over the force scale.
+    """Return tension and cohesion (K,) and payloads (G,) borne at a z, over the force scale.
 
-    ``own`` (G,): payload of every grip, N; by default the assembly's. Results: ``tension``,
-    ``cohesion`` (K,); ``payload`` (G,).
+    ``own`` (G,): payload of every grip, N; by default the assembly's.
     """
     share = assembly.corner_area * assembly.stress_scale / assembly.scales[0]
     own = assembly.payload if own is None else own
     payload = case.payload[0] * own / assembly.scales[0] + z * case.payload[1]
-    tension, cohesion = case.tension, case.cohesion
-    return (share * (tension[0] + z * tension[1]), share * (cohesion[0] + z * cohesion[1]), payload)
+    tension, cohesion = (part[0] + z * part[1] for part in (case.tension, case.cohesion))
+    return share * tension, share * cohesion, payload
 
 
 def violation(assembly: Assembly, case: Case, answer: Answer, own: Floats | None = None) -> float:
-    """Return by how much the forces of an answer violate a case at most.
+    """Return by how much the forces of an answer violate a case at most, over the force scale.
 
-    ``own`` (G,): payload of every grip, N; by default the assembly's. Result: over the force scale;
-    infinite where the answer is not finite.
+    Infinite where the answer is not finite. ``own``: as of `limits`.
     """
     z, force, grip = answer.value, answer.contact_force, answer.grip_force
     residual = assembly.contact_map @ force.ravel() + assembly.grip_map @ grip.ravel()
@@ -136,16 +138,12 @@ def violation(assembly: Assembly, case: Case, answer: Answer, own: Floats | None
 def is_finite(assembly: Assembly, answer: Answer) -> bool:
     """Return whether all numbers of an answer are finite, and as many as the assembly needs.
 
-    Result: what is not finite proves nothing: no comparison holds against it.
+    What is not finite proves nothing: no comparison holds against it.
     """
-    parts = (
-        (answer.contact_force, (len(assembly.corner), 3)),
-        (answer.grip_force, (len(assembly.payload), 3)),
-        (answer.motion, (len(assembly.centroid), 6)),
-    )
-    return bool(np.isfinite(answer.value)) and all(
-        part.shape == shape and np.isfinite(part).all() for part, shape in parts
-    )
+    parts = answer.contact_force, answer.grip_force, answer.motion
+    shapes = [(len(assembly.corner), 3), (len(assembly.payload), 3), (len(assembly.centroid), 6)]
+    right = [part.shape for part in parts] == shapes
+    return right and all(np.isfinite(part).all() for part in (answer.value, *parts))
 
 
 def bound(assembly: Assembly, case: Case, answer: Answer) -> float:
@@ -159,10 +157,15 @@ def bound(assembly: Assembly, case: Case, answer: Answer) -> float:
     if not is_finite(assembly, answer):
         return nothing
     size = np.frexp(np.abs(answer.motion).max())[1]  # a power of two: scaling by it is exact
-    motion = np.ldexp(answer.motion, -size)
-    taken = _taken(assembly, case, motion, (answer.value, 0.0, 1.0))
-    start = float(assembly.load() @ motion.ravel()) - taken[1]
-    growth = float(assembly.load(case.pull) @ motion.ravel()) - (taken[2] - taken[1])
+    motion = np.ldexp(answer.motion, -size).ravel()
+    at_grip = np.linalg.norm((assembly.grip_map.T @ motion).reshape(-1, 3), axis=1)
+    contact, opening = contact_work(assembly, case, motion, (answer.value, 0.0, 1.0))
+    total = np.linalg.norm(assembly.weight, axis=1).sum() + assembly.payload.sum()
+    most = LARGEST_FORCE if -opening.min(initial=0.0) <= _CLOSING else np.inf
+    closing = most * total / assembly.scales[0] * np.maximum(-opening, 0).sum()
+    _, low, high = (float(work + payload @ at_grip + closing) for work, payload in contact)
+    start = float(assembly.load() @ motion) - low
+    growth = float(assembly.load(case.pull) @ motion) - (high - low)
     if case.sense is Sense.SMALLEST:
         if not start > ROUNDING:
             return nothing
@@ -170,27 +173,21 @@ def bound(assembly: Assembly, case: Case, answer: Answer) -> float:
     return min(max(-start / growth, 0.0), CAP) if growth > 0 else nothing
 
 
-def _taken(
+def contact_work(
     assembly: Assembly, case: Case, motion: Floats, levels: tuple[float, ...]
-) -> list[float]:
-    """Return the most work that contacts and grips take up in a motion, for several z.
+) -> tuple[list[tuple[float, Floats]], Floats]:
+    """Return the most work that contacts take up in a motion (6B,), for several z, with payloads.
 
     The share of the tension cut-off and of the cone's tip is the one that is best for the first.
+    Beside it, by how much more than its sliding asks for every corner opens (K,).
     """
-    parting = (assembly.contact_map.T @ motion.ravel()).reshape(-1, 3)
-    at_grip = np.linalg.norm((assembly.grip_map.T @ motion.ravel()).reshape(-1, 3), axis=1)
+    parting = (assembly.contact_map.T @ motion).reshape(-1, 3)
     sliding = np.linalg.norm(parting[:, 1:], axis=1)
     opening = parting[:, 0] - case.friction * sliding
-    total = np.linalg.norm(assembly.weight, axis=1).sum() + assembly.payload.sum()
-    most = LARGEST_FORCE if -opening.min(initial=0.0) <= _CLOSING else np.inf
-    closing = most * total / assembly.scales[0] * np.maximum(-opening, 0).sum()
+    borne = [limits(assembly, case, z) for z in levels]
+    tip = case.friction * borne[0][0] > borne[0][1]
     taken = []
-    tip = None
-    for z in levels:
-        tension, cohesion, payload = limits(assembly, case, z)
-        if tip is None:
-            tip = case.friction * tension > cohesion
+    for tension, cohesion, payload in borne:
         cut = np.where(tip, cohesion / (case.friction or 1.0), tension)
-        contact = cohesion @ sliding + cut @ np.maximum(opening, 0)
-        taken.append(float(contact + payload @ at_grip + closing))
-    return taken
+        taken.append((float(cohesion @ sliding + cut @ np.maximum(opening, 0)), payload))
+    return taken, opening

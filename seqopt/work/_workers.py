@@ -33,19 +33,13 @@ from seqopt.errors import WorkerError
 _MEMORY = Path("/proc/meminfo")
 _OWN = Path("/proc/self/statm")
 _GROUPS = (
-    (Path("/sys/fs/cgroup/memory.max"), Path("/sys/fs/cgroup/memory.current")),
-    (
-        Path("/sys/fs/cgroup/memory/memory.limit_in_bytes"),
-        Path("/sys/fs/cgroup/memory/memory.usage_in_bytes"),
-    ),
+    ("memory.max", "memory.current"),
+    ("memory/memory.limit_in_bytes", "memory/memory.usage_in_bytes"),
 )  # what a container may have, and has
 
 
 def free_memory() -> float:
-    """Return how much memory can still be had.
-
-    Result: bytes; infinite where the system does not say.
-    """
+    """Return how many bytes can still be had, infinite where the system does not say."""
     return max(min(_free_at_all(), _free_in_group(), _free_within_limit()), 0.0)
 
 
@@ -58,11 +52,10 @@ def _free_at_all() -> float:
 
 def _free_in_group() -> float:
     """Return what is left of the memory that a container may have."""
-    for limit, used in _GROUPS:
-        try:
-            return float(limit.read_text("ascii")) - float(used.read_text("ascii"))
-        except (OSError, ValueError):  # not there, or "max"
-            continue
+    for names in _GROUPS:
+        with suppress(OSError, ValueError):  # not there, or "max"
+            limit, used = (Path("/sys/fs/cgroup", name).read_text("ascii") for name in names)
+            return float(limit) - float(used)
     return math.inf
 
 
@@ -79,55 +72,10 @@ def _free_within_limit() -> float:
     return float(limit - own)
 
 
-class Lanes:
-    """Processes that get the tasks of one lane each; see `seqopt.work._workers.Crew`.
-
-    For tasks of which neighbors share what a process prepares for one of them.
-
-    ``workers``: how many.
-    """
-
-    def __init__(self, workers: int) -> None:
-        self._lanes = [Processes(1) for _ in range(workers)]
-
-    @property
-    def workers(self) -> int:
-        """How many tasks are worked on at once."""
-        return len(self._lanes)
-
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Give a call out; see `Crew`. ``*arguments``: the last one has a ``lane``."""
-        lane: int = arguments[-1].lane
-        return self._lanes[lane].submit(function, *arguments)
-
-    def drop(self, calls: Iterable[Future[Any]]) -> None:
-        """Leave calls to their processes; see `Crew`."""
-
-    def look_after(self) -> None:
-        """End processes if one has died while it sent an answer; see `Crew`."""
-        for lane in self._lanes:
-            lane.look_after()
-
-    def replace(self, error: BaseException) -> bool:
-        """Take new processes for those that died; see `Crew`. Result: True."""
-        self.end(now=True)
-        return True
-
-    def end(self, *, now: bool) -> None:
-        """End the processes, and wait for their end.
-
-        ``now``: whether at once, or when all that was given out is done.
-        """
-        for lane in self._lanes:
-            lane.end(now=now)
-
-
-class Processes:
+class _Processes:
     """Processes of our own: started when they are needed, replaced when they die.
 
     They end with the process that started them, however that ends.
-
-    ``workers``: how many.
     """
 
     def __init__(self, workers: int) -> None:
@@ -166,8 +114,7 @@ class Processes:
             return
         self._leash.close()
         results = getattr(self._pool, "_result_queue", None)  # there is no public way to it
-        writer = getattr(results, "_writer", None)
-        if writer is not None:
+        if writer := getattr(results, "_writer", None):
             writer.close()
 
     def replace(self, error: BaseException) -> bool:
@@ -176,18 +123,41 @@ class Processes:
         return True
 
     def end(self, *, now: bool) -> None:
-        """End the processes, and wait for their end.
-
-        ``now``: whether at once, or when all that was given out is done.
-        """
+        """End the processes, at once or when all is done that was given out; wait for it."""
         if self._leash is not None and now:
             self._leash.close()
         if self._pool is not None:
             self._pool.shutdown(wait=True, cancel_futures=True)
-        if self._leash is not None and not now:
+        if self._leash is not None:
             self._leash.close()
         self._pool = self._leash = None
         self._started = []
+
+
+class Lanes(_Processes):
+    """Processes that get the tasks of one lane each; see `seqopt.work._workers.Crew`.
+
+    For tasks of which neighbors share what a process prepares for one of them.
+    """
+
+    def __init__(self, workers: int) -> None:
+        super().__init__(workers)
+        self._lanes = [_Processes(1) for _ in range(workers)]
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Give a call out; see `Crew`. ``*arguments``: the last one has a ``lane``."""
+        lane: int = arguments[-1].lane
+        return self._lanes[lane].submit(function, *arguments)
+
+    def look_after(self) -> None:
+        """End processes if one has died while it sent an answer; see `Crew`."""
+        for lane in self._lanes:
+            lane.look_after()
+
+    def end(self, *, now: bool) -> None:
+        """End the processes; see `_Processes`."""
+        for lane in self._lanes:
+            lane.end(now=now)
 
 
 @contextmanager
@@ -216,9 +186,6 @@ def _wait_and_end(end: Connection) -> None:
     with suppress(EOFError, OSError):
         end.recv()
     os._exit(1)
-
-
-_UNKNOWN = 16  # workers of an executor that does not say how many it has
 
 
 class Crew(Protocol):
@@ -270,10 +237,7 @@ class Crew(Protocol):
 
 @dataclass(frozen=True)
 class _Given:
-    """An executor of the caller, who also ends it.
-
-    ``workers``: how many tasks it works on at once.
-    """
+    """An executor of the caller, who also ends it."""
 
     executor: Executor
     workers: int
@@ -324,10 +288,10 @@ def hire(
         yield kept
     elif executor is not None:
         known = getattr(executor, "_max_workers", None)
-        most = known if isinstance(known, int) else _UNKNOWN
+        most = known if isinstance(known, int) else 16  # where it does not say
         yield _Given(executor, workers if workers > 1 else most)
     elif workers > 1:
-        processes = Lanes(workers) if lanes else Processes(workers)
+        processes = Lanes(workers) if lanes else _Processes(workers)
         try:
             yield processes
         except BaseException:
@@ -357,7 +321,6 @@ _Result = TypeVar("_Result")
 _UNDER_WAY = 4  # tasks given out or waiting to be taken, for every worker
 _PATIENCE = 1.0  # s without an answer, after which workers are looked after
 _FAILURES = 3  # times in a row that workers may end without any answer
-_GUARD = 'if __name__ == "__main__":'
 
 
 def map_ordered(
@@ -399,8 +362,7 @@ def map_ordered(
     ...     list(map_ordered(abs, [-3, 2], crew))
     [3, 2]
     """
-    known = known or _unknown
-    done = done or _nothing
+    known, done = known or _nothing, done or _nothing
     if crew is not None:
         yield from _Course(function, crew, known, done).run(iter(tasks))
         return
@@ -471,7 +433,9 @@ class _Course(Generic[_Task, _Result]):
     def _collect(self) -> None:
         """Wait for an answer at least; what came without one is to be given out again."""
         failure: BaseException | None = None
-        for future in self._ended():
+        while not (ended := wait(self.running, _PATIENCE, FIRST_COMPLETED).done):
+            self.crew.look_after()
+        for future in ended:
             number, task = self.running.pop(future)
             try:
                 fine, result = future.result()
@@ -486,24 +450,18 @@ class _Course(Generic[_Task, _Result]):
         if failure is not None:
             self._failed(failure)
 
-    def _ended(self) -> set[Future[Any]]:
-        """Wait until a call at least has ended."""
-        while True:
-            ended = wait(self.running, _PATIENCE, FIRST_COMPLETED).done
-            if ended:
-                return ended
-            self.crew.look_after()
-
     def _failed(self, error: BaseException) -> None:
         """Replace workers that died, unless there are none any more."""
         self.failures += 1
         if self.failures <= _FAILURES and self.crew.replace(error):
-            gone = [future for future in self.running if future.done() and _lost(future)]
-            self.waiting |= dict(self.running.pop(future) for future in gone)
+            ended = [call for call in self.running if call.done()]
+            lost = [call for call in ended if call.cancelled() or call.exception() is not None]
+            self.waiting |= dict(self.running.pop(call) for call in lost)
             return
         raise WorkerError(
             f"workers ended {self.failures} times without an answer ({_said(error)}); give another "
-            f"executor, or fewer workers where memory is short; a script starts under {_GUARD}"
+            "executor, or fewer workers where memory is short; a script starts under "
+            'if __name__ == "__main__":'
         ) from error
 
 
@@ -516,17 +474,8 @@ def _attempt(function: Callable[[_Task], _Result], task: _Task) -> tuple[bool, _
         return False, error
 
 
-def _lost(future: Future[Any]) -> bool:
-    """Return whether a call that ended did so without an answer."""
-    return future.cancelled() or future.exception() is not None
-
-
-def _unknown(task: object) -> None:
-    """Know no result."""
-
-
 def _nothing(*arguments: object) -> None:
-    """Do nothing."""
+    """Do nothing, and know no result."""
 
 
 def _said(error: BaseException) -> str:

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Sized
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
-from typing import Protocol, TypeAlias, TypeVar
+from typing import TypeAlias, TypeVar
 
 _QUIET = 1.0  # s after which a computation says how far it is
 _PAUSE = 0.2  # s between two lines of that
 
 Tell: TypeAlias = Callable[[object], object]  # told in words, or a `Stage`, how far something is
-_Item_co = TypeVar("_Item_co", covariant=True)
-
-
-class _SizedIterable(Sized, Iterable[_Item_co], Protocol[_Item_co]):
-    """Anything with a length whose items come one after the other."""
+_Item = TypeVar("_Item")
 
 
 @dataclass(frozen=True)
@@ -67,7 +63,7 @@ class Progress:
         self._done = 0.0
 
     def add(self, work: float) -> None:
-        """Say that some work is done. ``work``: in the unit of the total."""
+        """Say that some work is done, in the unit of the total."""
         self._done += work
         now = time.perf_counter()
         if self._tell is None or now - self._start < _QUIET or now - self._told < _PAUSE:
@@ -78,13 +74,8 @@ class Progress:
         self._tell(Stage(self._what, share, left))
 
 
-def with_progress(
-    what: str, items: _SizedIterable[_Item_co], tell: Tell | None
-) -> Iterator[_Item_co]:
-    """Yield items one after the other, and tell how far that is.
-
-    ``what``: what is done with the items, in a few words; ``tell``: told a `Stage` before the work
-    on each item.
+def with_progress(what: str, items: Collection[_Item], tell: Tell | None) -> Iterator[_Item]:
+    """Yield items one after the other, and tell a `Stage` before the work on each.
 
     Examples
     --------
@@ -115,11 +106,9 @@ def within(tell: Tell, seconds: float) -> Tell:
     start = time.perf_counter()
 
     def timed(told: object) -> None:
-        if isinstance(told, Stage):
-            tell(told)
-            return
         took = time.perf_counter() - start
-        tell(Stage(str(told), min(took / seconds, 1.0), max(seconds - took, 0.0)))
+        share, left = min(took / seconds, 1.0), max(seconds - took, 0.0)
+        tell(told if isinstance(told, Stage) else Stage(str(told), share, left))
 
     return timed
 

@@ -15,9 +15,9 @@ from seqopt.engines.rigid import compliance as trial
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid._operator import OperatorBuilder
-from seqopt.engines.rigid._refinement import Corrector
+from seqopt.engines.rigid._refinement import _Corrector
 from seqopt.engines.rigid._response_maps import loads_of
-from seqopt.engines.rigid.compliance import _CANCEL, _EVEN, ComplianceEngine, _solve_batch, cancels
+from seqopt.engines.rigid.compliance import _CANCEL, _EVEN, ComplianceEngine, _cancels, _solve_batch
 from seqopt.network.build import build_network
 from tests.builders import from_both_sides, six_bricks, small_arch
 from tests.limit_scenes import LOOSE_AT, chain, loosened
@@ -81,7 +81,7 @@ def test_who_looks_for_what_cancels(monkeypatch, scene, kind, share, uneven):
     """Only what has a joint that is far softer or stiffer than others, from where it acts on."""
     looked = []
     monkeypatch.setattr(
-        trial, "cancels", lambda *seen: looked.append(len(seen[0].axis)) or cancels(*seen)
+        trial, "_cancels", lambda *seen: looked.append(len(seen[0].axis)) or _cancels(*seen)
     )
     joint = scene.joints[2]
     engine = ComplianceEngine(build_network(evenly(scene, 2, kind, share)))
@@ -117,8 +117,8 @@ def test_motions_cancel_where_their_parts_are_ten_times_what_is_left(
             dead_displacement=size * dead,
             answer=lambda _, rows, pull: loads_of(rows, pull, 7).sum(motion),
         )
-        assert cancels(own, index, force)[row] == seen
-    assert cancels(own, np.zeros((3, 0), int), np.zeros((3, 0))).tolist() == [False] * 3
+        assert _cancels(own, index, force)[row] == seen
+    assert _cancels(own, np.zeros((3, 0), int), np.zeros((3, 0))).tolist() == [False] * 3
 
 
 def test_what_was_corrected_before_for_other_bricks_is_no_help():
@@ -167,12 +167,12 @@ def test_what_is_only_compared_is_corrected_once_and_right_to_six_digits(monkeyp
     """Grips close to the tip of a long chain, against the refined mixed system."""
     bricks, made = 120, []
 
-    class Counted(Corrector):
+    class Counted(_Corrector):
         def _correction(self, *arguments):
             made.append(len(arguments[0]))
             return super()._correction(*arguments)
 
-    monkeypatch.setattr("seqopt.engines.rigid._refinement.Corrector", Counted)
+    monkeypatch.setattr("seqopt.engines.rigid._refinement._Corrector", Counted)
     net = build_network(chain(bricks))
     nodes = np.array([brick.nodes for brick in net.scene.placed])
     pairs = [(i, j) for i in (1, 2, 3) for j in (4, 6, 9)]

@@ -16,7 +16,7 @@ from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._refinement import Refinement
-from seqopt.engines.rigid.compliance import ComplianceEngine, Kept, _solve_batch
+from seqopt.engines.rigid.compliance import ComplianceEngine, _Kept, _solve_batch
 from seqopt.network.build import build_network
 from tests.strategies import arches, both_sided, walls
 
@@ -170,7 +170,7 @@ def test_a_screen_is_not_corrected_where_six_digits_are_enough(monkeypatch):
 def kept_bytes(net, most=compliance._KEPT):
     """The bytes of all arrays after every brick count was asked for grips at all its nodes."""
     engine = ComplianceEngine(net)
-    engine._kept = Kept(most)
+    engine._kept = _Kept(most)
     for bricks in range(1, len(net.inner) + 1):
         known, index = net.index_of_grip
         engine.solve(bricks, known[index < 2 * bricks][:, None], Want.EDGES)

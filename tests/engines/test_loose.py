@@ -15,12 +15,12 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.rigid import _refinement as refinement
 from seqopt.engines.rigid import compliance
-from seqopt.engines.rigid._grip_equations import solve_positive
+from seqopt.engines.rigid._grip_equations import _solve_positive
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mechanism import require_resistance, ungripped_system
 from seqopt.engines.rigid._mixed import solve_dense, solve_mixed
 from seqopt.engines.rigid._operator import OperatorBuilder
-from seqopt.engines.rigid._refinement import Corrector, Refinement, held_operator, hold_loose
+from seqopt.engines.rigid._refinement import Refinement, _Corrector, _held_operator, _hold_loose
 from seqopt.engines.rigid.compliance import ComplianceEngine, _solve_batch
 from seqopt.errors import MechanismError, SolverError
 from seqopt.graph.layers.layers import candidate_layers
@@ -82,7 +82,7 @@ def test_an_arch_with_a_torsion_free_joint_is_posed_together(arch25, together):
 def test_loose_motions_are_counted(arch25, bricks, loose):
     """A closed arch resists even at a joint that does not."""
     net = build_network(torsion_free(arch25, TWISTED))
-    assert hold_loose(ungripped_system(net, bricks)).loose == loose
+    assert _hold_loose(ungripped_system(net, bricks)).loose == loose
 
 
 @pytest.mark.parametrize("bricks", [14, 20, 25])
@@ -165,8 +165,8 @@ def test_a_wall_with_loose_joints():
 
 def test_the_operator_of_a_loose_structure_is_symmetric(arch25):
     """Reciprocity: what a force moves at a loose motion, the motion moves at the force."""
-    system = hold_loose(ungripped_system(build_network(hinged(arch25, 3)), 20))
-    operator = held_operator(system)
+    system = _hold_loose(ungripped_system(build_network(hinged(arch25, 3)), 20))
+    operator = _held_operator(system)
     assert operator.loose == system.loose == 3
     matrix = operator.flexibility
     assert np.abs(matrix - matrix.T).max() <= 1e-12 * np.abs(matrix).max()
@@ -182,13 +182,13 @@ def test_a_saddle_among_many_systems():
     matrix[:, 4:, :4], matrix[:, :4, 4:] = reach, reach.transpose(0, 2, 1)
     load = rng.standard_normal((7, 6))
     system = np.concatenate([np.tril(matrix), load[:, None]], axis=1).transpose(1, 2, 0).copy()
-    answer, pivot = solve_positive(system, negative=2)
+    answer, pivot = _solve_positive(system, negative=2)
     expected = np.linalg.solve(matrix, load[..., None])[..., 0]
     assert np.abs(answer.T - expected).max() <= 1e-9 * np.abs(expected).max()
     assert (pivot > 0).all()
     matrix[0, 4:, :4] = 0.0  # nothing holds these motions
     system = np.concatenate([np.tril(matrix), load[:, None]], axis=1).transpose(1, 2, 0).copy()
-    _, pivot = solve_positive(system, negative=2)
+    _, pivot = _solve_positive(system, negative=2)
     assert not pivot[:, 0].min() > 0
     assert (pivot[:, 1:] > 0).all()
 
@@ -216,7 +216,7 @@ def test_the_first_correction_is_the_error(arch25):
     """Spoiled by a millionth, an answer is off by that much less in the next step."""
     net = build_network(arch25)
     operator = OperatorBuilder(net, grow_tree(net)).operator(20)
-    better = Corrector(Refinement(net, 20), operator)
+    better = _Corrector(Refinement(net, 20), operator)
     index = operator.load_index(columns := grip_columns(net, 20, [[7, 20, 33]]))
     right = refinement.grip_forces(operator, columns, index).force
     wrong = right * (1 + 1e-6)

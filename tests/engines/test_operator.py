@@ -11,7 +11,7 @@ from experiments.harness.scenes import running_bond
 from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.interface import _NAMES, FLAGS, SPACE, Want, grip_columns
 from seqopt.engines.rigid._grip_equations import (
-    doubts,
+    _doubts,
     grip_forces,
     share_pairs,
     still_forces,
@@ -21,7 +21,7 @@ from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mechanism import ungripped_system
 from seqopt.engines.rigid._mixed import solve_dense
 from seqopt.engines.rigid._operator import OperatorBuilder
-from seqopt.engines.rigid._refinement import held_operator, hold_loose
+from seqopt.engines.rigid._refinement import _held_operator, _hold_loose
 from seqopt.engines.rigid._response_maps import _GATHERED, loads_of
 from seqopt.engines.rigid.compliance import ComplianceEngine, _solve_batch
 from seqopt.network.build import build_network
@@ -200,7 +200,7 @@ def eliminated(matrix):
 def test_loose_motions_are_unknowns_of_the_grips(loosen, loose, grips):
     """They move until nothing pulls at them; pivots are measured by what they stand on."""
     net = build_network(loosen(six_bricks(), 2))
-    operator = held_operator(hold_loose(ungripped_system(net, 5)))
+    operator = _held_operator(_hold_loose(ungripped_system(net, 5)))
     assert operator.loose == loose
     columns = np.array([grips])
     index = operator.load_index(columns)
@@ -244,7 +244,7 @@ def test_what_rounding_may_change_grips_forces_by(grips):
         for i in range(len(own))
     ]
     doubt = (sums / left).max() / size.max()
-    assert doubts(operator, index, found) == pytest.approx([doubt], rel=1e-9)
+    assert _doubts(operator, index, found) == pytest.approx([doubt], rel=1e-9)
     assert found.lowest == pytest.approx([(left / own).min()], rel=1e-9)
     assert doubt <= len(own) * operator.worst_doubt / found.lowest[0]
     every = operator.flexibility.diagonal()
@@ -279,7 +279,7 @@ def test_answers_do_not_depend_on_how_they_are_summed(monkeypatch, name, grips):
 
 def test_answers_beside_loose_motions_do_not_depend_on_it_either(monkeypatch):
     net = build_network(torsion_free(six_bricks(), 2))
-    operator = held_operator(hold_loose(ungripped_system(net, 5)))
+    operator = _held_operator(_hold_loose(ungripped_system(net, 5)))
     columns = np.array([(2, 7, 9), (3, 8, 6)])
     index = operator.load_index(columns)
     force = np.random.default_rng(0).normal(size=index.shape)

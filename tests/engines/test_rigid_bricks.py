@@ -9,7 +9,7 @@ import pytest
 
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid import compliance as trial
-from seqopt.engines.rigid._grip_equations import solve_positive
+from seqopt.engines.rigid._grip_equations import _solve_positive
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid.compliance import ComplianceEngine, _solve_batch
@@ -59,7 +59,7 @@ def test_many_small_systems(count):
     root = rng.standard_normal((7, count, count))
     matrix, load = root @ root.transpose(0, 2, 1), rng.standard_normal((7, count))
     system = np.concatenate([np.tril(matrix), load[:, None]], axis=1).transpose(1, 2, 0).copy()
-    answer, pivot = solve_positive(system)
+    answer, pivot = _solve_positive(system)
     expected = np.linalg.solve(matrix, load[..., None])[..., 0]
     assert np.abs(answer.T - expected).max() <= 1e-9 * np.abs(expected).max()
     diagonals = np.linalg.cholesky(matrix).diagonal(axis1=1, axis2=2) ** 2
@@ -74,7 +74,7 @@ def test_a_system_that_is_not_positive_is_seen(last):
     system[:3, :, 0] = [[2, 0, 0], [1, 1, 0], [1, 1, last]]  # positive definite beyond 1
     system[:3, :, 1] = 2 * np.eye(3)
     system[3] = 1.0
-    answer, pivot = solve_positive(system)
+    answer, pivot = _solve_positive(system)
     assert not pivot[:, 0].min() >= 1e-8  # also where it is no number
     assert (pivot[:, 1] == 1).all()
     assert answer[:, 1].tolist() == [0.5, 0.5, 0.5]

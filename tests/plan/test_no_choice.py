@@ -162,8 +162,8 @@ def test_a_registered_formulation_that_is_none_is_named(monkeypatch, thing, said
 
 
 def test_what_does_not_fit_into_memory_is_refused_before(problem, monkeypatch):
-    needed = batches.bytes_of_costs(problem.schedule) / batches._SHARE
-    whole = batches.bytes_of_choices(problem.schedule, problem.evaluation.wanted) / batches._SHARE
+    needed = batches._bytes_of_costs(problem.schedule) / batches._SHARE
+    whole = batches._bytes_of_choices(problem.schedule, problem.evaluation.wanted) / batches._SHARE
     monkeypatch.setattr(batches, "free_memory", lambda: 0.99 * min(needed, whole))
     fresh = replace(problem, evaluation=replace(problem.evaluation))
     with pytest.raises(MemoryShortError, match=r"take about .* GB, .*up to 7 candidates"):
@@ -175,5 +175,5 @@ def test_what_does_not_fit_into_memory_is_refused_before(problem, monkeypatch):
 
 def test_the_estimate_of_memory_is_about_right(problem):
     kept = sum(a.nbytes for s in problem.evaluation.steps for a in s.responses.values())
-    assert 1 < batches.bytes_of_choices(problem.schedule, problem.evaluation.wanted) / kept < 5
+    assert 1 < batches._bytes_of_choices(problem.schedule, problem.evaluation.wanted) / kept < 5
     assert batches.free_memory() > 1e6

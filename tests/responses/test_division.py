@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt.responses._choices import _PREPARED, Portion, in_places, take_turns
+from seqopt.responses._choices import _PREPARED, _in_places, _Portion, _take_turns
 
 
 class Stub:
@@ -18,13 +18,13 @@ class Stub:
 
 
 def portions_of(works):
-    return [Portion((Stub(work),)) for work in works]
+    return [_Portion((Stub(work),)) for work in works]
 
 
 @given(works=st.lists(st.floats(0.0, 1e9), max_size=40), lanes=st.integers(1, 5))
 def test_every_portion_is_taken_once_and_its_answer_comes_in_its_place(works, lanes):
     portions = portions_of(works)
-    places, turns = take_turns(portions, lanes)
+    places, turns = _take_turns(portions, lanes)
     places, turns = [*places], [*turns]
     assert sorted(places) == [*range(len(works))]
     assert all(
@@ -36,12 +36,12 @@ def test_every_portion_is_taken_once_and_its_answer_comes_in_its_place(works, la
     for lane in range(lanes):
         mine = [place for place, turn in zip(places, turns, strict=True) if turn.lane == lane]
         assert mine == sorted(mine)
-    assert [*in_places(places, places)] == [*range(len(works))]
+    assert [*_in_places(places, places)] == [*range(len(works))]
 
 
 @pytest.mark.parametrize("lanes", [2, 3, 4])
 def test_lanes_end_together_where_each_prepares_what_comes_before_it(lanes):
-    _, turns = take_turns(portions_of([1.0] * 2000), lanes)
+    _, turns = _take_turns(portions_of([1.0] * 2000), lanes)
     own = np.bincount([turn.lane for turn in turns]) / 2000
     takes = own + _PREPARED * np.cumsum(own)
     assert takes == pytest.approx(takes[0], rel=0.01)
@@ -56,7 +56,7 @@ def test_an_answer_waits_for_those_before_it():
             asked.append(place)
             yield f"answer {place}"
 
-    answers = in_places((0, 2, 1, 3), results())
+    answers = _in_places((0, 2, 1, 3), results())
     assert [next(answers), asked] == ["answer 0", [0]]
     assert [next(answers), asked] == ["answer 1", [0, 2, 1]]
     assert [next(answers), asked] == ["answer 2", [0, 2, 1]]

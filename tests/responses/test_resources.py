@@ -27,7 +27,7 @@ from seqopt.responses.resources import Resources
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import CRITERIA, EQUATIONS
-from seqopt.work._workers import Processes
+from seqopt.work._workers import _Processes
 
 
 def everything(_):
@@ -79,7 +79,7 @@ def test_what_states_of_a_brick_count_share_is_prepared_once(loop25, portions, m
     groups = [batches.batch_of(single, steps, everything) for level in levels for steps in level]
     every = [block for group in groups for block in group.blocks()]
     total = sum(block.work for block in every)
-    shared = [*division.share_out(every, None, total, Processes(2))]
+    shared = [*division._share_out(every, None, total, _Processes(2))]
     assert [block for portion in shared for block in portion.blocks] == every
     assert portions / 2 < len(shared) <= 2 * portions
     if portions == 3:
@@ -87,7 +87,7 @@ def test_what_states_of_a_brick_count_share_is_prepared_once(loop25, portions, m
         assert all(a.isdisjoint(b) for a, b in itertools.pairwise(counts))
     most = division._SEVERAL * total / (2 * portions) + max(block.work for block in every)
     assert all(portion.work <= most for portion in shared)
-    alone = [*division.share_out(every, None, total, None)]
+    alone = [*division._share_out(every, None, total, None)]
     assert [len(portion.blocks) for portion in alone] == [1] * len(every)
 
 
@@ -219,7 +219,7 @@ def test_costs_are_the_same_where_responses_are_not_kept(engine25, loop25, crite
     """Where there is memory for costs alone, responses come and go; nothing else changes."""
     problem = candidate_layers(engine25, loop25, CRITERIA[criterion])
     asked = problem.evaluation.wanted
-    costs, whole = batches.bytes_of_costs(loop25), batches.bytes_of_choices(loop25, asked)
+    costs, whole = batches._bytes_of_costs(loop25), batches._bytes_of_choices(loop25, asked)
     assert costs < whole
     few = Resources(max_memory=whole - 1)
     streamed = candidate_layers(engine25, loop25, CRITERIA[criterion], resources=few)
@@ -241,7 +241,7 @@ def test_alternatives_are_those_that_go_with_the_choice_where_responses_are_not_
     engine25, loop25
 ):
     whole = candidate_layers(engine25, loop25, EQUATIONS)
-    kept = batches.bytes_of_choices(loop25, whole.evaluation.wanted)
+    kept = batches._bytes_of_choices(loop25, whole.evaluation.wanted)
     few = candidate_layers(engine25, loop25, EQUATIONS, resources=Resources(max_memory=kept - 1))
     every, some = (solve(p, "cascade").alternatives() for p in (whole, few))
     assert 0 < len(some) < len(every)

@@ -14,9 +14,9 @@ from seqopt.contact.mortar import DRY
 from seqopt.errors import GripError, SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.parts import Robot
-from seqopt.stability._held_states import Known
+from seqopt.stability._held_states import _Known
 from seqopt.stability._margins import Margins
-from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen, decided, held_places, lacking
+from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen, _decided, _lacking, held_places
 from seqopt.stability.limit_analysis import CAP, EXACT, Claim, bound, violation
 from tests.builders import held, small_arch
 
@@ -144,14 +144,14 @@ def test_a_motion_rules_out_every_set_that_it_leaves_at_rest(arch25):
 def test_motions_and_forces_prove_what_the_certificates_checks_say(arch25):
     """The batch formulas against `bound` and `violation`, which look at one assembly."""
     network = build_network(arch25)
-    states = lacking(Screen(network, DRY)._level((5, 8, True))[0].assembly, DRY, compile_held)
+    states = _lacking(Screen(network, DRY)._level((5, 8, True))[0].assembly, DRY, compile_held)
     assembly, case = states.assembly, states._case
     for grips in ([1, 9], [5, 9], [2, 8]):
         payload = np.zeros(10)
         payload[grips] = 392.4
         own = replace(assembly, payload=payload)
         answer = compile_held(assembly, case)(payload, lambda _: False)
-        new = Known(assembly, case).learn(answer, payload)
+        new = _Known(assembly, case).learn(answer, payload)
         low, high = new.bracket(np.array([grips]), np.array([[392.4, 392.4]]))[0]
         assert violation(own, case, answer) < 1e-8
         assert high == max(answer.value, 0.0)
@@ -196,6 +196,6 @@ def test_wrong_questions_get_a_line(arch25):
 def test_an_assembly_of_no_scene_can_be_asked():
     """The question itself needs blocks, contacts and grips, and nothing else."""
     leaning = held(stack([0.6]).assembly(2000.0), 1e5, (1.6, 0.5, 1.5))
-    states = lacking(leaning, DRY, compile_held)
-    bracket = states.bracket(np.array([[0], [1]]), np.array([[1e5], [0.0]]), decided)
+    states = _lacking(leaning, DRY, compile_held)
+    bracket = states.bracket(np.array([[0], [1]]), np.array([[1e5], [0.0]]), _decided)
     assert bracket[0, 1] < 1e-6 < bracket[1, 0]

@@ -13,9 +13,9 @@ from formulations.contact.held_equilibrium import compile_held
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.scene.parts import Robot
 from seqopt.stability._held_states import HeldStates
-from seqopt.stability._margins import Margins, narrow
+from seqopt.stability._margins import Margins, _narrow
 from seqopt.stability._prover import sideways
-from seqopt.stability._screens import STANDS, Screen, decided, lacking
+from seqopt.stability._screens import STANDS, Screen, _decided, _lacking
 from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import EXACT
 from tests.builders import block, held
@@ -26,7 +26,7 @@ WEIGHT = 2000.0 * 9.81
 
 def stands(assembly, mortar, places=NOBODY[0], payload=NOBODY[1]):
     """Whether it is proven to stand; an open answer is a failure here."""
-    low, high = lacking(assembly, mortar, compile_held).bracket(places, payload, decided)[0]
+    low, high = _lacking(assembly, mortar, compile_held).bracket(places, payload, _decided)[0]
     assert high <= EXACT or low > EXACT
     return high <= EXACT
 
@@ -56,7 +56,7 @@ def test_the_overhanging_block_needs_a_bond():
     excess, face = 0.1, 0.4
     leaning = stack([0.5 + excess]).assembly(2000.0)
     states = HeldStates(leaning, bonded(leaning, Mortar(friction=DRY.friction)), compile_held)
-    low, high = states.bracket(*NOBODY, narrow)[0] * leaning.stress_scale
+    low, high = states.bracket(*NOBODY, _narrow)[0] * leaning.stress_scale
     exact = WEIGHT * excess / (face * face / 2)
     assert low * (1 - 1e-9) <= exact <= high * (1 + 1e-9)
     assert high - low < 2e-3 * exact
@@ -88,7 +88,7 @@ def test_a_cube_slides_or_tips_when_it_is_tilted():
     for friction, expected in ((0.3, 0.3), (5.0, 1.0)):
         fixed = replace(bonded(cube, Mortar(friction=friction)), tension=(0, 0), cohesion=(0, 0))
         for case in sideways(fixed, (0.0, 0.0, 1.0))[::2]:
-            low, high = HeldStates(cube, case, compile_held).bracket(*NOBODY, narrow)[0]
+            low, high = HeldStates(cube, case, compile_held).bracket(*NOBODY, _narrow)[0]
             assert low <= expected * (1 + 1e-9)
             assert expected <= high * (1 + 1e-9)
             assert high - low < 2e-3

@@ -17,7 +17,7 @@ import pytest
 
 from seqopt.errors import SolverError, WorkerError
 from seqopt.work import Progress, hire, map_ordered
-from seqopt.work._workers import Processes
+from seqopt.work._workers import _Processes
 from tests.builders import ROOT
 
 
@@ -158,7 +158,7 @@ def test_a_run_that_is_ended_leaves_no_error_behind(monkeypatch, cancels):
     seen = []
     monkeypatch.setattr(threading, "excepthook", lambda seen_: seen.append(seen_.exc_type))
     if cancels:
-        monkeypatch.setattr(Processes, "drop", lambda self, calls: [c.cancel() for c in calls])
+        monkeypatch.setattr(_Processes, "drop", lambda self, calls: [c.cancel() for c in calls])
     with hire(workers=2) as crew:
         calls = [crew.submit(time.sleep, seconds) for seconds in (0.0, *[30.0] * 20)]
         calls[0].result()

@@ -31,28 +31,17 @@ class Held(FrozenValue):
     free: sparse.csr_array  # (6n, m); motions that the grips leave
     pads: sparse.csr_array  # (6n, 6n); stiffness of grips that give way
 
-    def left(self, motion: Floats, force: Floats, load: Floats) -> Floats:
-        """Return what is not balanced in the free motions.
-
-        ``motion``, ``force``, ``load``: as of `reaction`. Result (m,): N.
-        """
-        return np.asarray(self.free.T @ self.reaction(motion, force, load))
-
     def reaction(self, motion: Floats, force: Floats, load: Floats) -> Floats:
-        """Return what is not balanced on the bodies: what the grips must take.
+        """Return what is not balanced on the bodies (6n,): what the grips must take.
 
         ``motion`` (m,): in the free motions; ``force`` (P, 3): of the points, N; ``load`` (6n,).
-        Result (6n,).
         """
         system = self.system
         carried = system.gap.T @ system.bed_wrenches(force).ravel()
         return np.asarray(load + carried - (system.layers + self.pads) @ (self.free @ motion))
 
     def rounding(self, motion: Floats, force: Floats) -> float:
-        """Return what rounding leaves of a balance between large forces.
-
-        ``motion`` (m,); ``force`` (P, 3): N. Result: N.
-        """
+        """Return what rounding leaves of a balance between large forces, N."""
         moved = np.abs(self.free @ motion)
         return _ROUNDING * float((self._sizes @ moved).max() + np.abs(force).sum())
 
@@ -92,10 +81,9 @@ class Settled(FrozenValue):
     @classmethod
     def start(cls, held: Held, *, broken: bool) -> Settled:
         """Return the state without load. ``broken``: whether all bonds are lost at once."""
-        points = len(held.system.points.area)
-        none = np.zeros((points, 3))
+        none = np.zeros((len(held.system.points.area), 3))
         motion = np.zeros(held.free.shape[1])
-        return cls(motion, none, none[:, 1:], np.full(points, broken), np.inf)
+        return cls(motion, none, none[:, 1:], np.full(len(none), broken), np.inf)
 
     @property
     def rests(self) -> bool:
@@ -107,20 +95,14 @@ def settle(held: Held) -> Settled:
     """Return where a structure comes to rest within all limits, or as far as it was followed.
 
     Where no bond breaks under the whole load at once, none would on the way to it: the limits are
-    convex. Otherwise the load grows in steps, and a bond once broken stays so.
-
-    Result: an equilibrium if it rests.
+    convex. Otherwise the load grows in steps, which shrink where none is found, and a bond once
+    broken stays so.
     """
     points = held.system.points
     dry = points.mortar.tensile_strength == 0 and points.mortar.cohesion == 0
     state = _balance(held, Settled.start(held, broken=dry), 1.0)
     if dry or (state.rests and not points.exceeds(state.force).any()):
         return state
-    return _in_steps(held)
-
-
-def _in_steps(held: Held) -> Settled:
-    """Return the state under the whole load, reached in steps that shrink where none is found."""
     state, at, step = Settled.start(held, broken=False), 0.0, LARGEST_STEP
     while at < 1.0:
         target = min(at + step, 1.0)
@@ -172,7 +154,7 @@ def _newton(held: Held, state: Settled, share: float, resistance: float) -> Sett
     for _ in range(_ITERATIONS):
         opening = system.openings(held.free @ motion)
         force, slope = system.points.forces(opening, state.slip, state.broken)
-        left = held.left(motion, force, share * system.load)
+        left = held.free.T @ held.reaction(motion, force, share * system.load)
         missing = left - resistance * held.diagonal * (motion - state.motion)
         size = np.linalg.norm(missing)
         unit = max(system.scale, held.rounding(motion, force) / _BALANCED)

@@ -17,7 +17,6 @@ from scipy import linalg, sparse
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.contact._elastic_limits import Quadrature, face_quadrature, first_points, opening_maps
 from seqopt.contact._elastic_limits import quadrature_stiffness as bed_stiffness
-from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import Mortar
 from seqopt.errors import SceneError
@@ -40,31 +39,16 @@ class _Points(FrozenValue):
     mortar: Mortar
     stress_scale: float
 
-    def trial(self, opening: Floats, slip: Floats) -> Floats:
-        """Return the forces of unbroken springs that have slipped.
-
-        ``opening`` (P, 3); ``slip`` (P, 2). Result (P, 3): compression first, N.
-        """
-        stiffness = np.stack([self.normal, self.tangential, self.tangential], axis=1)
-        force = -stiffness * opening
-        force[:, 1:] += self.tangential[:, None] * slip
-        return force
-
     def slipped(self, opening: Floats, force: Floats) -> Floats:
-        """Return the slip that is left when points carry forces.
-
-        ``opening`` (P, 3); ``force`` (P, 3): N. Result (P, 2): m.
-        """
+        """Return the slip (P, 2) that is left when points carry forces (P, 3)."""
         return np.asarray(opening[:, 1:] + force[:, 1:] / self.tangential[:, None])
 
     def exceeds(self, force: Floats) -> Bools:
-        """Return at which points bonds do not hold forces. ``force`` (P, 3): N. Result (P,)."""
+        """Return at which points (P,) bonds do not hold forces (P, 3)."""
         mortar, margin = self.mortar, _EXCESS * self.stress_scale
         normal, shear = force[:, 0] / self.area, np.linalg.norm(force[:, 1:], axis=1) / self.area
-        return np.asarray(
-            (-normal > mortar.tensile_strength + margin)
-            | (shear > mortar.cohesion + mortar.friction * normal + margin)
-        )
+        slides = shear > mortar.cohesion + mortar.friction * normal + margin
+        return np.asarray((-normal > mortar.tensile_strength + margin) | slides)
 
     def forces(self, opening: Floats, slip: Floats, broken: Bools) -> tuple[Floats, Floats]:
         """Return forces on the second bodies, and how fast they fall.
@@ -72,18 +56,17 @@ class _Points(FrozenValue):
         ``opening`` (P, 3); ``slip`` (P, 2); ``broken`` (P,): where the bond is lost. Results:
         ``force`` (P, 3): N; ``slope`` (P, 3, 3): minus its derivative by the opening, N/m.
         """
-        force = self.trial(opening, slip)
-        slope = np.zeros((len(force), 3, 3))
+        slope = np.zeros((len(opening), 3, 3))
         slope[:, 0, 0] = self.normal
         slope[:, 1, 1] = slope[:, 2, 2] = self.tangential
+        force = -np.diagonal(slope, axis1=1, axis2=2) * opening  # of unbroken springs, slipped
+        force[:, 1:] += self.tangential[:, None] * slip
         size = np.linalg.norm(force[:, 1:], axis=1)
         limit = self.mortar.friction * np.maximum(force[:, 0], 0.0)
         slips = np.flatnonzero(broken & (size > limit))
         along = force[slips, 1:] / size[slips, None]
-        share = limit[slips] / size[slips] * self.tangential[slips]
-        slope[slips, 1:, 1:] = share[:, None, None] * (
-            np.eye(2) - along[:, :, None] * along[:, None, :]
-        )
+        share = (limit[slips] / size[slips] * self.tangential[slips])[:, None, None]
+        slope[slips, 1:, 1:] = share * (np.eye(2) - along[:, :, None] * along[:, None, :])
         slope[slips, 1:, 0] = self.mortar.friction * self.normal[slips, None] * along
         force[slips, 1:] = limit[slips, None] * along
         apart = broken & (force[:, 0] <= 0)
@@ -129,28 +112,21 @@ class System(FrozenValue):
     length: float  # of a brick, m
 
     def bed_wrenches(self, force: Floats) -> Floats:
-        """Return the wrenches of point forces on second bodies, about the springs.
-
-        ``force`` (P, 3): N. Result (J, 6): N and N m.
-        """
+        """Return the wrenches (J, 6) of point forces (P, 3) on second bodies, about the springs."""
         each = np.einsum("pij,pi->pj", self.maps, force)
         return np.asarray(np.add.reduceat(each, self._starts, axis=0))
 
     def stiffness(self, slope: Floats) -> sparse.csr_array:
-        """Return the stiffness of layers and beds.
+        """Return the stiffness of layers and beds for twists over ``unit``, (6n, 6n).
 
-        ``slope`` (P, 3, 3): how fast the forces of the points fall, from `Points.forces`, N/m.
-        Result (6n, 6n): for twists over ``unit``.
+        ``slope`` (P, 3, 3): how fast the forces of the points fall, N/m.
         """
         each = self.maps.transpose(0, 2, 1) @ slope @ self.maps
         joints = _diagonal(np.add.reduceat(each, self._starts, axis=0))
         return sparse.csr_array(self.gap.T @ joints @ self.gap + self.layers)
 
     def openings(self, twist: Floats) -> Floats:
-        """Return the openings of the points for twists of the bodies.
-
-        ``twist`` (6n,): over ``unit``. Result (P, 3): m.
-        """
+        """Return the openings (P, 3) of the points for twists (6n,) of the bodies."""
         across = (self.gap @ twist).reshape(-1, 6)
         return np.asarray(np.einsum("pij,pj->pi", self.maps, across[self.face]))
 
@@ -171,29 +147,25 @@ def build_system(network: Network, bricks: int, mortar: Mortar, bed: BedStiffnes
     layers are as stiff as the scene says. Raises `SceneError` if the faces of a joint do not
     overlap.
     """
-    assembly = bare_assembly(network, bricks)
-    acting = network.springs.acting(bricks)
-    points = face_quadrature(assembly)
-    maps = opening_maps(assembly, points.point, points.face, network.springs.position[acting])
-    stiffness = spring_stiffness(network, acting)
-    moduli = _moduli(bed, stiffness, points, maps)
+    assembly, acting = bare_assembly(network, bricks), network.springs.acting(bricks)
+    bed_points = face_quadrature(assembly)
+    face, area = bed_points.face, bed_points.area
+    maps = opening_maps(assembly, bed_points.point, face, network.springs.position[acting])
     own = None
     if bed is None:
-        own = _without(stiffness, bed_stiffness(points, maps, moduli))
+        stiffness = spring_stiffness(network, acting)
+        moduli = _moduli(stiffness, bed_points, maps)
+        own = _without(stiffness, bed_stiffness(bed_points, maps, moduli))
+    else:
+        moduli = np.tile([bed.normal, bed.tangential], (len(acting), 1))
     length = max(network.scene.placed[0].dimensions)
     gap, layers, unit = _joined(network, bricks, length, own)
-    return System(
-        bricks=bricks,
-        acting=acting,
-        points=_points(points, moduli, mortar, assembly),
-        face=points.face,
-        maps=maps,
-        gap=gap,
-        layers=layers,
-        load=_load(network, bricks, unit),
-        unit=unit,
-        length=length,
-    )
+    # plates weigh nothing
+    load = np.pad(network.weight[:bricks], ((0, len(unit) // 6 - bricks), (0, 3)))
+    normal, tangential = (area * moduli[face, i] for i in (0, 1))
+    points = _Points(area, normal, tangential, mortar, assembly.stress_scale)
+    pull = load.ravel() * unit
+    return System(bricks, acting, points, face, maps, gap, layers, pull, unit, length)
 
 
 def _joined(
@@ -218,34 +190,12 @@ def _joined(
     return gap, sparse.csr_array(layer.T @ _diagonal(own) @ layer), unit
 
 
-def _load(network: Network, bricks: int, unit: Floats) -> Floats:
-    """Return the weight of the bricks as wrenches (6n,) times their unit; plates weigh nothing."""
-    load = np.zeros((len(unit) // 6, 6))
-    load[:bricks, :3] = network.weight[:bricks]
-    return load.ravel() * unit
-
-
-def _moduli(
-    bed: BedStiffness | None, stiffness: Floats, points: Quadrature, maps: Floats
-) -> Floats:
-    """Return the moduli (J, 2) of given beds, or of some stiffer than their joints every way."""
-    if bed is not None:
-        return np.tile([bed.normal, bed.tangential], (len(stiffness), 1))
+def _moduli(stiffness: Floats, points: Quadrature, maps: Floats) -> Floats:
+    """Return the moduli (J, 2) of beds that are stiffer than their joints (J, 6, 6) every way."""
     even = np.ones((len(stiffness), 2))
-    return even * (
-        _BED_OVER_JOINT * _relative_stiffness(stiffness, bed_stiffness(points, maps, even))
-    )
-
-
-def _points(points: Quadrature, moduli: Floats, mortar: Mortar, assembly: Assembly) -> _Points:
-    normal, tangential = (points.area * moduli[points.face, i] for i in (0, 1))
-    return _Points(points.area, normal, tangential, mortar, assembly.stress_scale)
-
-
-def _relative_stiffness(stiffness: Floats, bed: Floats) -> Floats:
-    """Return how much stiffer a joint is than a bed (J, 6, 6 both) where most so, (J, 1)."""
-    most = [linalg.eigh(k, b, eigvals_only=True)[-1] for k, b in zip(stiffness, bed, strict=True)]
-    return np.array(most)[:, None]
+    beds = bed_stiffness(points, maps, even)
+    most = [linalg.eigh(k, b, eigvals_only=True)[-1] for k, b in zip(stiffness, beds, strict=True)]
+    return even * (_BED_OVER_JOINT * np.array(most)[:, None])
 
 
 def _without(stiffness: Floats, bed: Floats) -> Floats:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,7 +39,6 @@ from seqopt.engines.rigid._mechanism import mechanism_error, require_resistance
 from seqopt.engines.rigid._mixed import Solution, respond
 from seqopt.errors import SeqoptError, SolverError
 from seqopt.network._mechanics import build_statics, node_motion, point_motion
-from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 
@@ -63,27 +63,18 @@ class Pinch:
 
 
 def _pad_stiffness(network: Network, index: int, node: Floats, pinch: Pinch) -> Floats:
-    """Return the stiffness with which two pads beside a node hold a brick's twists.
-
-    ``index``: of the brick in build order; ``node`` (3,). Result (6, 6): N/m and N m/rad.
-    """
+    """Return the stiffness (6, 6) with which two pads beside a node hold a brick's twists."""
     brick = network.scene.placed[index]
-    axes = brick.frame
-    out = axes[pinch.across]
-    sides = np.delete(axes, pinch.across, axis=0)
+    out, sides = brick.frame[pinch.across], np.delete(brick.frame, pinch.across, axis=0)
     moduli = pinch.stiffness.tangential * np.eye(3)
     moduli += (pinch.stiffness.normal - pinch.stiffness.tangential) * np.outer(out, out)
     total = np.zeros((6, 6))
     reach = pinch.side / np.sqrt(12)  # four points here have a square's second moments
-    for sign in (-0.5, 0.5):
-        for a, b in ((-reach, -reach), (-reach, reach), (reach, -reach), (reach, reach)):
-            point = node + sign * brick.dimensions[pinch.across] * out + a * sides[0] + b * sides[1]
-            moved = point_motion(point - network.centroid[index])
-            total += pinch.side**2 / 4 * moved.T @ moduli @ moved
+    for sign, a, b in product((-0.5, 0.5), (-reach, reach), (-reach, reach)):
+        point = node + sign * brick.dimensions[pinch.across] * out + a * sides[0] + b * sides[1]
+        moved = point_motion(point - network.centroid[index])
+        total += pinch.side**2 / 4 * moved.T @ moduli @ moved
     return total
-
-
-_GONE = "joints open or slip and brick {brick} becomes unstable; add a grip, a bond or friction"
 
 
 class DiscreteEngine(NamedEngine):
@@ -101,24 +92,18 @@ class DiscreteEngine(NamedEngine):
         bed: BedStiffness | None = None,
         pinch: Pinch | None = None,
     ) -> None:
-        self._network, self._mortar = network_of(network), mortar
-        self._bed, self._pinch = bed, pinch
+        super().__init__(network)
+        self._mortar, self._bed, self._pinch = mortar, bed, pinch
         self._systems: dict[int, System] = {}
-
-    @property
-    def network(self) -> Network:
-        """The network whose nodes and edges the fields follow."""
-        return self._network
 
     @failing_in_a_line
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
-        """Return the fields of a partial structure for many grip sets.
+        """Return the fields of a partial structure for grip sets (S, r).
 
         All fields are evaluated whatever is asked: finding the equilibrium dominates the cost.
-
-        ``grips`` (S, r): node numbers. Raises `MechanismError`: also if the structure moves a tenth
-        of a brick's length and is not stopped by then; `SolverError`: also if it neither comes to
-        rest nor goes; `SceneError` if the faces of a joint do not overlap.
+        Raises `MechanismError`: also if the structure moves a tenth of a brick's length and is not
+        stopped by then; `SolverError`: also if it neither comes to rest nor goes; `SceneError` if
+        the faces of a joint do not overlap.
         """
         network = self._network
         columns = grip_columns(network, bricks, grips)
@@ -132,14 +117,15 @@ class DiscreteEngine(NamedEngine):
 
     def _solve_one(self, system: System, columns: Ints) -> Fields:
         """Return the fields of one grip set."""
-        network, pinch = self._network, self._pinch
-        nodes = network.node_position[network.inner.ravel()[columns]]
-        held = _held_nodes(network, system, columns, nodes)
-        if pinch is not None:
+        network, pinch, inner = self._network, self._pinch, self._network.inner.ravel()[columns]
+        nodes = network.node_position[inner]
+        if pinch is None:
+            held = _held_nodes(network, system, columns, nodes)
+        else:
             held = _pinched(network, system, columns, nodes, pinch)
         found = settle(held)
         if not found.rests:
-            raise _not_at_rest(network, held, found, network.inner.ravel()[columns])
+            raise _not_at_rest(network, held, found, inner)
         return _fields(network, held, found, columns, nodes)
 
 
@@ -148,7 +134,8 @@ def _not_at_rest(network: Network, held: Held, found: Settled, nodes: Ints) -> S
     system = held.system
     if held.gone(found):
         moved = system.unit * (held.free @ found.motion)
-        return mechanism_error(network, moved[: 6 * system.bricks], _GONE)
+        said = "joints open or slip and brick {brick} becomes unstable; add a grip, a bond or "
+        return mechanism_error(network, moved[: 6 * system.bricks], said + "friction")
     names = ", ".join(str(network.node_name[n]) for n in nodes) or "nothing"
     return SolverError(
         f"{system.bricks} bricks held at {names}: the discrete elements neither came to rest nor "
@@ -157,11 +144,7 @@ def _not_at_rest(network: Network, held: Held, found: Settled, nodes: Ints) -> S
 
 
 def _held_nodes(network: Network, system: System, columns: Ints, nodes: Floats) -> Held:
-    """Return a system whose held nodes stand still.
-
-    ``columns`` (r,): grips as indices into ``network.inner.ravel()``; ``nodes`` (r, 3): where they
-    hold, m.
-    """
+    """Return a system whose held nodes stand still, at (r, 3)."""
     blocks = [np.eye(6)] * (len(system.load) // 6)
     for body in np.unique(columns // 2):
         moved = point_motion(nodes[columns // 2 == body] - network.centroid[body]).reshape(-1, 6)
@@ -171,51 +154,36 @@ def _held_nodes(network: Network, system: System, columns: Ints, nodes: Floats) 
 
 
 def _pinched(network: Network, system: System, columns: Ints, nodes: Floats, pinch: Pinch) -> Held:
-    """Return a system whose held bricks are pinched between pads beside their nodes.
-
-    ``columns`` (r,): grips as indices into ``network.inner.ravel()``; ``nodes`` (r, 3): where they
-    hold, m.
-    """
+    """Return a system whose held bricks are pinched between pads beside their nodes (r, 3)."""
     blocks = [sparse.csr_array((6, 6))] * (len(system.load) // 6)
+    units = np.outer(system.unit[:6], system.unit[:6])
     for body, node in zip(columns // 2, nodes, strict=True):
-        pads = _pad_stiffness(network, body, node, pinch) * np.outer(
-            system.unit[:6], system.unit[:6]
-        )
+        pads = _pad_stiffness(network, body, node, pinch) * units
         blocks[body] = blocks[body] + sparse.csr_array(pads)
     every = sparse.eye_array(len(system.load), format="csr")
     return Held(system, every, sparse.csr_array(sparse.block_diag(blocks, format="csr")))
 
 
 def _fields(network: Network, held: Held, found: Settled, columns: Ints, nodes: Floats) -> Fields:
-    """Return the fields of one grip set."""
-    system = held.system
-    size = 6 * system.bricks
-    moved = held.free @ found.motion
-    wrench = np.zeros((len(network.springs.since), 6))
-    wrench[system.acting] = system.bed_wrenches(found.force)
-    exerted = -held.reaction(found.motion, found.force, system.load) - held.pads @ moved
-    force = _grip_forces(network, system, columns, nodes, exerted)
-    solution = Solution((system.unit * moved)[None, :size], wrench[None], force[None])
-    motion = node_motion(network, system.bricks)
-    return respond(network, build_statics(network), motion, columns[None], solution)
-
-
-def _grip_forces(
-    network: Network, system: System, columns: Ints, nodes: Floats, exerted: Floats
-) -> Floats:
-    """Return the forces (r, 3) of the grips from the wrenches (6n,) they must exert.
+    """Return the fields of one grip set.
 
     Two grips on one brick share so that their forces are as small as can be; what pads exert
     beside a force, a moment, belongs to no node.
     """
-    out = np.zeros((len(columns), 3))
+    system, moved = held.system, held.free @ found.motion
+    wrench = np.zeros((len(network.springs.since), 6))
+    wrench[system.acting] = system.bed_wrenches(found.force)
+    exerted = -held.reaction(found.motion, found.force, system.load) - held.pads @ moved
+    force = np.zeros((len(columns), 3))
     for body in np.unique(columns // 2):
-        mine = np.flatnonzero(columns // 2 == body)
-        maps = point_motion(nodes[mine] - network.centroid[body]).reshape(-1, 6).T
-        rows = slice(6 * body, 6 * body + 6)
+        mine, rows = np.flatnonzero(columns // 2 == body), slice(6 * body, 6 * body + 6)
         if len(mine) == 1:
-            out[mine[0]] = exerted[rows][:3]
+            force[mine[0]] = exerted[rows][:3]
         else:
-            wrench = exerted[rows] / system.unit[rows]
-            out[mine] = np.linalg.lstsq(maps, wrench, rcond=None)[0].reshape(-1, 3)
-    return out
+            maps = point_motion(nodes[mine] - network.centroid[body]).reshape(-1, 6).T
+            pulls = np.linalg.lstsq(maps, exerted[rows] / system.unit[rows], rcond=None)[0]
+            force[mine] = pulls.reshape(-1, 3)
+    twist = (system.unit * moved)[None, : 6 * system.bricks]
+    solution = Solution(twist, wrench[None], force[None])
+    motion, statics = node_motion(network, system.bricks), build_statics(network)
+    return respond(network, statics, motion, columns[None], solution)

@@ -12,20 +12,18 @@ from seqopt.arrays import Bools, Floats, Ints, frozen
 from seqopt.engines.rigid._operator import ComplianceOperator
 
 
-def solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tuple[Floats, Floats]:
+def _solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tuple[Floats, Floats]:
     """Solve S positive definite systems of k unknowns in place, the batch along the last axis.
-
-    The last unknowns may be those of a saddle: then only what is left of their equations, when the
-    others are eliminated, is definite, and negative.
 
     Up to three times as fast as ``numpy.linalg.solve`` for a thousand 9 x 9 systems, which calls
     LAPACK once for each.
 
     ``system`` (k + 1, k, S): the matrices, of which only the lower triangles are read, and the
-    loads as a last row. Overwritten; ``negative``: how many unknowns at the end belong to the
-    negative definite part; ``scale``: what their pivots are measured against. Results: ``answer``
-    (k, S): not finite where a matrix is not positive definite; ``pivot`` (k, S): pivots over their
-    diagonal entries: small where equations nearly repeat those before them.
+    loads as a last row. Overwritten; ``negative``: how many unknowns at the end are those of a
+    saddle: what is left of their equations, when the others are eliminated, is negative definite;
+    ``scale``: what their pivots are measured against. Results: ``answer`` (k, S): not finite where
+    a matrix is not definite; ``pivot`` (k, S): pivots over their diagonal entries: small where
+    equations nearly repeat those before them.
     """
     size = system.shape[1]
     every = np.arange(size)
@@ -44,9 +42,6 @@ def solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tup
             answer[:j] -= system[j, :j] * answer[j]
         pivots /= diagonal
     return answer, pivots
-
-
-_TINY = np.finfo(float).tiny
 
 
 class _GripForces(NamedTuple):
@@ -82,10 +77,7 @@ class Pairs(NamedTuple):
 
 
 def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
-    """Return all pairs of grips of the sets that share a brick.
-
-    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``.
-    """
+    """Return all pairs of grips of the sets that share a brick."""
     first, second = _couples(columns.shape[1])
     bricks = columns.T // 2
     couple, sets = np.divmod(np.flatnonzero(bricks[first] == bricks[second]), len(columns))
@@ -96,7 +88,7 @@ def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
 
 @cache
 def _couples(grips: int) -> Ints:
-    """Return all couples of a number of grips. Result (2, c)."""
+    """Return all couples (2, c) of a number of grips."""
     return frozen(np.array([*combinations(range(grips), 2)], dtype=np.int64).reshape(-1, 2).T)
 
 
@@ -108,8 +100,8 @@ def grip_forces(
     Two grips on one rigid brick leave the force between them along the brick undetermined:
     `share_pairs` says how they share it.
 
-    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``; ``index`` (S, k): the loads
-    at the grips, from `ComplianceOperator.load_index`; ``pairs``: of the sets, if they are known.
+    ``index`` (S, k): the loads at the grips, from `ComplianceOperator.load_index`; ``pairs``: of
+    the sets, if they are known.
     """
     pairs = pairs_of(operator, columns) if pairs is None else pairs
     rows = np.ascontiguousarray(index.T)
@@ -118,27 +110,25 @@ def grip_forces(
 
 
 def trusted(operator: ComplianceOperator, index: Ints, found: _GripForces, most: float) -> Bools:
-    """Return which sets' forces rounding changes little enough.
+    """Return which sets' forces (S,) rounding changes little enough.
 
-    ``index`` (S, k): the loads at the grips; ``most``: largest of `doubts` that is accepted. Result
-    (S,).
+    ``most``: largest of `_doubts` that is accepted.
     """
     lowest = found.lowest
     out = np.asarray(most * lowest >= len(found.pivot) * operator.worst_doubt)
     rest = np.flatnonzero(~out & (lowest > 0))
     if rest.size:
         part = _GripForces(found.force[rest], found.pivot[:, rest])
-        out[rest] = doubts(operator, index[rest], part) <= most
+        out[rest] = _doubts(operator, index[rest], part) <= most
     return out
 
 
-def doubts(operator: ComplianceOperator, index: Ints, found: _GripForces) -> Floats:
-    """Return the error of forces for rounding of one part in one, over the largest of each set.
+def _doubts(operator: ComplianceOperator, index: Ints, found: _GripForces) -> Floats:
+    """Return the error (S,) of forces for rounding of one part in one, over the largest of each.
 
     A displacement is known to a share of all that adds up in it; with ``|G_ij| ≤ √(G_ii G_jj)``
-    that is read off the diagonal. Over its pivot it is the force that it leaves undetermined.
-
-    ``index`` (S, k): the loads at the grips; ``found``: with positive pivots. Result (S,).
+    that is read off the diagonal. Over its pivot, which must be positive, it is the force that it
+    leaves undetermined.
     """
     size = np.abs(found.force.T)
     root, own, scale = operator.shares.take(np.ascontiguousarray(index.T), axis=1)
@@ -146,16 +136,15 @@ def doubts(operator: ComplianceOperator, index: Ints, found: _GripForces) -> Flo
         own += (root * size).sum(axis=0)
         own *= scale
         own /= found.pivot
-        most = size.max(axis=0, initial=_TINY)
+        most = size.max(axis=0, initial=np.finfo(float).tiny)
         return np.asarray(own.max(axis=0, initial=0.0) / most)
 
 
 def still_forces(operator: ComplianceOperator, columns: Ints, index: Ints, moved: Floats) -> Floats:
-    """Return the forces with which grips undo given displacements of their nodes.
+    """Return the forces (S, k) with which grips undo given displacements of their nodes.
 
-    ``columns``, ``index`` (S, r), (S, k): as of `grip_forces`. ``moved`` (S, k): m; of loose
-    motions, the force that pulls at them, N. Result (S, k): N; between two grips on one brick,
-    none.
+    ``moved`` (S, k): m; of loose motions, the force that pulls at them, N. Between two grips on one
+    brick there is no force.
     """
     pairs, rows = pairs_of(operator, columns), np.ascontiguousarray(index.T)
     return _solved(operator, pairs, rows, np.ascontiguousarray(moved.T))[0].T
@@ -174,9 +163,8 @@ def share_pairs(
     Then the inner edge between them carries nothing: the limit of a stiff bar with both ends held.
     Nothing else in the structure changes.
 
-    ``columns``, ``index`` (S, r), (S, k): as of `grip_forces`. ``force`` (S, k): changed in place,
-    N. ``carried`` (S, E), (S, 0): by the edges, N; changed in place. Computed where they are needed
-    if there are none. ``pairs``: of the sets, if they are known.
+    ``force`` (S, k), ``carried`` (S, E), (S, 0): of grips and edges, changed in place, N; where
+    there are none of edges, they are computed. Others: as of `grip_forces`.
     """
     pairs = pairs_of(operator, columns) if pairs is None else pairs
     if not len(pairs.sets):
@@ -186,13 +174,12 @@ def share_pairs(
         between = carried[sets, edges]
         carried[sets, edges] = 0.0
     else:
-        between = operator.answer("edge_force", index[sets], force[sets])[
-            np.arange(len(sets)), edges
-        ]
+        found = operator.answer("edge_force", index[sets], force[sets])
+        between = found[np.arange(len(sets)), edges]
     shift = between[:, None] * pairs.axis
     shift[columns[sets, pairs.first] % 2 == 1] *= -1.0  # the axis leads to the second node
-    width = pairs.axis.shape[1]
-    nodes = force[:, : force.shape[1] - operator.loose].reshape(len(force), -1, width)
+    own = force.shape[1] - operator.loose
+    nodes = force[:, :own].reshape(len(force), -1, pairs.axis.shape[1])
     nodes[sets, pairs.first] += shift
     nodes[sets, pairs.second] -= shift
 
@@ -214,7 +201,7 @@ def _solved(
         nodes = count - operator.loose
         _brace(system[:nodes, :nodes], pairs)
     scale = 1 / operator.softness if operator.loose else 1.0
-    return solve_positive(system, operator.loose, scale)
+    return _solve_positive(system, operator.loose, scale)
 
 
 def _brace(system: Floats, pairs: Pairs) -> None:

@@ -40,11 +40,12 @@ def grow_tree(network: Network) -> SpanningTree:
     It ends before the brick with which a spring without stiffness in some direction begins to act,
     or that is placed without a spring to what stands: from there on a structure may have no
     compliance of its own.
-
-    Result: of as many bricks as are tied in every direction when placed; maybe none.
     """
     springs = network.springs
-    count = _count_tied(network)
+    slack = springs.since[(springs.stiffness <= 0).any(axis=1)]
+    hung = springs.bodies[springs.since == springs.bodies[:, 1] + 1, 1]
+    bare = np.setdiff1d(np.arange(len(network.inner)), hung)
+    count = int(min([len(network.inner), *bare, *(slack - 1)]))
     spring, parent = np.empty((2, count), dtype=np.int64)
     depth = np.zeros(count + 1, dtype=np.int64)  # the ground, index -1, comes last
     for b in range(count):
@@ -55,30 +56,15 @@ def grow_tree(network: Network) -> SpanningTree:
     return SpanningTree(spring, parent)
 
 
-def _count_tied(network: Network) -> int:
-    """Return how many bricks stand when the first is placed without a tie in every direction."""
-    springs = network.springs
-    slack = springs.since[(springs.stiffness <= 0).any(axis=1)]
-    hung = springs.bodies[springs.since == springs.bodies[:, 1] + 1, 1]
-    bare = np.setdiff1d(np.arange(len(network.inner)), hung)
-    return int(min([len(network.inner), *bare, *(slack - 1)]))
-
-
-def compliances(network: Network, which: Ints, basis: Basis = SPACE) -> Floats:
-    """Return the compliances of springs.
-
-    ``which`` (s,): springs of the network. ``basis``: k directions; all of space by default. Result
-    (s, k, k): m/N and rad/(N m).
-    """
-    springs = network.springs
-    axes = springs.axes[which]
-    count = len(basis.force)
-    out = np.zeros((len(which), *2 * basis.wrench.shape[:1]))
+def compliances(network: Network, first: int, basis: Basis) -> Floats:
+    """Return the compliances (s, k, k) of the first springs in k directions, m/N, rad/(N m)."""
+    springs, count = network.springs, len(basis.force)
+    out = np.zeros((first, *2 * basis.wrench.shape[:1]))
     for block, directions, stiffness in (
-        (slice(0, count), basis.force, springs.translational_stiffness[which]),
-        (slice(count, None), basis.moment, springs.rotational_stiffness[which]),
+        (slice(0, count), basis.force, springs.translational_stiffness[:first]),
+        (slice(count, None), basis.moment, springs.rotational_stiffness[:first]),
     ):
-        own = axes @ directions.T
+        own = springs.axes[:first] @ directions.T
         out[:, block, block] = own.transpose(0, 2, 1) / stiffness[:, None, :] @ own
     return out
 
@@ -109,43 +95,40 @@ class Growth:
         self._network, self._tree, self._basis = network, tree, basis
         self._size = len(basis.wrench)
         most = self._size * len(tree.spring)
-        self._acting = np.searchsorted(
-            network.springs.since, np.arange(1, len(tree.spring) + 1), side="right"
-        )
-        springs = int(self._acting[-1]) if len(self._acting) else 0
-        self._compliance = compliances(network, np.arange(springs), basis)
+        counts = np.arange(len(tree.spring) + 1)
+        # how many springs act on as many bricks
+        self._acting = np.searchsorted(network.springs.since, counts, side="right").tolist()
+        self._compliance = compliances(network, self._acting[-1], basis)
         center = network.centroid[: len(tree.spring)]
         self._own_arm = self._carried(center - network.springs.position[tree.spring])
         self._along = self._carried(center - center[tree.parent])
         self.loss = np.ones(len(tree.spring))
         self.twist = np.empty((1 + most, most))
-        self.wrench = np.zeros((1 + most, self._size * springs))
+        self.wrench = np.zeros((1 + most, self._size * self._acting[-1]))
         self.bricks = self._closed = 0
         self._weighed: list[tuple[Floats, Floats]] = []
-        self._ties: dict[int, dict[int, int]] = {}
-        self._left = 1.0  # rounding when the twists were summed anew
         self._start()
 
     def reach(self, bricks: int) -> None:
-        """Let a number of bricks stand.
+        """Let a number of bricks stand, at most as many as the tree has.
 
         More than stand are added. Fewer: if no loop was closed since, rows and columns of the
         others are left out; else all begins anew.
-
-        ``bricks``: at most as many as the tree has.
         """
         if bricks < self._closed:
             self._start()
         if bricks < self.bricks:
             self.bricks = bricks
-            self._tie(np.arange(self._count(bricks)))
+            self._tie(np.arange(self._acting[bricks]))
             del self._weighed[bricks - self._closed + 1 :]
             twist, wrench = self._weighed[-1]
             self.twist[0, : len(twist)], self.wrench[0, : len(wrench)] = twist, wrench
         while self.bricks < bricks:
             self._add()
-            if self._others(self.bricks - 1).size:
-                self._close(self._others(self.bricks - 1))
+            mine = np.arange(*self._acting[self.bricks - 1 : self.bricks + 1])
+            others = mine[mine != self._tree.spring[self.bricks - 1]]
+            if others.size:
+                self._close(others)
                 self._closed, self._weighed = self.bricks, []
             self._weighed.append((self.twist[0, : self._moves].copy(), self._stressed(0).copy()))
 
@@ -158,27 +141,18 @@ class Growth:
     def _moves(self) -> int:
         return self._size * self.bricks
 
-    def _count(self, bricks: int) -> int:
-        """Return how many springs act on a number of bricks."""
-        return int(self._acting[bricks - 1]) if bricks else 0
-
     def _stressed(self, rows: slice | int) -> Floats:
         """Return the wrenches of the springs that act, of some rows."""
-        return self.wrench[rows, : self._size * self._count(self.bricks)]
+        return self.wrench[rows, : self._size * self._acting[self.bricks]]
 
     def _start(self) -> None:
         if self._closed:
             self.wrench[:] = 0.0  # springs not of the tree act on all rows
         self.bricks = self._closed = 0
-        self._left = 1.0
+        self._left = 1.0  # rounding when the twists were summed anew
         self._weighed = [(np.empty(0), np.empty(0))]
         self._tie(np.arange(0))
         self.twist[0], self.wrench[0] = 0.0, 0.0
-
-    def _others(self, brick: int) -> Ints:
-        """Return the springs beside that of the tree that begin to act with a brick."""
-        mine = np.arange(self._count(brick), self._count(brick + 1))
-        return np.asarray(mine[mine != self._tree.spring[brick]])
 
     def _add(self) -> None:
         """Hang the next brick on its spring."""
@@ -187,14 +161,12 @@ class Growth:
         old, after = slice(0, 1 + k * brick), 1 + k * brick
         mine, rows = slice(k * brick, k * brick + k), slice(after, after + k)
         self.bricks += 1
-        self._stressed(0)[k * self._count(brick) :] = 0.0  # as in all old rows, never written yet
+        self._stressed(0)[k * self._acting[brick] :] = 0.0  # as in all old rows, never written yet
         own, along = self._own_arm[brick], self._along[brick]
         flexibility = own @ self._compliance[spring] @ own.T
         if parent != GROUND:
-            theirs, moved = (
-                slice(1 + k * parent, 1 + k * parent + k),
-                slice(k * parent, k * parent + k),
-            )
+            moved = slice(k * parent, k * parent + k)
+            theirs = slice(1 + moved.start, 1 + moved.stop)
             self.twist[rows, : k * brick] = along @ self.twist[theirs, : k * brick]
             self.twist[old, mine] = self.twist[old, moved] @ along.T
             self._stressed(rows)[:] = along @ self._stressed(theirs)
@@ -226,8 +198,8 @@ class Growth:
         stressed, before = self._stressed(rows), self._own().copy()
         _add_product(self.twist[rows, : self._moves], closing, moved)
         _add_product(stressed, closing, pulled)
-        for i, spring in enumerate(springs.tolist()):
-            self.wrench[rows, k * spring : k * spring + k] = closing[:, k * i : k * i + k]
+        by_spring = self.wrench[rows].reshape(1 + self._moves, -1, k)
+        by_spring[:, springs] = closing.reshape(1 + self._moves, -1, k)
         self._tie(springs, self._ties)
         lost = (before / np.maximum(self._own(), TINY)).reshape(self.bricks, k).max(axis=1)
         self.loss[: self.bricks] *= np.maximum(lost, 1.0)
@@ -243,9 +215,8 @@ class Growth:
         k, springs, center = self._size, self._network.springs, self._network.centroid
         ways = []
         for parent, brick, spring, sign in self._ways(GROUND):
-            given = (
-                self._compliance[spring] @ self._carried(center[brick] - springs.position[spring]).T
-            )
+            at_spring = self._carried(center[brick] - springs.position[spring])
+            given = self._compliance[spring] @ at_spring.T
             arm = center[brick] - center[parent] if parent != GROUND else np.zeros(3)
             ways.append((brick, parent, spring, -sign * given, self._carried(arm).T))
         step = max(1, _SUMMED // self._moves)
@@ -257,15 +228,13 @@ class Growth:
                 twist[:, brick] = wrench[:, spring] @ given
                 if parent != GROUND:
                     twist[:, brick] += twist[:, parent] @ along
-        self.loss[: self.bricks] = self._left = self._asymmetry()
-
-    def _asymmetry(self) -> float:
-        """Return by how many last digits what should be symmetric is not: that is rounding."""
+        # by how many last digits what should be symmetric is not: that is rounding
         some = np.linspace(0, self._moves - 1, min(self._moves, _SAMPLE)).astype(int)
         matrix, root = self.twist[np.ix_(1 + some, some)], np.sqrt(np.abs(self._own()[some]))
         apart = np.abs(matrix - matrix.T) / np.maximum(root * root[:, None], TINY)
         more = (len(SPACE.wrench) / self._size) ** 2  # in space there are as many times the pairs
-        return max(1.0, float(np.quantile(apart, 1 - more * (1 - _MOST))) / ROUNDING)
+        self._left = max(1.0, float(np.quantile(apart, 1 - more * (1 - _MOST))) / ROUNDING)
+        self.loss[: self.bricks] = self._left
 
     def _gap(self, spring: int) -> Floats:
         """Return how far the bodies of a spring part at it under every load, (1 + kb, k)."""
@@ -285,10 +254,9 @@ class Growth:
 
     def _tie(self, springs: Ints, ties: dict[int, dict[int, int]] | None = None) -> None:
         """Let ways lead through springs, beside those that do or alone."""
-        self._ties = {GROUND: {}} if ties is None else ties
-        for spring, (first, second) in zip(
-            springs.tolist(), self._network.springs.bodies[springs].tolist(), strict=True
-        ):
+        self._ties: dict[int, dict[int, int]] = {GROUND: {}} if ties is None else ties
+        bodies = self._network.springs.bodies[springs].tolist()
+        for spring, (first, second) in zip(springs.tolist(), bodies, strict=True):
             self._ties.setdefault(first, {})[second] = spring
             self._ties.setdefault(second, {})[first] = spring
 
@@ -309,11 +277,8 @@ class Growth:
 
     def _pulled(self, answers: Floats, spring: int) -> Floats:
         """Return what a spring's unit wrenches on both its bodies do, of the answers' rows."""
-        k, springs, out = (
-            self._size,
-            self._network.springs,
-            np.zeros((self._size, answers.shape[1])),
-        )
+        k, springs = self._size, self._network.springs
+        out = np.zeros((k, answers.shape[1]))
         for body, sign in zip(springs.bodies[spring].tolist(), (-1.0, 1.0), strict=True):
             if body != GROUND:
                 arm = springs.position[spring] - self._network.centroid[body]

@@ -73,19 +73,14 @@ def share(network: Network) -> Shared:
     brick = np.repeat(np.arange(len(network.inner)), 2)
     arm = network.node_position[network.inner.ravel()] - network.centroid[brick]
     column = np.repeat(6 * brick[:, None] + np.arange(6), 3, axis=0).ravel()
-    inner = (point_motion(arm).ravel(), column, np.arange(0, 18 * size + 1, 6))
-    return Shared(
-        statics=build_statics(network),
-        gap=deformation(springs.bodies, springs.position, network.centroid, springs.axes),
-        inner=sparse.csr_array(inner, shape=(3 * size, 3 * size)),
-    )
+    moved = (point_motion(arm).ravel(), column, np.arange(0, 18 * size + 1, 6))
+    inner = sparse.csr_array(moved, shape=(3 * size, 3 * size))
+    gap = deformation(springs.bodies, springs.position, network.centroid, springs.axes)
+    return Shared(build_statics(network), gap, inner)
 
 
 def ungripped_system(network: Network, bricks: int, shared: Shared | None = None) -> Ungripped:
-    """Return what all systems of a partial structure have in common.
-
-    ``shared``: from `share`; made anew by default.
-    """
+    """Return what all systems of a partial structure have in common."""
     shared = share(network) if shared is None else shared
     springs = network.springs
     acting = springs.acting(bricks)
@@ -94,10 +89,11 @@ def ungripped_system(network: Network, bricks: int, shared: Shared | None = None
     lever = np.array([1.0, 1.0, 1.0, length, length, length])
     raw = (springs.stiffness[acting] / lever**2).ravel()
     unit = float(np.median(raw[raw > 0])) if raw.any() else 1.0
-    stiffness = raw / unit
-    twist_unit = np.tile(1 / lever, bricks)
+    stiffness, twist_unit = raw / unit, np.tile(1 / lever, bricks)
     gap = _scaled_gap(shared, acting, twist_unit, lever)
-    inner = _leading(shared.inner, twist_unit)
+    size, own = 6 * bricks, shared.inner.indices[: 36 * bricks]
+    nodes = shared.inner.data[: 36 * bricks] * twist_unit[own], own, shared.inner.indptr[: size + 1]
+    inner: sparse.csr_array = sparse.csr_array(nodes, shape=(size, size))
     weight = network.inner_weight[: 2 * bricks].ravel()
     return Ungripped(
         network=network,
@@ -115,28 +111,16 @@ def ungripped_system(network: Network, bricks: int, shared: Shared | None = None
     )
 
 
-def _scaled_gap(
-    shared: Shared, acting: Ints, twist_unit: Floats, lever: Floats
-) -> sparse.csr_array:
+def _scaled_gap(shared: Shared, acting: Ints, unit: Floats, lever: Floats) -> sparse.csr_array:
     """Return the deformation (6s, 6b) of the acting springs, all components made lengths."""
-    rows = 6 * len(acting)
-    if len(acting) == 0 or acting[-1] + 1 == len(acting):  # none beyond them acts
-        indptr = shared.gap.indptr[: rows + 1]
-        indices, data = shared.gap.indices[: indptr[-1]], shared.gap.data[: indptr[-1]]
-    else:
-        part = shared.gap[(6 * acting[:, None] + np.arange(6)).ravel()]
-        indptr, indices, data = part.indptr, part.indices, part.data
-    data = data * np.repeat(np.tile(lever, len(acting)), np.diff(indptr))
-    data *= twist_unit[indices]
-    return sparse.csr_array((data, indices, indptr), shape=(rows, len(twist_unit)))
-
-
-def _leading(inner: sparse.csr_array, twist_unit: Floats) -> sparse.csr_array:
-    """Return the displacements (6b, 6b) of the first inner nodes for scaled twists, m."""
-    size = len(twist_unit)
-    column = inner.indices[: 6 * size]
-    data = inner.data[: 6 * size] * twist_unit[column]
-    return sparse.csr_array((data, column, inner.indptr[: size + 1]), shape=(size, size))
+    rows, part = 6 * len(acting), shared.gap
+    if rows and acting[-1] + 1 != len(acting):  # those that act are not the first
+        part = part[(6 * acting[:, None] + np.arange(6)).ravel()]
+    indptr = part.indptr[: rows + 1]
+    indices = part.indices[: indptr[-1]]
+    data = part.data[: indptr[-1]] * np.repeat(np.tile(lever, len(acting)), np.diff(indptr))
+    data *= unit[indices]
+    return sparse.csr_array((data, indices, indptr), shape=(rows, len(unit)))
 
 
 def _side_by_side(gap: sparse.csr_array, stiffness: Floats) -> sparse.csc_array:
@@ -173,10 +157,7 @@ class RigidStructure(FrozenValue):
     statics: Statics  # of the network
 
     def forbidden(self, grips: Ints) -> Floats:
-        """Return the motions that grips forbid.
-
-        ``grips`` (r,): indices into ``network.inner.ravel()``. Result (3r, 6b).
-        """
+        """Return the motions (3r, 6b) that grips forbid."""
         return np.asarray(self.inner_motion[(3 * grips[:, None] + np.arange(3)).ravel()])
 
 
@@ -185,20 +166,15 @@ def rigid_structure(network: Network, bricks: int) -> RigidStructure:
     acting, gap, stiffness = spring_maps(network, bricks)
     matrix = np.einsum("sik,sij,sjl->kl", gap, stiffness, gap, optimize=True)
     motion = node_motion(network, bricks).toarray()
-    inner = network.inner[:bricks].ravel()
-    of_inner = motion[(3 * inner[:, None] + np.arange(3)).ravel()]
-    statics = build_statics(network)
-    return RigidStructure(acting, gap, stiffness, matrix, motion, of_inner, statics)
+    inner = motion[(3 * network.inner[:bricks].reshape(-1, 1) + np.arange(3)).ravel()]
+    return RigidStructure(acting, gap, stiffness, matrix, motion, inner, build_statics(network))
 
 
 def require_resistance(network: Network, bricks: int, columns: Ints) -> None:
-    """Check that one grip set leaves no motion that nothing resists.
+    """Raise `MechanismError` if one grip set leaves a motion that nothing resists.
 
     The assembled stiffness settles most cases at once. It cannot tell a soft support from none;
     `free_motion` can.
-
-    ``columns`` (r,): grips as indices into ``network.inner.ravel()``. Raises `MechanismError` if it
-    does.
     """
     parts = rigid_structure(network, bricks)
     with one_thread():
@@ -213,9 +189,7 @@ def free_motion(network: Network, bricks: int, columns: Ints) -> Floats | None:
     How stiff springs are does not count: a soft one ties as well as a stiff one, so that rounding
     has nothing to hide behind.
 
-    ``columns`` (r,): grips as indices into ``network.inner.ravel()``. Result (b, 6): translation
-    over the length of the longest brick's inner edge, and rotation; the largest component is 1.
-    None if there is no such motion.
+    Result (b, 6): as `seqopt.engines.diagnosis.Diagnosis.mode`; None if there is no such motion.
     """
     parts = ungripped_system(network, bricks)
     node = 3 * network.inner.ravel()[columns][:, None] + np.arange(3)
@@ -230,19 +204,15 @@ def free_motion(network: Network, bricks: int, columns: Ints) -> Floats | None:
 
 
 def lost_to_rounding(values: Floats) -> bool:
-    """Return whether the least of eigenvalues may be rounding alone.
-
-    ``values`` (m,): eigenvalues of a scaled stiffness, ascending.
-    """
+    """Return whether the least of ascending eigenvalues may be rounding alone."""
     return len(values) > 0 and not values[0] > _ROUNDING * values[-1]  # all may be zero
 
 
 def resisting_modes(matrix: Floats, forbidden: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return how a structure resists the motions that its grips leave.
+    """Return how a structure of some stiffness resists the motions that its grips do not forbid.
 
-    ``matrix`` (6b, 6b): stiffness without grips; ``forbidden`` (c, 6b): motions that the grips
-    forbid. Results: ``values`` (m,): eigenvalues of the scaled stiffness, ascending; ``vectors``
-    (m, m): its modes; ``motions`` (6b, m): the motions that the modes combine.
+    Results: ``values`` (m,): eigenvalues of the scaled stiffness, ascending; ``vectors`` (m, m):
+    its modes; ``motions`` (6b, m): the motions that the modes combine.
     """
     free = linalg.null_space(forbidden) if len(forbidden) else np.eye(len(matrix))
     diagonal = np.diag(free.T @ matrix @ free)
@@ -257,15 +227,12 @@ def mechanism_error(
     twist: Floats,
     text: str = "nothing resists a motion of brick {brick}; add a grip, a joint or stiffness",
 ) -> MechanismError:
-    """Return the error that shows an unresisted motion.
+    """Return the error that shows an unresisted motion (6b,), its largest component made 1.
 
-    ``twist`` (6b,): the motion, of any size; ``text``: what to say of the brick that moves most,
-    ``{brick}``. Result: with the motion's largest component scaled to 1.
+    ``text``: what to say of the brick that moves most, ``{brick}``.
     """
     shape = (twist / np.abs(twist).max()).reshape(-1, 6)
     worst = int(np.abs(shape).max(axis=1).argmax())
     names = [brick.name for brick in network.scene.placed[: len(shape)]]
-    return MechanismError(
-        f"{len(shape)} bricks: {text.format(brick=names[worst])}",
-        tuple((name, tuple(row)) for name, row in zip(names, shape.tolist(), strict=True)),
-    )
+    mode = tuple((name, tuple(row)) for name, row in zip(names, shape.tolist(), strict=True))
+    return MechanismError(f"{len(shape)} bricks: {text.format(brick=names[worst])}", mode)

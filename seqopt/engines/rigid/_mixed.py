@@ -21,7 +21,7 @@ from itertools import permutations
 
 import numpy as np
 from scipy import linalg, sparse
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines.interface import Fields, join_sets, no_sets
@@ -60,12 +60,7 @@ def respond(
     columns: Ints,
     solution: Solution,
 ) -> Fields:
-    """Return the fields of grip sets.
-
-    ``statics``: of the network. ``motion`` (3n, 6b): displacements of the nodes for unit twists;
-    see `seqopt.network._mechanics.node_motion`. ``columns`` (S, r): grips as indices into
-    ``network.inner.ravel()``.
-    """
+    """Return the fields of grip sets, of which ``motion`` is as `node_motion` returns it."""
     twist, wrench, force = solution.twist, solution.wrench, solution.force.copy()
     sets, bricks = len(twist), twist.shape[1] // 6
     load = np.tile(network.inner_weight[: 2 * bricks], (sets, 1, 1))
@@ -83,11 +78,10 @@ def respond(
 
 
 def edge_forces(network: Network, statics: Statics, wrench: Floats, load: Floats) -> Floats:
-    """Return what the edges carry.
+    """Return what the edges carry (S, E), tension positive.
 
-    ``statics``: of the network; ``wrench`` (S, J, 6): of every spring of the network on its second
-    body, N and N m; ``load`` (S, 2b, 3): forces at the inner nodes, those of grips among them, N.
-    Result (S, E): tension positive, N.
+    ``wrench`` (S, J, 6): as of `Solution`; ``load`` (S, 2b, 3): forces at the inner nodes, those of
+    grips among them.
     """
     sets, bricks = len(load), load.shape[1] // 2
     edges = network.count_edges(bricks)
@@ -98,11 +92,7 @@ def edge_forces(network: Network, statics: Statics, wrench: Floats, load: Floats
 
 
 def reactions(network: Network, statics: Statics, wrench: Floats) -> Floats:
-    """Return force and moment of every ground end about its fixed point.
-
-    ``statics``: of the network; ``wrench`` (S, J, 6): of every spring of the network on its second
-    body, N and N m. Result (S, G, 6): N and N m.
-    """
+    """Return force and moment (S, G, 6) of every ground end about its fixed point."""
     at_spring = wrench[:, network.springs.support]
     return np.asarray(np.einsum("gij,sgj->sgi", statics.support_of_spring, at_spring))
 
@@ -110,8 +100,7 @@ def reactions(network: Network, statics: Statics, wrench: Floats) -> Floats:
 def split_pairs(network: Network, columns: Ints, force: Floats, carried: Floats) -> None:
     """Let each of two grips on one brick take what reaches its own node, in place.
 
-    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``; ``force`` (S, r, 3): of the
-    grips, N; ``carried`` (S, E): by the edges, N.
+    ``force`` (S, r, 3): of the grips; ``carried`` (S, E): by the edges.
     """
     inner = np.flatnonzero(network.edge_spring < 0)
     edge_of = np.empty(len(network.inner), dtype=np.int64)
@@ -137,54 +126,38 @@ class MixedSystem(FrozenValue):
 def mixed_system(parts: Ungripped, grips: Ints, shift: Floats | None = None) -> MixedSystem:
     """Return the system of one grip set.
 
-    ``grips`` (r,): indices into ``network.inner.ravel()``; ``shift`` (6b,): added to the diagonal
-    of the scaled stiffness, so that a mechanism can be factored.
-    """
-    rows, force = _constraints(parts, grips)
-    forbidden = sparse.csr_array(rows @ sparse.diags_array(parts.twist_unit))
-    matrix, joints = parts.matrix, len(parts.wrench_unit)
-    if shift is not None:
-        below = sparse.diags_array(np.concatenate([np.zeros(joints), shift]))
-        matrix = sparse.csc_array(matrix + below)
-    if len(force):
-        of_all = (forbidden.data, forbidden.indices + joints, forbidden.indptr)
-        rows = sparse.csr_array(of_all, shape=(forbidden.shape[0], matrix.shape[0]))
-        matrix = sparse.block_array([[matrix, -rows.T], [rows, None]], format="csc")
-    return MixedSystem(forbidden, sparse.csc_array(matrix), force)
-
-
-def factorize(system: MixedSystem) -> SuperLU:
-    """Return the factors of a system. Raises `RuntimeError` if the matrix is exactly singular."""
-    return splu(system.matrix)
-
-
-def _constraints(parts: Ungripped, grips: Ints) -> tuple[sparse.csr_array, Floats]:
-    """Return independent motions that grips forbid (c, 6b), and their forces (3r, c).
-
-    A second grip on a brick forbids nothing along the line to the first.
+    ``shift`` (6b,): added to the diagonal of the scaled stiffness, so that a mechanism can be
+    factored.
     """
     network = parts.network
-    inner = network.inner.ravel()[grips]
-    motion = parts.motion[(3 * inner[:, None] + np.arange(3)).ravel()]
-    directions = []
+    motion = parts.motion[(3 * network.inner.ravel()[grips, None] + np.arange(3)).ravel()]
+    directions = [np.eye(3)] * len(grips)
     for i, brick in enumerate(grips // 2):
-        free = np.eye(3)
-        if (grips[:i] // 2 == brick).any():
+        if (grips[:i] // 2 == brick).any():  # it forbids nothing along the line to the other grip
             step = np.diff(network.node_position[network.inner[brick]], axis=0)
-            free = linalg.null_space(step)
-        directions.append(free)
+            directions[i] = linalg.null_space(step)
     force = linalg.block_diag(*directions) if len(grips) else np.zeros((0, 0))
-    return sparse.csr_array(sparse.csr_array(force.T) @ motion), force
+    rows = sparse.csr_array(sparse.csr_array(force.T) @ motion)
+    forbidden = sparse.csr_array(rows @ sparse.diags_array(parts.twist_unit))
+    matrix = parts.matrix
+    if shift is not None:
+        below = sparse.diags_array(np.concatenate([np.zeros(len(parts.wrench_unit)), shift]))
+        matrix = sparse.csc_array(matrix + below)
+    return MixedSystem(forbidden, bordered(matrix, forbidden), force)
+
+
+def bordered(matrix: sparse.csc_array, rows: sparse.csr_array) -> sparse.csc_array:
+    """Return a system (6s + 6b,) in which products of rows (c, 6b) with twists are zero too."""
+    if not rows.shape[0]:
+        return sparse.csc_array(matrix)
+    entries = rows.data, rows.indices + matrix.shape[0] - rows.shape[1], rows.indptr
+    wide = sparse.csr_array(entries, shape=(rows.shape[0], matrix.shape[0]))
+    return sparse.csc_array(sparse.block_array([[matrix, -wide.T], [wide, None]], format="csc"))
 
 
 def unscaled(parts: Ungripped, states: Floats) -> tuple[Floats, Floats]:
-    """Return the wrenches and twists that scaled unknowns stand for.
-
-    ``states`` (S, 6s + 6b). Results: ``wrench`` (S, J, 6): of every spring of the network on its
-    second body, N and N m; zero where it does not act. ``twist`` (S, 6b): of the bricks, m and rad.
-    """
-    springs, sets = parts.network.springs, len(states)
-    joints = len(parts.wrench_unit)
+    """Return the wrenches and twists, as of `Solution`, of scaled unknowns (S, 6s + 6b)."""
+    springs, sets, joints = parts.network.springs, len(states), len(parts.wrench_unit)
     own = (states[:, :joints] * parts.wrench_unit).reshape(sets, len(parts.acting), 2, 3)
     wrench = np.zeros((sets, len(springs.since), 6))
     turned = np.einsum("nshi,sij->nshj", own, springs.axes[parts.acting])
@@ -193,17 +166,11 @@ def unscaled(parts: Ungripped, states: Floats) -> tuple[Floats, Floats]:
 
 
 def rescaled(parts: Ungripped, wrench: Floats, twist: Floats) -> Floats:
-    """Return the scaled unknowns that stand for wrenches and twists.
-
-    ``wrench`` (S, J, 6): of every spring of the network on its second body, N and N m; ``twist``
-    (S, 6b): of the bricks, m and rad. Result (S, 6s + 6b).
-    """
-    joints = len(parts.wrench_unit)
+    """Return the scaled unknowns (S, 6s + 6b) of wrenches and twists, as of `Solution`."""
     acting = wrench[:, parts.acting].reshape(len(wrench), len(parts.acting), 2, 3)
     own = np.einsum("nshj,sij->nshi", acting, parts.network.springs.axes[parts.acting])
-    return np.hstack(
-        [own.reshape(len(wrench), joints) / parts.wrench_unit, twist / parts.twist_unit]
-    )
+    own = own.reshape(len(wrench), len(parts.wrench_unit))
+    return np.hstack([own / parts.wrench_unit, twist / parts.twist_unit])
 
 
 _CORRECTIONS = 3  # after which an answer is judged
@@ -215,39 +182,31 @@ _LIGHT = 1e-3  # nor what is this small beside the weight, or the motion it make
 def solve_mixed(network: Network, bricks: int, columns: Ints) -> Fields:
     """Return the fields of grip sets, one factorization for each.
 
-    A mechanism that no load excites passes:
-    `seqopt.engines.rigid._mechanism.require_resistance` finds it.
-
-    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. Raises `MechanismError` if
-    a motion that the load excites meets no resistance; `SolverError` if the answer still changes by
-    more than `LAST_CORRECTION`.
+    A mechanism that no load excites passes: `seqopt.engines.rigid._mechanism.require_resistance`
+    finds it. Raises as `solve_load`.
     """
     parts = ungripped_system(network, bricks)
-    answers = [_solve_one(parts, grips) for grips in columns]
-    return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
-
-
-def _solve_one(parts: Ungripped, grips: Ints) -> Fields:
-    """Return the fields of one grip set."""
-    network = parts.network
-    solution = solve_load(parts, grips, parts.load)
-    return respond(network, parts.statics, parts.motion, grips[None], solution)
+    answers = [no_sets(network, bricks, columns.shape[1])]
+    for grips in columns:
+        solution = solve_load(parts, grips, parts.load)
+        answers.append(respond(network, parts.statics, parts.motion, grips[None], solution))
+    return join_sets(answers)
 
 
 def solve_load(parts: Ungripped, grips: Ints, pull: Floats) -> Solution:
     """Return how a partial structure answers to a load while a grip set holds its nodes still.
 
-    ``grips`` (r,): indices into ``network.inner.ravel()``; ``pull`` (6b,): the load, scaled as
-    ``parts.load``. Raises `MechanismError` if a motion that the load excites meets no resistance;
-    `SolverError` if the answer still changes by more than `LAST_CORRECTION`.
+    ``pull`` (6b,): the load, scaled as ``parts.load``. Raises `MechanismError` if a motion that the
+    load excites meets no resistance; `SolverError` if the answer still changes by more than
+    `LAST_CORRECTION`.
     """
     network, bricks = parts.network, parts.bricks
     system = mixed_system(parts, grips)
-    joints, moves = len(parts.wrench_unit), len(parts.twist_unit)
+    joints, last = len(parts.wrench_unit), len(parts.wrench_unit) + len(parts.twist_unit)
     load = np.zeros(system.matrix.shape[0])
-    load[joints : joints + moves] = pull
+    load[joints:last] = pull
     try:
-        factors = factorize(system)
+        factors = splu(system.matrix)
     except RuntimeError as error:
         require_resistance(network, bricks, grips)
         raise SolverError(f"{bricks} bricks: exactly singular in double precision") from error
@@ -255,28 +214,24 @@ def solve_load(parts: Ungripped, grips: Ints, pull: Floats) -> Solution:
     for _ in range(_CORRECTIONS):
         correction = factors.solve(load - system.matrix @ result)
         result += correction
-    both = np.stack([result, correction])[:, None, : joints + moves]
-    if not unchanged(parts, *both)[0]:
+    if not unchanged(parts, *np.stack([result, correction])[:, None, :last])[0]:
         require_resistance(network, bricks, grips)
         raise SolverError(
             f"{bricks} bricks: too close to a mechanism for double precision; "
             "add a grip or stiffness"
         )
-    wrench, twist = unscaled(parts, result[None, : joints + moves])
-    force = (system.force @ (result[joints + moves :] * parts.unit)).reshape(1, -1, 3)
-    return Solution(twist, wrench, force)
+    wrench, twist = unscaled(parts, result[None, :last])
+    force = system.force @ (result[last:] * parts.unit)
+    return Solution(twist, wrench, force.reshape(1, -1, 3))
 
 
 def unchanged(
     parts: Ungripped, states: Floats, corrections: Floats, largest: float = LAST_CORRECTION
 ) -> Bools:
-    """Return whether corrections are small beside forces, moments, shifts and turns each.
+    """Return whether corrections (S, 6s + 6b) are small beside forces, moments, shifts and turns.
 
     Where nothing moves, as where robots hold every brick at both nodes, what is left is rounding:
-    it is measured against the weight.
-
-    ``states``, ``corrections`` (S, 6s + 6b): scaled wrenches and twists; ``largest``: that counts
-    as small. Result (S,).
+    it is measured against the weight. ``largest``: that counts as small.
     """
     size, change = _sizes(parts, states), _sizes(parts, corrections)
     other = size.reshape(-1, 2, 2).max(axis=2).repeat(2, axis=1)
@@ -286,11 +241,8 @@ def unchanged(
 
 def _sizes(parts: Ungripped, states: Floats) -> Floats:
     """Return the largest force, moment, shift and turn of each state, (S, 4)."""
-    ends = [len(parts.wrench_unit)]
-    kinds = [
-        part.reshape(len(states), part.shape[1] // 6, 2, 3)
-        for part in np.split(states, ends, axis=1)
-    ]
+    both = np.split(states, [len(parts.wrench_unit)], axis=1)
+    kinds = [part.reshape(len(states), part.shape[1] // 6, 2, 3) for part in both]
     return np.hstack([np.abs(part).max(axis=(1, 3), initial=0.0) for part in kinds])
 
 
@@ -300,9 +252,8 @@ _BACKWARD = 1e-10  # largest backward error of an accepted solution
 def solve_dense(network: Network, bricks: int, columns: Ints) -> Fields:
     """Return the fields of grip sets from the stiffness matrix of each.
 
-    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. Raises `MechanismError` if
-    nothing resists a motion; `SolverError` if a motion is resisted too little for the assembled
-    stiffness to tell, or the backward error of an answer is larger than `_BACKWARD`.
+    Raises `MechanismError` if nothing resists a motion; `SolverError` if a motion is resisted too
+    little for the assembled stiffness to tell, or the backward error is larger than `_BACKWARD`.
     """
     parts = rigid_structure(network, bricks)
     answers = [_solve_one_dense(network, parts, grips) for grips in columns]
@@ -314,25 +265,19 @@ def _solve_one_dense(network: Network, parts: RigidStructure, grips: Ints) -> Fi
     bricks = len(parts.matrix) // 6
     pull = parts.inner_motion.T @ network.inner_weight[: 2 * bricks].ravel()
     forbidden = parts.forbidden(grips)
-    modes = resisting_modes(parts.matrix, forbidden)
-    if lost_to_rounding(modes[0]):
+    values, vectors, motions = resisting_modes(parts.matrix, forbidden)
+    if lost_to_rounding(values):
         require_resistance(network, bricks, grips)
         raise SolverError(f"direct solve of {bricks} bricks: too close to a mechanism")
-    twist = _constrained(parts.matrix, modes, pull)
+    target = motions.T @ pull
+    answer = vectors @ (vectors.T @ target / values)
+    residual = np.abs(motions.T @ (parts.matrix @ (motions @ answer)) - target).max()
+    if not residual <= _BACKWARD * (values[-1] * np.abs(answer).max() + np.abs(target).max()):
+        raise SolverError(f"direct solve of {bricks} bricks: backward error too large")
+    twist = motions @ answer
     wrench = np.zeros((len(network.springs.since), 6))
     wrench[parts.acting] = -np.einsum("sij,sjk,k->si", parts.stiffness, parts.gap, twist)
     missing = parts.matrix @ twist - pull
     force = np.asarray(np.linalg.lstsq(forbidden.T, missing, rcond=None)[0].reshape(-1, 3))
     solution = Solution(twist[None], wrench[None], force[None])
     return respond(network, parts.statics, parts.motion, grips[None], solution)
-
-
-def _constrained(matrix: Floats, modes: tuple[Floats, Floats, Floats], load: Floats) -> Floats:
-    """Return the twists under a load that modes of the stiffness resist."""
-    values, vectors, motions = modes
-    target = motions.T @ load
-    answer = vectors @ (vectors.T @ target / values)
-    residual = np.abs(motions.T @ (matrix @ (motions @ answer)) - target).max()
-    if not residual <= _BACKWARD * (values[-1] * np.abs(answer).max() + np.abs(target).max()):
-        raise SolverError(f"direct solve of {len(matrix) // 6} bricks: backward error too large")
-    return np.asarray(motions @ answer)

@@ -88,20 +88,18 @@ class ComplianceOperator(FrozenValue):
         """Roots of flexibilities, what weight adds to their sum, what makes it forces; (3, l)."""
         own = np.maximum(np.abs(self.flexibility.diagonal()), np.finfo(float).tiny)
         root = np.sqrt(own * self.loss)
-        return frozen(
-            np.stack([root, np.abs(self.dead_displacement) * self.loss / root, root / own])
-        )
+        dead = np.abs(self.dead_displacement) * self.loss / root
+        return frozen(np.stack([root, dead, root / own]))
 
     @cached_property
     def worst_doubt(self) -> float:
         """Most that a grip's force can be in doubt where pivots are one, over the loads at grips.
 
-        As `seqopt.engines.rigid._grip_equations.doubts`: forces undo the displacements, so these
-        are no more in doubt than what the forces add up to.
+        As `_doubts` of `seqopt.engines.rigid._grip_equations`: the forces undo the displacements, so
+        these are no more in doubt than what the forces add up to.
         """
-        own = np.sqrt(
-            np.abs(self.flexibility.diagonal()).max(initial=0.0) * self.loss.max(initial=1.0)
-        )
+        most = np.abs(self.flexibility.diagonal()).max(initial=0.0)
+        own = np.sqrt(most * self.loss.max(initial=1.0))
         return float(2 * own * self.shares[2].max(initial=0.0))
 
     def covers(self, bricks: Ints) -> bool:
@@ -109,11 +107,7 @@ class ComplianceOperator(FrozenValue):
         return len(self.held) == self.bricks or bool((self.place[bricks] >= 0).all())
 
     def load_index(self, columns: Ints) -> Ints:
-        """Return which loads act at every grip, and after them all loose motions.
-
-        ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. Result (S, rd + m):
-        rows of the operator.
-        """
+        """Return which loads act at every grip, and after them all loose motions, (S, rd + m)."""
         every = len(self.held) == self.bricks
         nodes = columns if every else 2 * self.place[columns // 2] + columns % 2
         rows = self.directions * nodes[:, :, None] + np.arange(self.directions)
@@ -124,11 +118,7 @@ class ComplianceOperator(FrozenValue):
         return np.asarray(rows)
 
     def loads(self, index: Ints, force: Floats, weight: float = 1.0) -> Loads:
-        """Return forces at loads, and the weight.
-
-        ``index`` (S, k): loads that act; ``force`` (S, k): by how much, N; ``weight``: share of the
-        weight.
-        """
+        """Return forces (S, k) at loads (S, k), and a share of the weight."""
         return loads_of(index, force, len(self.twist), weight)
 
     def answer(self, name: str, index: Ints, force: Floats, loads: Loads | None = None) -> Floats:
@@ -136,16 +126,14 @@ class ComplianceOperator(FrozenValue):
 
         Where there are fewer sets than loads of all bricks, their twists and wrenches are summed
         and mapped; else those of the loads are mapped, once, and then summed. So are reactions,
-        which few of the wrenches tell.
-
-        ``name``: of a field; ``index`` (S, k): loads that act; ``force`` (S, k): by how much, N;
-        ``loads``: the same, if it was made before. Result (S, Q).
+        which few of the wrenches tell. ``loads``: from the others, if it was made before.
         """
         few = name == "support" or 2 * self.axis.size <= max(_FEW, len(index))
         if few:  # whatever was asked before: answers do not depend on it
             loads = self.loads(index, force) if loads is None else loads
             return loads.sum(getattr(self, name))
-        states, out = self._states(name), np.empty((len(index), self.maps.count(name)))
+        states = self.twist if name in _OF_TWISTS else self.wrench
+        out = np.empty((len(index), self.maps.count(name)))
         step = max(16, AT_ONCE // states.shape[1])
         for start in range(0, len(index), step):
             part = slice(start, start + step)
@@ -165,16 +153,10 @@ class ComplianceOperator(FrozenValue):
         for i in range(nodes):  # two may share an edge
             out[np.arange(len(index)), self.inner_edge[brick[:, i]]] += along[:, i]
 
-    def _states(self, name: str) -> Floats:
-        return self.twist if name in _OF_TWISTS else self.wrench
-
-    def _rows(self, name: str) -> Floats:
-        return self.maps.apply(name, self._states(name))
-
     @cached_property
     def edge_force(self) -> Floats:
         """Axial forces of all edges under every load, (l + 1, E)."""
-        out, width = self._rows("edge_force"), self.directions
+        out, width = self.maps.apply("edge_force", self.wrench), self.directions
         out[-1, self.inner_edge] += self.at_second
         rows = 2 * width * np.arange(len(self.held))[:, None] + width + np.arange(width)
         out[rows, self.inner_edge[self.held][:, None]] += self.axis[self.held]
@@ -183,30 +165,26 @@ class ComplianceOperator(FrozenValue):
     @cached_property
     def displacement(self) -> Floats:
         """Displacements of all nodes, (l + 1, 3n)."""
-        return frozen(self._rows("displacement"))
+        return frozen(self.maps.apply("displacement", self.twist))
 
     @cached_property
     def support(self) -> Floats:
         """Force and moment at every ground end of the scene, (l + 1, 6G)."""
-        return frozen(self._rows("support"))
+        return frozen(self.maps.apply("support", self.wrench))
 
     @cached_property
     def joint_wrench(self) -> Floats:
         """Wrenches of all springs of the network, (l + 1, 6S)."""
-        return frozen(self._rows("joint_wrench"))
+        return frozen(self.maps.apply("joint_wrench", self.wrench))
 
     @cached_property
     def brick_twist(self) -> Floats:
         """Twists of all bricks, (l + 1, 6b)."""
-        return frozen(self._rows("brick_twist"))
+        return frozen(self.maps.apply("brick_twist", self.twist))
 
 
 class OperatorBuilder:
-    """Makes the operator of any brick count of a tree from what grows with it.
-
-    ``tree``: on which the bricks hang. ``basis``: the directions in which bricks are loaded and
-    move; all by default.
-    """
+    """Makes the operator of any brick count of a tree from what grows with it."""
 
     def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
         self.network, self.basis = network, basis
@@ -215,17 +193,28 @@ class OperatorBuilder:
         self._nodes = inner_motions(network, basis)
 
     def operator(self, bricks: int, held: Ints | None = None) -> ComplianceOperator:
-        """Return the operator of a partial structure.
+        """Return the operator of at most as many bricks as the tree has.
 
-        ``bricks``: how many bricks stand, at most as many as the tree has. ``held`` (h,): the
-        bricks at whose nodes loads act, ascending; all by default.
+        ``held`` (h,): the bricks at whose nodes loads act, ascending; all by default.
         """
         self.growth.reach(bricks)
         held = np.arange(bricks) if held is None else held
         which = slice(bricks) if len(held) == bricks else held
         nodes = self._nodes[which]
-        twist, wrench = self._rows(bricks, which, nodes)
-        moved = _at_nodes(twist.reshape(len(twist), bricks, nodes.shape[2])[:, which], nodes)
+        k, loads = nodes.shape[2], nodes.shape[0] * nodes.shape[1]
+        springs = int(np.searchsorted(self.network.springs.since, bricks, side="right"))
+        found = []  # twists and wrenches under unit loads at nodes, and under the weight
+        for answers, width in ((self.growth.twist, k * bricks), (self.growth.wrench, k * springs)):
+            by_brick = answers[1 : 1 + k * bricks, :width].reshape(bricks, k, width)
+            rows = np.empty((loads + 1, width))
+            np.matmul(nodes, by_brick[which], out=rows[:-1].reshape(*nodes.shape[:2], width))
+            rows[-1] = answers[0, :width]
+            found.append(rows)
+        twist, wrench = found
+        turned = twist.reshape(len(twist), bricks, k)[:, which].transpose(1, 0, 2)
+        at_nodes = np.empty((len(twist), *nodes.shape[:2]))  # displacements
+        np.matmul(turned, nodes.swapaxes(1, 2), out=at_nodes.transpose(1, 0, 2))
+        moved = at_nodes.reshape(len(twist), loads)
         inner_edge, axis, at_second = inner_edges(self.network, bricks)
         return ComplianceOperator(
             held=held,
@@ -239,23 +228,3 @@ class OperatorBuilder:
             inner_edge=inner_edge,
             loss=np.repeat(self.growth.loss[held], nodes.shape[1]),
         )
-
-    def _rows(self, bricks: int, which: Ints | slice, nodes: Floats) -> tuple[Floats, Floats]:
-        """Return the twists and wrenches under unit loads at nodes, and under the weight."""
-        k, loads = nodes.shape[2], nodes.shape[0] * nodes.shape[1]
-        springs = int(np.searchsorted(self.network.springs.since, bricks, side="right"))
-        out = []
-        for answers, width in ((self.growth.twist, k * bricks), (self.growth.wrench, k * springs)):
-            by_brick = answers[1 : 1 + k * bricks, :width].reshape(bricks, k, width)
-            rows = np.empty((loads + 1, width))
-            np.matmul(nodes, by_brick[which], out=rows[:-1].reshape(*nodes.shape[:2], width))
-            rows[-1] = answers[0, :width]
-            out.append(rows)
-        return out[0], out[1]
-
-
-def _at_nodes(twist: Floats, nodes: Floats) -> Floats:
-    """Return the displacements (L, 2dh) of nodes for rows of twists (L, h, k)."""
-    out = np.empty((len(twist), *nodes.shape[:2]))
-    np.matmul(twist.transpose(1, 0, 2), nodes.swapaxes(1, 2), out=out.transpose(1, 0, 2))
-    return out.reshape(len(twist), nodes.shape[0] * nodes.shape[1])

@@ -35,6 +35,7 @@ from seqopt.engines.rigid._mechanism import Shared, Ungripped, require_resistanc
 from seqopt.engines.rigid._mixed import (
     LAST_CORRECTION,
     Solution,
+    bordered,
     rescaled,
     respond,
     solve_mixed,
@@ -61,42 +62,31 @@ class _HeldSystem:
     factors: SuperLU  # of the system of 6s wrenches, 6b twists and m forces that hold
 
     def solve(self, loads: Floats, moved: Floats | None = None) -> tuple[Floats, Floats]:
-        """Return the answers to right-hand sides.
+        """Return scaled states (S, 6s + 6b) and the forces (S, m) that pull at loose motions, N.
 
         ``loads`` (S, 6s + 6b): scaled, of the springs' equations and of equilibrium. ``moved`` (S,
-        m): how far the loose motions are moved, m; nowhere by default. Results: ``states`` (S, 6s +
-        6b): scaled; ``force`` (S, m): with which the loose motions must be pulled, N.
+        m): how far the loose motions are moved, m; nowhere by default.
         """
-        whole = np.zeros((loads.shape[1] + self.loose, len(loads)), order="F")
-        whole[: loads.shape[1]] = loads.T
+        size = loads.shape[1]
+        whole = np.zeros((size + self.loose, len(loads)), order="F")
+        whole[:size] = loads.T
         if moved is not None:
-            whole[loads.shape[1] :] = moved.T
+            whole[size:] = moved.T
         answer = self.factors.solve(whole).T
-        states, force = np.split(answer, [loads.shape[1]], axis=1)
-        return states, force * self.parts.unit
+        return answer[:, :size], answer[:, size:] * self.parts.unit
 
 
-def hold_loose(parts: Ungripped, *, tied: bool = False) -> _HeldSystem:
+def _hold_loose(parts: Ungripped, *, tied: bool = False) -> _HeldSystem:
     """Return the factored system of a partial structure with its loose motions held.
 
     ``tied``: whether springs are known to tie every brick to the ground, however softly. Raises
     `SolverError` if it is exactly singular all the same.
     """
-    matrix, rows = parts.matrix, _held_motions(parts, tied=tied)
-    if rows.shape[0]:
-        joints = len(parts.wrench_unit)
-        wide = sparse.csr_array(
-            (rows.data, rows.indices + joints, rows.indptr), shape=(rows.shape[0], matrix.shape[0])
-        )
-        matrix = sparse.block_array([[matrix, -wide.T], [wide, None]], format="csc")
+    rows = _held_motions(parts, tied=tied)
+    matrix = bordered(parts.matrix, rows)
     try:
         # springs first, then bricks as they are built: neighbors stand near each other
-        factors = splu(
-            sparse.csc_array(matrix),
-            permc_spec="NATURAL",
-            diag_pivot_thresh=_NEAR,
-            panel_size=_PANEL,
-        )
+        factors = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=_NEAR, panel_size=_PANEL)
     except RuntimeError as error:  # SuperLU met an exactly zero pivot
         raise SolverError(
             f"{parts.bricks} bricks: exactly singular in double precision; stiffen what is soft"
@@ -106,15 +96,20 @@ def hold_loose(parts: Ungripped, *, tied: bool = False) -> _HeldSystem:
 
 def _held_motions(parts: Ungripped, *, tied: bool) -> sparse.csr_array:
     """Return the rows (m, 6b) whose products with scaled twists say how far loose motions go."""
-    stiff = parts.stiffness.reshape(-1, 6)
-    firm = stiff.min(axis=1) >= _SOFT
+    firm = parts.stiffness.reshape(-1, 6).min(axis=1) >= _SOFT
     none = sparse.csr_array((0, 6 * parts.bricks))
     if tied and firm.all():
         return none
     label, first = _clusters(parts, firm)
     if not len(first):
         return none
-    rigid = _cluster_motions(parts, label, first)
+    center = parts.network.centroid[: parts.bricks]
+    each = np.zeros((parts.bricks, 6, len(first), 6))  # twists where groups move as one
+    for group, lead in enumerate(first):
+        mine = np.flatnonzero(label == group)
+        each[mine, :3, group] = point_motion(center[mine] - center[lead])
+        each[mine, 3:, group, 3:] = np.eye(3)
+    rigid = each.reshape(6 * parts.bricks, -1) / parts.twist_unit[:, None]
     soft = np.repeat(~firm, 6)
     strain = np.sqrt(parts.stiffness[soft])[:, None] * (parts.deformation[soft] @ rigid)
     _, sizes, modes = np.linalg.svd(strain)  # SciPy 1.12 refuses an empty matrix
@@ -137,40 +132,26 @@ def _clusters(parts: Ungripped, firm: Bools) -> tuple[Ints, Ints]:
     tied = sparse.coo_array((np.ones(len(ends)), tuple(ends.T)), shape=(size, size))
     _, label = csgraph.connected_components(tied, directed=False)
     loose = np.flatnonzero(label[:-1] != label[-1])
-    names, first, own = np.unique(label[loose], return_index=True, return_inverse=True)
+    _, first, own = np.unique(label[loose], return_index=True, return_inverse=True)
     out = np.full(parts.bricks, -1)
     out[loose] = own
-    return out, loose[first][np.arange(len(names))]
-
-
-def _cluster_motions(parts: Ungripped, label: Ints, first: Ints) -> Floats:
-    """Return the scaled twists (6b, 6c) of all bricks when groups of them move as one."""
-    center = parts.network.centroid[: parts.bricks]
-    out = np.zeros((parts.bricks, 6, len(first), 6))
-    for group, lead in enumerate(first):
-        mine = np.flatnonzero(label == group)
-        out[mine, :3, group] = point_motion(center[mine] - center[lead])
-        out[mine, 3:, group, 3:] = np.eye(3)
-    return out.reshape(6 * parts.bricks, -1) / parts.twist_unit[:, None]
+    return out, loose[first]
 
 
 _TIED = 0.1  # most that what resists loose motions may be of the springs that they stand on
 
 
-def held_operator(system: _HeldSystem) -> ComplianceOperator:
+def _held_operator(system: _HeldSystem) -> ComplianceOperator:
     """Return the operator of a partial structure whose loose motions are unknowns of grip sets.
 
-    Result: of all directions of space, with a load for each loose motion after those of the nodes.
+    It is of all directions of space, with a load for each loose motion after those of the nodes.
     """
     parts, loose = system.parts, system.loose
     joints, loads = len(parts.wrench_unit), 6 * parts.bricks
-    inner = parts.inner
     right = np.zeros((loads + loose, joints + loads))
-    right[:loads, joints:] = inner.toarray() / parts.unit
-    moved = np.zeros((loads + loose, loose))
-    moved[loads:] = np.eye(loose)
-    states, pull = system.solve(right, moved)
-    motion = (inner @ states[:, joints:].T).T
+    right[:loads, joints:] = parts.inner.toarray() / parts.unit
+    states, pull = system.solve(right, np.eye(loads + loose, loose, -loads))
+    motion = (parts.inner @ states[:, joints:].T).T
     reach, resistance = motion[loads:], pull[loads:]
     softness = _softness(motion[:loads], reach, resistance, parts.unit)
     states[:loads] += softness * (reach.T @ states[loads:])
@@ -205,17 +186,14 @@ def _operator(
     weight = np.zeros(len(states))
     weight[:loads] = network.inner_weight[: 2 * bricks].ravel()
     wrench, twist = unscaled(parts, states)
+    wrench = wrench[:, parts.acting].reshape(len(states), -1)
     inner_edge, axis, at_second = inner_edges(network, bricks)
-
-    def with_weight(rows: Floats) -> Floats:
-        return np.vstack([rows, weight @ rows])
-
     return ComplianceOperator(
         held=np.arange(bricks),
         flexibility=flexibility,
         dead_displacement=flexibility @ weight,
-        twist=with_weight(twist),
-        wrench=with_weight(wrench[:, parts.acting].reshape(len(states), -1)),
+        twist=np.vstack([twist, weight @ twist]),
+        wrench=np.vstack([wrench, weight @ wrench]),
         maps=ResponseMaps(scene_maps(network), bricks),
         at_second=at_second,
         axis=axis,
@@ -234,8 +212,7 @@ _HARDLY_HELD = 1e-9  # a pivot of loose motions below which they are looked into
 class Refinement:
     """Answers grip sets of one partial structure to rounding, whatever is loose in it.
 
-    ``shared``: what the systems of all brick counts are cut from, if it is known; ``tied``: whether
-    springs are known to tie every brick to the ground.
+    ``tied``: whether springs are known to tie every brick to the ground.
     """
 
     def __init__(
@@ -243,15 +220,14 @@ class Refinement:
     ) -> None:
         self.network, self.bricks = network, bricks
         self.parts = ungripped_system(network, bricks, shared)
-        self.held: _HeldSystem = hold_loose(self.parts, tied=tied)
-        self.inner = self.parts.inner
+        self.held, self.inner = _hold_loose(self.parts, tied=tied), self.parts.inner
         weighed = sparse.csr_array(self.parts.load[None])
         self.pulls = sparse.vstack([self.inner / self.parts.unit, weighed], format="csr")
 
     @cached_property
     def own(self) -> ComplianceOperator:
         """Of all nodes and directions, from the factored system; for where something is loose."""
-        return held_operator(self.held)
+        return _held_operator(self.held)
 
     def solve(
         self,
@@ -262,26 +238,21 @@ class Refinement:
     ) -> Fields:
         """Return all fields of grip sets.
 
-        ``columns`` (S, r): grips as indices into ``network.inner.ravel()``. ``operator``: with
-        wrenches and twists, if there is one for these grips; it serves if nothing is loose.
-        ``largest``: correction of a set after which it needs no other, over the largest of each
-        kind. ``basis``: the directions that the operator knows; in the others nothing may move.
+        ``operator``: with wrenches and twists, if there is one for these grips; it serves if
+        nothing is loose. ``largest``: correction of a set after which it needs no other, over the
+        largest of each kind. ``basis``: the directions that the operator knows; in the others
+        nothing may move.
         """
-        empty = no_sets(self.network, self.bricks, columns.shape[1])
         starts = range(0, len(columns), _TOGETHER)
         if operator is None or self.held.loose:
             operator, basis = self.own, SPACE
-        corrector = Corrector(self, operator, largest, basis)
+        corrector = _Corrector(self, operator, largest, basis)
         parts = (corrector.together(columns[i : i + _TOGETHER]) for i in starts)
-        return join_sets([empty, *parts])
+        return join_sets([no_sets(self.network, self.bricks, columns.shape[1]), *parts])
 
 
-class Corrector:
-    """Corrects what an operator answers.
-
-    ``largest``: correction of a set after which it needs no other; ``basis``: the directions that
-    the operator knows.
-    """
+class _Corrector:
+    """Corrects what an operator answers; as of `Refinement.solve`."""
 
     def __init__(
         self,
@@ -295,22 +266,18 @@ class Corrector:
         self.operator, self.largest, self.basis = operator, largest, basis
 
     def together(self, columns: Ints) -> Fields:
-        """Return the fields of a few sets.
-
-        ``columns`` (S, r): grips as indices into ``network.inner.ravel()``.
-        """
+        """Return the fields of a few sets."""
         operator, parts, bricks = self.operator, self.parts, self.bricks
         index = operator.load_index(columns)
         found = grip_forces(operator, columns, index)
         if operator.loose:
             for row in columns[~(found.lowest >= _HARDLY_HELD)]:
                 require_resistance(self.network, bricks, row)
-        answers = _Answers(
-            self._states(index, found.force), self._in_space(found.force, columns.shape[1])
-        )
-        done = self._correct(columns, index, answers)
-        wrench, twist = unscaled(parts, answers.states[done])
-        held = answers.force[done].reshape(int(done.sum()), columns.shape[1], 3)
+        states = self._states(index, found.force)
+        force = self._in_space(found.force, columns.shape[1])
+        done = self._correct(columns, index, states, force)
+        wrench, twist = unscaled(parts, states[done])
+        held = force[done].reshape(int(done.sum()), columns.shape[1], 3)
         solution = Solution(twist, wrench, held)
         motion = operator.maps.motion if self.basis is SPACE else parts.motion
         fields = respond(self.network, parts.statics, motion, columns[done], solution)
@@ -322,10 +289,8 @@ class Corrector:
         """Return the scaled answers (S, n) to forces (S, k) at loads, and the weight or none."""
         loads = self.operator.loads(index, force, weight)
         every = self.basis.wrench
-        wrench, twist = (
-            loads.sum(rows).reshape(len(index), -1, len(every)) @ every
-            for rows in (self.operator.wrench, self.operator.twist)
-        )
+        rows = self.operator.wrench, self.operator.twist
+        wrench, twist = (loads.sum(r).reshape(len(index), -1, len(every)) @ every for r in rows)
         return rescaled(self.parts, wrench, twist.reshape(len(index), -1))
 
     def _in_space(self, force: Floats, grips: int) -> Floats:
@@ -334,18 +299,21 @@ class Corrector:
         nodes = force[:, : grips * width].reshape(len(force), grips, width)
         return np.asarray(nodes @ self.basis.force).reshape(len(force), 3 * grips)
 
-    def _correct(self, columns: Ints, index: Ints, answers: _Answers) -> Bools:
-        """Correct answers until they no longer change; return which have come so far, (S,)."""
+    def _correct(self, columns: Ints, index: Ints, states: Floats, force: Floats) -> Bools:
+        """Correct answers in place until they no longer change; return which have come so far.
+
+        ``states`` (S, n): scaled wrenches and twists; ``force`` (S, 3r): of the grips.
+        """
         done = np.zeros(len(columns), dtype=bool)
-        left = np.flatnonzero(np.isfinite(answers.states).all(axis=1))
+        left = np.flatnonzero(np.isfinite(states).all(axis=1))
         for _ in range(_STEPS):
             if not len(left):
                 break
-            state, force = answers.states[left], answers.force[left]
-            change, more = self._correction(columns[left], index[left], state, force)
-            answers.states[left] = state + change
-            answers.force[left] = force + more
-            done[left] = unchanged(self.parts, state, change, self.largest)
+            before = states[left]
+            change, more = self._correction(columns[left], index[left], before, force[left])
+            states[left] += change
+            force[left] += more
+            done[left] = unchanged(self.parts, before, change, self.largest)
             left = left[~done[left] & np.isfinite(change).all(axis=1)]
         return done
 
@@ -370,11 +338,3 @@ class Corrector:
         more = self._in_space(change, grips)
         change[:, change.shape[1] - operator.loose :] += loose
         return answer + self._states(index, change, 0.0), more
-
-
-@dataclass(frozen=True)
-class _Answers:
-    """Scaled wrenches and twists (S, n), and forces of the grips (S, 3r), corrected in place."""
-
-    states: Floats
-    force: Floats

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
 
 import numpy as np
 from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.engines.interface import SPACE, Basis
+from seqopt.engines.interface import SHAPES, SPACE, Basis, counts_of_fields
 from seqopt.network._mechanics import build_statics, node_motion
 from seqopt.network.network import Network
 
@@ -36,7 +37,7 @@ class _SceneMaps(FrozenValue):
 
 
 def scene_maps(network: Network, basis: Basis = SPACE) -> _SceneMaps:
-    """Return the maps of a scene. ``basis``: all directions by default."""
+    """Return the maps of a scene."""
     statics, springs = build_statics(network), network.springs
     pick = np.zeros((3, len(basis.wrench)))
     pick[:, : len(basis.force)] = basis.force.T
@@ -45,15 +46,11 @@ def scene_maps(network: Network, basis: Basis = SPACE) -> _SceneMaps:
     if basis is not SPACE:
         each = sparse.eye_array(len(network.inner))
         motion = sparse.csr_array(motion @ sparse.kron(each, basis.wrench.T))
-    since = np.where(network.node_spring >= 0, springs.since[network.node_spring], 0)
-    return _SceneMaps(
-        network=network,
-        basis=basis,
-        edge=sparse.csr_array(statics.edge_of_spring @ sparse.kron(every, pick)),
-        motion=motion,
-        since=np.repeat(np.repeat(since, 3), np.diff(motion.indptr)),
-        support=basis.wrench @ statics.support_of_spring.transpose(0, 2, 1),
-    )
+    edge = sparse.csr_array(statics.edge_of_spring @ sparse.kron(every, pick))
+    of_node = np.where(network.node_spring >= 0, springs.since[network.node_spring], 0)
+    since = np.repeat(np.repeat(of_node, 3), np.diff(motion.indptr))
+    support = basis.wrench @ statics.support_of_spring.transpose(0, 2, 1)
+    return _SceneMaps(network, basis, edge, motion, since, support)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -84,30 +81,25 @@ class ResponseMaps(FrozenValue):
     def nbytes(self) -> int:
         """Bytes of the maps that were made."""
         made = [vars(self)[name] for name in ("edge", "motion") if name in vars(self)]
-        parts = [(found.data, found.indices, found.indptr) for found in made]
-        return sum(array.nbytes for arrays in parts for array in arrays)
+        return sum(each.data.nbytes + each.indices.nbytes + each.indptr.nbytes for each in made)
 
     def count(self, name: str) -> int:
         """Return how many numbers a field has."""
-        network, bricks = self.scene.network, self.bricks
-        return {
-            "edge_force": network.count_edges(bricks),
-            "displacement": 3 * network.count_nodes(bricks),
-            "support": 6 * len(network.springs.support),
-            "joint_wrench": 6 * len(network.springs.since),
-            "brick_twist": 6 * bricks,
-        }[name]
+        return counts_of_fields(self.scene.network, self.bricks)[name] * prod(SHAPES[name])
 
     def apply(self, name: str, states: Floats, out: Floats | None = None) -> Floats:
-        """Return a field of states.
+        """Return a field of states, edge forces without what loads add to the inner edges.
 
-        ``name``: of the field. ``states`` (S, n): wrenches; of displacements and brick twists,
-        twists. ``out`` (S, Q): where to put it. Result (S, Q): of edge forces, without what loads
-        on the bricks' nodes add to the inner edges.
+        ``states`` (S, n): wrenches; of displacements and brick twists, twists. ``out`` (S, Q):
+        where to put it.
         """
         out = np.empty((len(states), self.count(name))) if out is None else out
         if name == "support":
-            self._support(states, out)
+            k = len(self.scene.basis.wrench)
+            for g, spring in enumerate(self.scene.network.springs.support.tolist()):
+                mine = states[:, k * spring : k * spring + k]
+                there = mine.shape[1] > 0  # else it does not act
+                out[:, 6 * g : 6 * g + 6] = mine @ self.scene.support[g] if there else 0.0
         elif name in ("joint_wrench", "brick_twist"):
             basis = self.scene.basis
             own = states.reshape(len(states), -1, len(basis.wrench))
@@ -121,14 +113,6 @@ class ResponseMaps(FrozenValue):
                 part = slice(start, start + step)
                 out[part] = (maps @ states[part].T).T
         return out
-
-    def _support(self, states: Floats, out: Floats) -> None:
-        """Put force and moment at every ground end of the scene; zero where it does not act."""
-        k = len(self.scene.basis.wrench)
-        for g, spring in enumerate(self.scene.network.springs.support.tolist()):
-            mine = states[:, k * spring : k * spring + k]
-            there = mine.shape[1] > 0
-            out[:, 6 * g : 6 * g + 6] = mine @ self.scene.support[g] if there else 0.0
 
 
 def _leading(
@@ -155,7 +139,7 @@ class Loads:
     count: int  # how many rows there are, the weight's among them
 
     def sum(self, rows: Floats) -> Floats:
-        """Return the sums of what the loads mean. ``rows`` (count, Q). Result (S, Q)."""
+        """Return the sums (S, Q) of what the loads mean by rows (count, Q)."""
         if self.index.size * rows.shape[1] <= _GATHERED:  # in the order of the sparse product
             return np.asarray(np.einsum("sk,skq->sq", self.share, rows[self.index]))
         return np.asarray(self.matrix @ rows)
@@ -169,17 +153,11 @@ class Loads:
 
 
 def loads_of(index: Ints, force: Floats, count: int, weight: float = 1.0) -> Loads:
-    """Return forces at the loads of an operator beside the weight.
-
-    ``index`` (S, k): rows of the operator that are loaded; ``force`` (S, k): by how much, N;
-    ``count``: how many rows there are, the weight's among them, which comes last; ``weight``: share
-    of the weight.
-    """
+    """Return forces (S, k) at loads (S, k) beside a share of the weight, the last of the rows."""
     sets, loads = index.shape
     rows = np.full((sets, loads + 1), count - 1, dtype=np.int32)
-    rows[:, :-1] = index
     share = np.full((sets, loads + 1), weight)
-    share[:, :-1] = force
+    rows[:, :-1], share[:, :-1] = index, force
     return Loads(rows, share, count)
 
 
@@ -195,10 +173,7 @@ def inner_edges(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
 
 
 def inner_motions(network: Network, basis: Basis) -> Floats:
-    """Return the displacements of the inner nodes of bricks for their unit twists.
-
-    ``basis``: d directions of forces, k of twists. Result (n, 2d, k).
-    """
+    """Return the displacements (n, 2d, k) of the inner nodes of bricks for their unit twists."""
     count, forces = len(network.inner), len(basis.force)
     arms = network.node_position[network.inner] - network.centroid[:count, None]
     out = np.zeros((count, 2, forces, len(basis.wrench)))

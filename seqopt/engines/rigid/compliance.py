@@ -40,7 +40,6 @@ from seqopt.engines.rigid._mechanism import Shared, share
 from seqopt.engines.rigid._mixed import LAST_CORRECTION
 from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder
 from seqopt.engines.rigid._refinement import Refinement
-from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 
@@ -62,20 +61,16 @@ class _Tried:
     trusted: Bools  # (S,); which sets it answers well enough
 
     def fields(self, want: Want) -> dict[str, Floats]:
-        """Return the fields of all sets by name.
-
-        Result: as of `Fields`, grip forces in the directions of the operator.
-        """
+        """Return the fields of all sets by name, grip forces in the operator's directions."""
         operator, columns = self.operator, self.columns
         force = self.force.copy() if len(self.pairs.sets) else self.force
         loads, asked = operator.loads(self.index, force), names_wanted(want)
         found = {}
         for name, shape in SHAPES.items():
+            wanted = np.empty((len(columns), 0))
             if name in asked:
                 wanted = operator.answer(name, self.index, force, loads)
-                found[name] = wanted.reshape(len(wanted), wanted.shape[1] // prod(shape), *shape)
-            else:
-                found[name] = np.empty((len(columns), 0, *shape))
+            found[name] = wanted.reshape(len(wanted), wanted.shape[1] // prod(shape), *shape)
         share_pairs(operator, columns, self.index, force, found["edge_force"], self.pairs)
         nodes = force[:, : columns.shape[1] * operator.directions]
         found["grip_force"] = nodes.reshape(*columns.shape, operator.directions)
@@ -87,9 +82,8 @@ def _try_forces(
 ) -> _Tried:
     """Return what an operator alone says about grip sets, and which of them it answers well enough.
 
-    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``; ``even``: whether the
-    joints are about equally stiff: where not, pivots do not tell the whole error; ``accuracy``:
-    largest error of fields, over the largest entry of each, that is accepted.
+    ``even``: whether the joints are about equally stiff: where not, pivots do not tell the whole
+    error; ``accuracy``: largest error of fields, over the largest entry of each, that is accepted.
     """
     sets, index, pairs = len(columns), operator.load_index(columns), pairs_of(operator, columns)
     force, good = np.empty(index.shape), np.empty(sets, dtype=bool)
@@ -101,7 +95,7 @@ def _try_forces(
         good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN)
     force[~good] = 0.0
     if not even:
-        good &= ~cancels(operator, index, force)
+        good &= ~_cancels(operator, index, force)
     return _Tried(operator, columns, index, force, pairs, good)
 
 
@@ -113,27 +107,17 @@ def _solve_batch(
     even: bool = True,
     accuracy: float = ACCURACY,
 ) -> tuple[Fields, Bools]:
-    """Return the fields of grip sets, and which of them are accurate.
-
-    ``columns`` (S, r): grips as indices into ``network.inner.ravel()``; ``even``, ``accuracy``: as
-    of `_try_forces`: joints about equally stiff, `ACCURACY`. Results: ``fields``: forces in the
-    directions of the operator; ``trusted`` (S,).
-    """
+    """Return the fields of grip sets, as `_Tried.fields`, and which of them (S,) are accurate."""
     tried = _try_forces(operator, columns, even=even, accuracy=accuracy)
     return Fields(**tried.fields(want)), tried.trusted
 
 
-def cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
-    """Return whether motions cancel at the grips of sets.
-
-    ``index`` (S, k): rows of the operator that the grips load; ``force`` (S, k): there, N. Result
-    (S,).
-    """
+def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
+    """Return whether motions cancel at the grips of sets (S,), by forces (S, k) at rows (S, k)."""
     out = np.zeros(len(index), dtype=bool)
     if not index.size:
         return out
-    size = np.abs(operator.flexibility)
-    dead = operator.dead_displacement
+    size, dead = np.abs(operator.flexibility), operator.dead_displacement
     for start in range(0, len(index), _CHUNK):
         rows, pull = index[start : start + _CHUNK], force[start : start + _CHUNK]
         held = rows[:, :, None], rows[:, None]
@@ -143,7 +127,7 @@ def cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
     return out
 
 
-class Kept:
+class _Kept:
     """The operators that were asked for last, by brick count.
 
     ``most``: bytes that they may take when a further one is to be made.
@@ -152,7 +136,6 @@ class Kept:
     def __init__(self, most: float) -> None:
         self._most = most
         self._operators: dict[int, ComplianceOperator] = {}  # the one asked last comes last
-        self._bytes: dict[int, int] = {}
 
     def take(self, bricks: int) -> ComplianceOperator | None:
         """Return the operator of a brick count, if it is here, and give it away."""
@@ -164,14 +147,9 @@ class Kept:
 
     def make_room(self) -> None:
         """Drop those that were not asked for longest, until the rest takes little memory."""
-        if self._operators:
-            last = next(reversed(self._operators))
-            self._bytes[last] = self._operators[last].nbytes  # it grows while it is asked
-        total = sum(self._bytes.get(bricks, 0) for bricks in self._operators)
+        total = sum(operator.nbytes for operator in self._operators.values())
         while total > self._most:
-            first = next(iter(self._operators))
-            del self._operators[first]
-            total -= self._bytes.get(first, 0)
+            total -= self._operators.pop(next(iter(self._operators))).nbytes
 
 
 _KEPT = 32e6  # bytes of operators that may stay when another is made
@@ -190,53 +168,38 @@ class ComplianceEngine(NamedEngine):
     def __init__(
         self, network: Network | Scene, basis: Basis = SPACE, accuracy: float = ACCURACY
     ) -> None:
-        network = network_of(network)
-        self._network = network
+        super().__init__(network)
         self._basis, self._accuracy = basis, accuracy
-        self._tree = grow_tree(network)
-        self._kept = Kept(_KEPT)
-        self._even = _count_even(network)
+        self._tree, self._even = grow_tree(self.network), _count_even(self.network)
+        self._kept = _Kept(_KEPT)
         self._refinement: Refinement | None = None  # of the brick count that was asked last
-
-    @property
-    def network(self) -> Network:
-        """The network whose nodes and edges the fields follow."""
-        return self._network
 
     @failing_in_a_line
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
-        """Return the fields of a partial structure for many grip sets.
-
-        ``grips`` (S, r): node numbers.
-        """
+        """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self._network, bricks, grips)
-        tried = self._tried(bricks, columns, want) if bricks <= len(self._tree.spring) else None
+        tried: _Tried | None = None
+        if bricks <= len(self._tree.spring):
+            operator, even = self._operator(bricks, columns), bricks <= self._even
+            accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
+            tried = _try_forces(operator, columns, even=even, accuracy=accuracy)
         if tried is None or (len(columns) and not tried.trusted.any()):
-            answer = keep_wanted(self._refined(bricks, columns, want), want)
-            return require_finite(answer, bricks, grips)
+            return require_finite(self._refined(bricks, columns, want), bricks, grips)
         found = tried.fields(want)
         if self._basis is not SPACE:
             found["grip_force"] = found["grip_force"] @ self._basis.force
         if not tried.trusted.all():
             wrong = ~tried.trusted
-            better = keep_wanted(self._refined(bricks, columns[wrong], want), want)
+            better = self._refined(bricks, columns[wrong], want)
             for name, values in found.items():
                 values[wrong] = getattr(better, name)
         return require_finite(Fields(**found), bricks, grips)
-
-    def _tried(self, bricks: int, columns: Ints, want: Want) -> _Tried:
-        """Return what the operator alone says about grip sets."""
-        operator, even = self._operator(bricks, columns), bricks <= self._even
-        accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
-        return _try_forces(operator, columns, even=even, accuracy=accuracy)
 
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
         known = self._kept.take(bricks)
         if known is None or not known.covers(columns // 2):
-            held = np.unique(columns // 2)
-            if known is not None:
-                held = np.union1d(held, known.held)
+            held = np.union1d(columns // 2, np.arange(0) if known is None else known.held)
             if 2 * len(held) >= bricks:
                 held = np.arange(bricks)
             self._kept.make_room()
@@ -256,14 +219,15 @@ class ComplianceEngine(NamedEngine):
         return OperatorBuilder(self._network, self._tree, self._basis)
 
     def _refined(self, bricks: int, columns: Ints, want: Want) -> Fields:
-        """Return the fields of grip sets that the operator alone does not answer well enough."""
+        """Return what is wanted of grip sets that the operator alone answers not well enough."""
         largest = _SCREEN if want & Want.SCREEN else LAST_CORRECTION
         operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
                 tied = operator is not None  # the tree that it grew on reaches them all
                 self._refinement = Refinement(self._network, bricks, self._shared, tied=tied)
-            return self._refinement.solve(columns, operator, largest, self._basis)
+            answer = self._refinement.solve(columns, operator, largest, self._basis)
+        return keep_wanted(answer, want)
 
 
 def _count_even(network: Network) -> int:
@@ -273,6 +237,5 @@ def _count_even(network: Network) -> int:
     even = np.ones(len(order), dtype=bool)
     for stiffness in (springs.translational_stiffness, springs.rotational_stiffness):
         low = np.minimum.accumulate(stiffness[order].min(axis=1))
-        high = np.maximum.accumulate(stiffness[order].max(axis=1))
-        even &= low >= _EVEN * high
+        even &= low >= _EVEN * np.maximum.accumulate(stiffness[order].max(axis=1))
     return len(network.inner) if even.all() else int(springs.since[order][even.argmin()]) - 1
