@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
@@ -16,7 +17,7 @@ import numpy as np
 
 from seqopt._showing import Shown
 from seqopt.arrays import Floats
-from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.problem.requirements import Criterion, Limit, as_limits
@@ -24,7 +25,6 @@ from seqopt.problem.standing import MARGINS, Standing
 from seqopt.responses.quantities import robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import short
-from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
@@ -81,12 +81,9 @@ class Aim(Enum):
     SUM = "sum"
     PEAK = "peak"
 
-    @property
-    def value_of(self) -> Callable[[Costs, Sequence[int]], float]:
-        """The value of a choice: its total, or its largest cost."""
-        if self is Aim.SUM:
-            return lambda costs, choice: costs.cost(choice)
-        return lambda costs, choice: costs.worst(choice)
+    def worth(self, costs: Costs, choice: Sequence[int]) -> float:
+        """Return the value of a choice: its total, or its largest cost."""
+        return costs.cost(choice) if self is Aim.SUM else costs.worst(choice)
 
     def costs(self, problem: _Costed[Found_co]) -> Found_co:
         """Return the costs of a problem that this aim is about: its sums or its peaks."""
@@ -105,10 +102,9 @@ class RobustKind(Enum):
 class RobustAim:
     """What to minimize over scenarios, all of which are equally likely.
 
-    ``kind``: the largest cost of any step in any scenario; the largest total over the build of any
-    scenario; or the mean total of the worst scenarios (conditional value at risk); ``level``: of
-    the last: the share of scenarios that is left out, from 0 (the mean over all) to below 1. Raises
-    `ProblemError` if the level is none.
+    That is the largest cost of any step in any scenario, the largest total over the build of any
+    scenario, or the mean total of the worst scenarios (conditional value at risk), where ``level``
+    is the share of scenarios that is left out, from 0 (the mean over all) to below 1.
 
     Examples
     --------
@@ -140,20 +136,13 @@ class RobustAim:
         return Aim.PEAK if self.kind is RobustKind.WORST_PEAK else Aim.SUM
 
     def most(self, count: int) -> float:
-        """Return the largest weight of a scenario in the mean of the worst.
-
-        ``count``: how many scenarios there are. Result: one over how many scenarios the mean is of;
-        one where the worst alone counts.
-        """
+        """Return the largest weight of one of so many scenarios in the mean of the worst."""
         if self.kind is not RobustKind.CVAR:
             return 1.0
         return min(1.0, 1.0 / ((1.0 - self.level) * count))
 
     def ordered_weights(self, count: int) -> Floats:
-        """Return the weights of scenarios from the worst to the best.
-
-        Result (count,): they add up to one.
-        """
+        """Return the weights (count,) of scenarios from the worst to the best; their sum is one."""
         most = self.most(count)
         weights = np.clip(1.0 - most * np.arange(count), 0.0, most)
         return np.asarray(weights / weights.sum())
@@ -167,17 +156,11 @@ class RobustAim:
         return np.asarray(within / max(1.0, float(within.sum())))
 
     def value(self, values: Floats) -> float:
-        """Return one value from the values of all scenarios.
-
-        ``values`` (S,): a total or a peak for every scenario.
-        """
+        """Return one value from the totals or peaks (S,) of all scenarios."""
         return float(self.each(np.asarray(values, dtype=float)[None])[0])
 
     def each(self, values: Floats) -> Floats:
-        """Return one value from every row of values.
-
-        ``values`` (n, S). Result (n,).
-        """
+        """Return one value (n,) from every row of values (n, S)."""
         weights = self.ordered_weights(values.shape[1])
         used = int(np.count_nonzero(weights))
         if used == 1:
@@ -190,28 +173,20 @@ WORST_TOTAL = RobustAim(RobustKind.WORST_TOTAL)
 
 
 def cvar(level: float) -> RobustAim:
-    """Return the aim of the mean total over the worst scenarios.
-
-    ``level``: share of the scenarios that is left out, from 0 to below 1: 0.9 is the mean of the
-    worst tenth.
-    """
+    """Return the aim of the mean total over the worst scenarios: of 0.9, over their worst tenth."""
     return RobustAim(RobustKind.CVAR, level)
 
 
 def parse_robust(text: str) -> RobustAim:
-    """Return an aim from words.
-
-    ``text``: ``worst-peak``, ``worst-total`` or as ``cvar=0.9``. Raises `ProblemError` if it is
-    none of these.
-    """
+    """Return an aim from words: ``worst-peak``, ``worst-total`` or as ``cvar=0.9``."""
     known = {str(aim): aim for aim in (WORST_PEAK, WORST_TOTAL)}
     if text in known:
         return known[text]
     name, _, number = text.partition("=")
-    try:
-        level = float(number) if name == RobustKind.CVAR.value else math.nan
-    except ValueError:
-        level = math.nan
+    level = math.nan
+    if name == RobustKind.CVAR.value:
+        with suppress(ValueError):
+            level = float(number)
     if math.isnan(level):
         hint = did_you_mean(name, (*known, RobustKind.CVAR.value))
         raise ProblemError(
@@ -237,20 +212,15 @@ class Measure(Enum):
 
 @dataclass(frozen=True)
 class Goal:
-    """A quantity that a free schedule minimizes.
-
-    ``response``: whose peak or sum it is, or a margin of stability; that of the criterion if none
-    is named.
-    """
+    """A quantity that a free schedule minimizes."""
 
     measure: Measure
-    response: str = ""
+    response: str = ""  # whose peak or sum it is, or a margin; else that of the criterion
 
     def __str__(self) -> str:
-        names = {Measure.PEAK: "minmax", Measure.SUM: "sum"}
-        if not self.response:
-            return names.get(self.measure, self.measure.value)
-        return f"sum({self.response})" if self.measure is Measure.SUM else self.response
+        if self.response:
+            return f"sum({self.response})" if self.measure is Measure.SUM else self.response
+        return "minmax" if self.measure is Measure.PEAK else self.measure.value
 
     @property
     def of_states(self) -> bool:
@@ -263,42 +233,34 @@ class Goal:
         return self.response in MARGINS
 
     def shown(self, value: float) -> float:
-        """Return a value as people read it: of a tilt, how much is survived, in degrees.
-
-        ``value``: SI units; of a tilt, how far it is from a right angle.
-        """
+        """Return a value, SI units, as people read it: of a tilt, what is survived, in degrees."""
         return degrees(pi / 2 - value) if self.response == "tilt" else value
 
 
 def judged_by(goals: Sequence[Goal], criterion: Criterion) -> dict[str, object]:
-    """Return the criterion with its numbers, for a summary.
-
-    Result: ``criterion`` is None where every goal names a response of its own, or is about moves.
-    """
+    """Return the criterion with its numbers, for a summary; None where no goal asks for it."""
     if not any(goal.of_states and not goal.response for goal in goals):
         return {"criterion": None}
     return {"criterion": criterion.name, **criterion.settings}
 
 
 def parse_goals(text: str) -> tuple[Goal, ...]:
-    """Return goals from words, the most important first.
+    """Return goals from words, the most important first, with commas between them.
 
-    ``text``: ``minmax`` (the worst of the criterion), ``sum`` (over all steps), ``steps``,
-    ``regrips``, ``travel``, a response (its worst) or ``sum(RESPONSE)``, with commas between them;
-    also ``bond`` and ``friction`` (the least with which every state stands) and ``tilt`` (the
-    largest that every state survives). Raises `ProblemError` if there is no such goal, or one
-    stands there twice.
+    They are ``minmax`` (the worst of the criterion), ``sum`` (over all steps), ``steps``,
+    ``regrips``, ``travel``, a response (its worst) or ``sum(RESPONSE)``; also ``bond`` and
+    ``friction`` (the least with which every state stands) and ``tilt`` (the largest that every
+    state survives).
 
     Examples
     --------
     >>> [str(goal) for goal in parse_goals("minmax,steps,sum(T_max)")]
     ['minmax', 'steps', 'sum(T_max)']
     """
-    known = {"minmax": Goal(Measure.PEAK), "sum": Goal(Measure.SUM)}
-    known |= {m.value: Goal(m) for m in (Measure.STEPS, Measure.REGRIPS, Measure.TRAVEL)}
-    known |= {name: Goal(Measure.PEAK, name) for name in STATE_RESPONSES}
-    known |= {name: Goal(Measure.PEAK, name) for name in MARGINS}
-    known |= {f"sum({name})": Goal(Measure.SUM, name) for name in STATE_RESPONSES}
+    goals = [Goal(measure) for measure in Measure]
+    goals += [Goal(Measure.PEAK, name) for name in (*STATE_RESPONSES, *MARGINS)]
+    goals += [Goal(Measure.SUM, name) for name in STATE_RESPONSES]
+    known = {str(goal): goal for goal in goals}
     words = [word.strip() for word in text.split(",")] if isinstance(text, str) else [text]
     for word in words:
         if word not in known:
@@ -320,36 +282,26 @@ FORMS = "travel=0.8, travel=3.5m, steps_over:F_largest=250:10 or robot_use:rob1=
 
 @dataclass(frozen=True)
 class AskedBudget:
-    """A budget as it is asked for.
-
-    ``response``: whose steps over a level are counted; empty for the way that robots go; ``level``:
-    SI units; ``bound``: how much there is, or a share of what the optimum without budgets takes;
-    ``share``: whether it is one.
-    """
+    """A budget as it is asked for."""
 
     words: str
-    response: str
-    level: float
-    bound: float
-    share: bool
+    response: str  # whose steps over a level are counted; empty for the way that robots go
+    level: float  # SI units
+    bound: float  # how much there is
+    share: bool  # whether that is a share of what the optimum without budgets takes
 
 
 def parse_budgets(texts: Sequence[str] | str) -> tuple[AskedBudget, ...]:
-    """Return budgets from words.
-
-    ``texts``: one or several, each ``travel=BOUND``, ``steps_over:RESPONSE=LEVEL:BOUND`` or
-    ``robot_use:ROBOT=LEVEL:BOUND``, SI units. A bound of travel is a share of what the optimum
-    without budgets travels, or in meters, as ``3.5m``; other bounds are numbers of steps, or
-    shares, as ``0.8x``. Raises `ProblemError` if one has another form, or stands there twice.
-    """
+    """Return budgets from words of `FORMS`, SI units; ``travel=0.8`` and ``0.8x`` are shares."""
     texts = (texts,) if isinstance(texts, str) else texts
     if not isinstance(texts, Sequence) or not all(isinstance(text, str) for text in texts):
         raise ProblemError(f"budgets {short(texts)}: give {FORMS}, as words")
-    found = tuple(_parse(text) for text in texts)
+    found = [_parse(text) for text in texts]
+    about = [(budget.response, budget.level) for budget in found]
     for i, budget in enumerate(found):
-        if any((b.response, b.level) == (budget.response, budget.level) for b in found[:i]):
+        if about[i] in about[:i]:
             raise ProblemError(f"budget {budget.words}: it stands there twice; give one bound")
-    return found
+    return tuple(found)
 
 
 def _parse(text: str) -> AskedBudget:
@@ -358,20 +310,16 @@ def _parse(text: str) -> AskedBudget:
         hint = did_you_mean(re.split("[=:]", text)[0], ("travel", "steps_over", "robot_use"))
         states = f", or with an aim {CAPS}" if CAP.fullmatch(text) else ""
         raise ProblemError(f"budget {text} does not exist{hint}; give {FORMS}{states}")
-    is_travel = found["kind"] == "travel"
-    if found["unit"] == "m" and not is_travel:
+    is_travel, unit = found["kind"] == "travel", found["unit"]
+    if unit == "m" and not is_travel:
         raise ProblemError(f"budget {text}: steps have no meters; give a number of them")
     response = found["response"] or (robot_response(found["robot"]) if found["robot"] else "")
-    level = 0.0 if is_travel else _positive(found["level"], text)
-    share = found["unit"] == "x" or (is_travel and not found["unit"])
-    return AskedBudget(text, response, level, _positive(found["bound"], text), share)
+    level, bound = (_positive(found[name] or "0", text) for name in ("level", "bound"))
+    return AskedBudget(text, response, level, bound, unit == "x" or (is_travel and not unit))
 
 
 def parse_caps(texts: Sequence[str] | str) -> dict[str, float]:
-    """Return caps on totals of states from words: ``travel=3.5m``, ``regrips=2``, ``sum(T_max)=9``.
-
-    Raises `ProblemError` if one has another form, or stands there twice.
-    """
+    """Return caps on totals of states: ``travel=3.5m``, ``regrips=2``, ``sum(T_max)=9``."""
     out: dict[str, float] = {}
     for text in (texts,) if isinstance(texts, str) else texts:
         found = CAP.fullmatch(text) if isinstance(text, str) else None
@@ -384,10 +332,9 @@ def parse_caps(texts: Sequence[str] | str) -> dict[str, float]:
 
 
 def _positive(text: str, words: str) -> float:
-    try:
+    value = -1.0
+    with suppress(ValueError):
         value = float(text)
-    except ValueError:
-        value = -1.0
     if not (np.isfinite(value) and value >= 0):
         raise ProblemError(f"budget {words}: {text!r} is not a number from 0; give {FORMS}")
     return value
@@ -465,17 +412,13 @@ class Problem(Shown):
     resources: Resources = HERE
 
     def __repr__(self) -> str:
-        what = f"{self.scene.name!r}, {self.method!r}, criterion {self.criterion.name!r}"
-        counts = {
-            "limits": len(self.limits),
-            "budgets": len(self.budgets),
-            "scenarios": len(self.scenarios),
-        }
-        parts = [what, *map(str, self.goals), *(f"{n} {name}" for name, n in counts.items() if n)]
-        if self.stands is not None:
-            parts.append("every state stands")
-        if self.orders is not None:
-            parts.append(f"{self.orders.value} orders")
+        parts = [f"{self.scene.name!r}, {self.method!r}, criterion {self.criterion.name!r}"]
+        parts += map(str, self.goals)
+        for name in ("limits", "budgets", "scenarios"):
+            count = len(getattr(self, name))
+            parts += [f"{count} {name}"] if count else []
+        parts += ["every state stands"] if self.stands is not None else []
+        parts += [f"{self.orders.value} orders"] if self.orders is not None else []
         return f"Problem({', '.join(parts)})"
 
     @property
@@ -514,11 +457,7 @@ class Problem(Shown):
 
 def _in_values(words: Mapping[str, Any]) -> dict[str, Any]:
     """Return values in the place of words, by what they are about."""
-    return {name: READ.get(name, _as_it_is)(value) for name, value in words.items()}
-
-
-def _as_it_is(given: object) -> object:
-    return given
+    return {name: READ[name](value) if name in READ else value for name, value in words.items()}
 
 
 def _goals(given: Sequence[Goal] | str) -> tuple[Goal, ...]:
@@ -529,20 +468,6 @@ def _goals(given: Sequence[Goal] | str) -> tuple[Goal, ...]:
     return tuple(goals)
 
 
-def _budgets(given: Sequence[str] | str) -> tuple[str, ...]:
-    """Return budgets in words; what is none is refused where they are read."""
-    several = isinstance(given, Sequence) and not isinstance(given, str)
-    return tuple(given) if several else (given,)  # type: ignore[return-value]
-
-
-def _standing(given: Standing | Mortar | str | None) -> Standing | None:
-    return given if isinstance(given, Standing | None) else Standing(find_mortar(given))
-
-
-def _scenes(given: Scenarios | Sequence[Scene]) -> tuple[Scene, ...]:
-    return given.scenes if isinstance(given, Scenarios) else tuple(given)
-
-
 def _over(given: RobustAim | str) -> RobustAim:
     """Return an aim over scenarios that is given as such, or in words."""
     aim = parse_robust(given) if isinstance(given, str) else given
@@ -551,17 +476,18 @@ def _over(given: RobustAim | str) -> RobustAim:
     return aim
 
 
-def _orders(given: Orders | str | None) -> Orders | None:
-    return None if given is None else Orders.of(given)
-
-
 READ: dict[str, Callable[[Any], Any]] = {
     "goals": _goals,
     "limits": as_limits,
-    "budgets": _budgets,
-    "stands": _standing,
-    "scenarios": _scenes,
+    # what is no budget is refused where they are read
+    "budgets": lambda given: (
+        tuple(given) if isinstance(given, Sequence) and not isinstance(given, str) else (given,)
+    ),
+    "stands": lambda given: (
+        given if isinstance(given, Standing | None) else Standing(find_mortar(given))
+    ),
+    "scenarios": lambda given: tuple(getattr(given, "scenes", given)),
     "over": _over,
-    "orders": _orders,
+    "orders": lambda given: None if given is None else Orders.of(given),
     "also": tuple,
 }

@@ -45,36 +45,19 @@ choices speak for such a rounding.
 
 @dataclass(frozen=True)
 class Units:
-    """A force (N), a moment (N m) and a displacement (m) that grow as a scene's responses do.
+    """A force, a moment and a displacement that grow as a scene's responses do."""
 
-    ``force``: the mean weight of a brick; ``moment``: that weight at the mean length of a brick;
-    ``displacement``: that weight over the median stiffness of the joints against translation.
-    """
-
-    force: float
-    moment: float
-    displacement: float
+    force: float  # N; the mean weight of a brick
+    moment: float  # N m; that weight at the mean length of a brick
+    displacement: float  # m; that weight over the median translational stiffness of the joints
 
     def of(self, response: str) -> float:
-        """Return the unit of a response, by its first letter.
-
-        Result: n, N m or m.
-        """
-        units = {
-            "F": self.force,
-            "T": self.force,
-            "C": self.force,
-            "M": self.moment,
-            "D": self.displacement,
-        }
-        return units[response[0]]
+        """Return the unit of a response, by its first letter: N, N m or m."""
+        return {"M": self.moment, "D": self.displacement}.get(response[0], self.force)
 
 
 def _scene_units(network: Network) -> Units:
-    """Return the units of a scene.
-
-    Result: each 1 where the scene has no weight or no stiffness.
-    """
+    """Return the units of a scene, each 1 where it has no weight or no stiffness."""
     weight = float(np.linalg.norm(network.weight, axis=1).mean()) or 1.0
     length = float(np.mean([max(brick.dimensions) for brick in network.scene.bricks]))
     stiffness = network.springs.translational_stiffness
@@ -83,23 +66,20 @@ def _scene_units(network: Network) -> Units:
 
 
 def _own_scales(network: Network) -> Mapping[str, float]:
-    """Return scales that every scene has, for one that no fixed method builds.
+    """Return scales that every scene has, SI units, for one that no fixed method builds.
 
-    Result: SI units: of grip forces the smallest payload; of ``T_max`` the weight of the structure,
-    of ``M_sup`` this at its size, of ``D_max`` what it moves a chain of a joint for every brick.
+    Of grip forces it is the smallest payload; of ``T_max`` the weight of the structure, of
+    ``M_sup`` this at its size, of ``D_max`` what it moves a chain of a joint for every brick.
     """
-    scene, units = network.scene, _scene_units(network)
-    count = len(scene.bricks)
+    scene, units, count = network.scene, _scene_units(network), len(network.scene.bricks)
     size = np.ptp([brick.position for brick in scene.bricks], axis=0).max()
     size += max(max(brick.dimensions) for brick in scene.bricks)
-    weight, payload = count * units.force, min(robot.payload for robot in scene.robots)
-    forces = {robot_response(robot.name): payload for robot in scene.robots}
-    moved = count**2 * units.displacement
-    return forces | {
-        "F_largest": payload,
+    weight = count * units.force
+    names = [*(robot_response(robot.name) for robot in scene.robots), "F_largest"]
+    return dict.fromkeys(names, min(robot.payload for robot in scene.robots)) | {
         "T_max": weight,
         "M_sup": weight * float(size),
-        "D_max": moved,
+        "D_max": count**2 * units.displacement,
     }
 
 
@@ -107,23 +87,18 @@ def crown(scene: Scene) -> float:
     """Return how many bricks are placed when a build reaches its crown.
 
     The crown is the first of the highest bricks, by their centroids, if the build rises to it and
-    comes down again after it.
-
-    Result: `NEVER` where the build ends at its highest level, as that of a wall.
+    comes down again after it: `NEVER` where the build ends at its highest level, as that of a wall.
     """
     height = np.array([brick.position for brick in scene.placed]) @ np.array(scene.up)
     level = LEVEL * max(float(np.ptp(height)), *scene.placed[0].dimensions)
-    top = int(np.argmax(height >= height.max() - level))
     low = height < height.max() - level
+    top = int(np.argmin(low))
     return top + 1 if low[0] and low[top:].any() else NEVER
 
 
 @dataclass(frozen=True)
 class SceneFacts:
-    """What criteria may ask of a scene, each computed when it is first asked for.
-
-    ``engine``: computes the responses of the scene's fixed methods.
-    """
+    """What criteria may ask of a scene, each computed when it is first asked for."""
 
     engine: Engine
 
@@ -158,26 +133,19 @@ class SceneFacts:
         return "" if self._reached else OWN
 
     @cached_property
-    def _reached(self) -> tuple[dict[str, float], ...]:
+    def _reached(self) -> list[dict[str, float]]:
         """The largest responses of every fixed method that can build the scene."""
-        found: list[dict[str, float]] = []
+        found = []
         for method in METHODS.values():
             with suppress(StepError, MechanismError):
                 found.append(self._largest(method(self.engine.network)))
-        return tuple(found)
+        return found
 
     def _largest(self, steps: tuple[Step, ...]) -> dict[str, float]:
         """Return the largest responses of a method's steps, SI units."""
-        table = analyze(self.engine, steps)
-        forces = {
-            robot_response(robot.name): float(table[force_column(robot)].abs().max())
-            for robot in self.engine.network.scene.robots
-        }
-        out = {"F_largest": float(np.nanmax([*forces.values()]))}
-        for name in ("T_max", "M_sup", "D_max"):
-            response = RESPONSES[name]
-            out[name] = float(table[response.column].max()) / response.scale
-        return out
+        scene, table = self.engine.network.scene, analyze(self.engine, steps)
+        names = ("F_largest", "T_max", "M_sup", "D_max")
+        return {name: float(np.nanmax(_response_along(scene, table, name))) for name in names}
 
 
 ChoiceResponses = Mapping[str, Floats]
@@ -280,18 +248,12 @@ class Limit:
             raise ProblemError(f"limit {self.response}: its bound is NaN; give a number")
 
     def exceeded(self, values: Floats) -> Bools:
-        """Return where values of the response exceed the limit.
-
-        ``values`` (...): NaN, as of a robot that does not grip, exceeds nothing. Result (...).
-        """
+        """Return where values exceed the limit; NaN, as of a robot without a grip, does not."""
         return np.asarray(values > self.bound + LIMIT_TOLERANCE * abs(self.bound))
 
 
 def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
-    """Return limits, one or several.
-
-    Raises `ProblemError` if it is something else.
-    """
+    """Return limits, one or several; a `ProblemError` if it is something else."""
     limits = (given,) if isinstance(given, Limit) else given
     if not isinstance(limits, Sequence) or not all(isinstance(each, Limit) for each in limits):
         raise ProblemError(
@@ -302,42 +264,31 @@ def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
 
 
 def payload_limits(scene: Scene) -> tuple[Limit, ...]:
-    """Return limits that keep every robot of a scene within its payload.
-
-    Result: one for every robot, N.
-    """
+    """Return limits that keep every robot of a scene within its payload, N."""
     return tuple(Limit(robot_response(robot.name), robot.payload) for robot in scene.robots)
 
 
 @dataclass(frozen=True, repr=False)
 class ResponsesAsked(Terse):
-    """The responses that criterion, limits and further wishes ask for.
-
-    ``criterion``: what a step costs; ``limits``: what no open step may exceed; ``also``: responses
-    that are asked for beside these.
-    """
+    """The responses that criterion, limits and further wishes ask for."""
 
     criterion: Criterion
     limits: tuple[Limit, ...]
     also: tuple[str, ...]
 
     def __call__(self, bricks: int) -> frozenset[str]:
-        """Return their names for a move.
-
-        ``bricks``: bricks placed when the move is made.
-        """
-        named = {*self.criterion.wanted(bricks), *(limit.response for limit in self.limits)}
-        return frozenset(named | {*self.also})
+        """Return their names for a move with so many bricks."""
+        limited = (limit.response for limit in self.limits)
+        return frozenset([*self.criterion.wanted(bricks), *limited, *self.also])
 
 
 def state_costs(
     criterion: Criterion, found: Mapping[str, Floats], bricks: int, possible: Bools
 ) -> Floats:
-    """Return what states cost; steps can be added to a plan, so none may cost less than nothing.
+    """Return what states cost (n,), infinite where they are not possible (n,).
 
-    ``found`` (mapping of str to (n,) float): responses of the states, SI units; ``possible`` (n,):
-    which states count. Result (n,): infinite where a state does not count. Raises `ProblemError` if
-    a state that counts costs less than zero.
+    Steps can be added to a plan, so none that counts may cost less than nothing. ``found`` has
+    responses (n,), SI units.
     """
     costs = np.where(possible, criterion.costs(found, bricks, len(possible)), np.inf)
     if (costs < 0).any():
@@ -349,21 +300,7 @@ def state_costs(
 
 
 def robots_of(engine: Engine, schedule: Schedule, criterion: Criterion) -> list[str]:
-    """Return the names of a schedule's robots if all is what it should be, and grips are open.
-
-    Raises `ProblemError` if one is something else, or no grip is open.
-    """
-    _require_kinds(engine, schedule, criterion)
-    if not schedule.moves:
-        raise ProblemError(
-            f"schedule {schedule.method}: with {len(schedule.scene.bricks)} bricks it leaves no "
-            "grip open; there is nothing to choose, analyze its steps"
-        )
-    return [robot.name for robot in schedule.scene.robots]
-
-
-def _require_kinds(engine: Engine, schedule: Schedule, criterion: Criterion) -> None:
-    """Say what is wanted where something else is given."""
+    """Return the names of a schedule's robots if all is what it should be, and grips are open."""
     wanted = (
         (engine, isinstance(getattr(engine, "network", None), Network), "engine", "make_engine"),
         (schedule, isinstance(schedule, Schedule), "schedule", "three_robot_loop"),
@@ -372,76 +309,66 @@ def _require_kinds(engine: Engine, schedule: Schedule, criterion: Criterion) -> 
     for given, right, what, source in wanted:
         if not right:
             raise ProblemError(f"{short(given)} is no {what}; take one of seqopt.{source}")
+    if not schedule.moves:
+        raise ProblemError(
+            f"schedule {schedule.method}: with {len(schedule.scene.bricks)} bricks it leaves no "
+            "grip open; there is nothing to choose, analyze its steps"
+        )
+    return [robot.name for robot in schedule.scene.robots]
 
 
 @dataclass(frozen=True)
 class Excess:
-    """A limit that some steps of a build exceed.
-
-    ``steps``: numbers of the steps; ``largest``: the largest value in them, SI units; ``robot``:
-    whose payload it is; empty for other limits.
-    """
+    """A limit that some steps of a build exceed."""
 
     limit: Limit
-    steps: tuple[int, ...]
-    largest: float
-    robot: str = ""
+    steps: tuple[int, ...]  # their numbers
+    largest: float  # value in them, SI units
+    robot: str = ""  # whose payload it is; empty for other limits
 
     def __str__(self) -> str:
-        where = steps_in_words(self.steps)
-        if self.robot:
-            return (
-                f"{self.robot} holds up to {self.largest:.1f} N, more than its payload of "
-                f"{self.limit.bound:g} N ({where})"
-            )
+        bound, where = self.limit.bound, steps_in_words(self.steps)
+        if not self.robot:
+            return f"{self.limit.response} is up to {self.largest:.6g} of {bound:.6g} ({where})"
         return (
-            f"{self.limit.response} is up to {self.largest:.6g} of {self.limit.bound:.6g} ({where})"
+            f"{self.robot} holds up to {self.largest:.1f} N, more than its payload of "
+            f"{bound:g} N ({where})"
         )
 
 
 def excesses(scene: Scene, table: pd.DataFrame, limits: Sequence[Limit]) -> tuple[Excess, ...]:
-    """Return the limits that steps exceed.
+    """Return the limits that steps of a table of `seqopt.analyze` exceed, in their order.
 
-    ``table``: responses of the steps, from `seqopt.analyze`; ``limits``: one on ``F_move``, which
-    only open steps have, is left out. Result: in the order of the limits.
+    A limit on ``F_move``, which only open steps have, is left out.
     """
     out = []
-    for limit in limits:
-        if limit.response == "F_move":
-            continue
+    for limit in (each for each in limits if each.response != "F_move"):
         values = _response_along(scene, table, limit.response)
         over = limit.exceeded(values)
         if over.any():
-            steps = tuple(int(number) for number in table["step"][over])
+            steps = tuple(table["step"][over].astype(int).tolist())
             out.append(Excess(limit, steps, float(values[over].max())))
     return tuple(out)
 
 
 def overloads(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
-    """Return the payloads that steps exceed; see `excesses`.
-
-    ``table``: from `seqopt.analyze`. Result: in the order of the robots.
-    """
+    """Return the payloads that steps exceed, in the order of the robots; see `excesses`."""
     names = {robot_response(robot.name): robot.name for robot in scene.robots}
     found = excesses(scene, table, payload_limits(scene))
     return tuple(replace(excess, robot=names[excess.limit.response]) for excess in found)
 
 
 def _response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:
-    """Return a response of every step as limits name it.
+    """Return a response of every step (steps,) as limits name it, but ``F_move``.
 
-    ``table``: from `seqopt.analyze`; ``name``: ``T_max``, ``C_max``, ``M_sup``, ``D_max``,
-    ``F_largest`` or ``F_`` and a robot's name. Result (steps,): SI units, sizes without sign; NaN
-    where the robot does not grip.
+    They are in SI units, sizes without sign, NaN where the robot does not grip.
     """
     if name == "C_max":
         return np.asarray(np.maximum(-table[RESPONSES["F_min"].column].to_numpy(float), 0.0))
     if name in RESPONSES:
         response = RESPONSES[name]
         return table[response.column].to_numpy(float) / response.scale
-    forces = {
-        robot_response(robot.name): table[force_column(robot)].abs() for robot in scene.robots
-    }
-    if name == "F_largest":
-        return pd.DataFrame(forces).max(axis=1).to_numpy(float)
-    return forces[name].to_numpy(float)
+    columns = {robot_response(robot.name): force_column(robot) for robot in scene.robots}
+    forces = table[[*columns.values()]].abs()
+    found = forces.max(axis=1) if name == "F_largest" else forces[columns[name]]
+    return found.to_numpy(float)

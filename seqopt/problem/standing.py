@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
-from math import degrees, isfinite, pi
+from math import degrees, pi
+from operator import le
 
 import numpy as np
 
@@ -22,6 +23,7 @@ MARGINS = ("bond", "friction", "tilt")
 tension, with that times 1 + friction as cohesion), the least coefficient of friction, and how far
 the tilt that is survived is from a right angle (rad)."""
 TILTS = 2048  # steps of a right angle, to which the tilt of a state is found
+STEP = pi / 2 / TILTS  # rad
 NARROW = {"bond": (0.02, 0.0), "friction": (0.0, 2.0**-6), "tilt": (0.0, 2e-3)}
 """By margin, within which share of itself and within what a value is proven: brackets' widths."""
 
@@ -31,7 +33,7 @@ class Standing:
     """The demand that every state of a schedule is proven to stand, robots within payload.
 
     ``mortar``: of all joints; or its name; ``tilt``: that every state must survive in every
-    direction, rad. Raises `ProblemError` if the tilt is none that anything survives.
+    direction, rad.
 
     Examples
     --------
@@ -48,10 +50,7 @@ class Standing:
             raise ProblemError(f"tilt {short(self.tilt)}: give an angle from 0 to below pi/2, rad")
 
     def demanding(self, name: str, value: float) -> Standing:
-        """Return the demand that a margin is no worse than a value, and nothing else.
-
-        ``name``: one of `MARGINS`; ``value``: as goals count it.
-        """
+        """Return the demand that a margin, as goals count it, is no worse than a value alone."""
         if name == "tilt":
             return Standing(self.mortar, max(0.0, pi / 2 - value))
         if name == "friction":
@@ -60,15 +59,11 @@ class Standing:
 
     def _implies(self, other: Standing) -> bool:
         """Return whether what meets this demand meets another one."""
-        own, weaker = astuple(self.mortar), astuple(other.mortar)
-        stronger = all(a <= b for a, b in zip(own, weaker, strict=True))
-        return stronger and self.tilt >= other.tilt
+        stronger = map(le, astuple(self.mortar), astuple(other.mortar))
+        return all(stronger) and self.tilt >= other.tilt
 
     def described(self) -> dict[str, float]:
-        """Return the demand, ready for JSON.
-
-        Result: friction, strengths (Pa) and tilt (degrees).
-        """
+        """Return the demand, ready for JSON: strengths in Pa, tilt in degrees."""
         return {
             "friction": self.mortar.friction,
             "tensile_strength_Pa": self.mortar.tensile_strength,
@@ -79,9 +74,8 @@ class Standing:
 
 def _without_implied(demands: Sequence[Standing]) -> tuple[Standing, ...]:
     """Return demands without those that another one implies."""
-    out = set(demands)
-    implied = {one for one in out if any(other._implies(one) for other in out - {one})}
-    return tuple(demand for demand in dict.fromkeys(demands) if demand not in implied)
+    out = dict.fromkeys(demands)
+    return tuple(one for one in out if not any(o._implies(one) for o in out if o != one))
 
 
 class StandingSets:
@@ -89,8 +83,7 @@ class StandingSets:
 
     ``standing``: margins are those of its mortar; ``payloads`` (k,): all that robots may have, N;
     ``demands``: all of which what stands has to meet; by default the one; ``undecided``: how many
-    grip sets were neither proven to stand nor to fall. Raises `ProblemError` if a robot could hold
-    anything.
+    grip sets were neither proven to stand nor to fall.
     """
 
     def __init__(
@@ -101,7 +94,7 @@ class StandingSets:
         demands: Sequence[Standing] = (),
     ) -> None:
         self._payloads = np.unique(payloads)
-        if not all(isfinite(load) for load in self._payloads):
+        if not np.isfinite(self._payloads).all():
             raise ProblemError(
                 "a robot without a largest force holds up anything, and says nothing of what "
                 "stands; give it a payload, or a limit on its force, and keep payloads"
@@ -135,10 +128,7 @@ class StandingSets:
         return np.asarray(self._verdicts(bricks, held, payload) == STANDS)
 
     def may_stand(self, bricks: int, held: Ints, payload: Floats) -> Bools:
-        """Return which grip sets are not proven to fall.
-
-        ``held`` (S, r); ``payload`` (S, r). Result (S,).
-        """
+        """Return which grip sets are not proven to fall, (S,); see `stand`."""
         return np.asarray(self._verdicts(bricks, held, payload) != FALLS)
 
     def _verdicts(self, bricks: int, held: Ints, payload: Floats) -> Floats:
@@ -152,16 +142,11 @@ class StandingSets:
         return self._ask("", bricks, (held, payload), verdicts)[:, 0]
 
     def margins(self, name: str, bricks: int, held: Ints, payload: Floats) -> Floats:
-        """Return between which values a margin of grip sets lies, as goals count it.
-
-        ``name``: one of `MARGINS`; ``held`` (S, r); ``payload`` (S, r). Result (S, 2): what is
-        proven not to be enough, and what is proven to be.
-        """
+        """Return (S, 2) between which values, as goals count them, margins of grip sets lie."""
 
         def brackets(rows: Ints) -> Floats:
-            if name == "tilt":
-                return self._tilts(bricks, held[rows], payload[rows])
-            return np.asarray(getattr(self._margins, name)(bricks, held[rows], payload[rows]))
+            margin = self._tilts if name == "tilt" else getattr(self._margins, name)
+            return np.asarray(margin(bricks, held[rows], payload[rows]))
 
         return self._ask(name, bricks, (held, payload), brackets)
 
@@ -180,13 +165,12 @@ class StandingSets:
                     high[rows[found < least]] = step
                     fallen[rows[found == FALLS]] = step
             ends.append(low.copy())
-        survived = np.where(ends[0] < 0, -np.inf, ends[0] * (pi / 2 / TILTS))
-        return np.stack([pi / 2 - fallen * (pi / 2 / TILTS), pi / 2 - survived], axis=1)
+        survived = np.where(ends[0] < 0, -np.inf, ends[0] * STEP)
+        return np.stack([pi / 2 - fallen * STEP, pi / 2 - survived], axis=1)
 
     def _tilted(self, step: int) -> Screen:
         if step not in self._tilts_known:
-            tilt = step * (pi / 2 / TILTS)
-            self._tilts_known[step] = Screen(self._network, self._mortar, tilt)
+            self._tilts_known[step] = Screen(self._network, self._mortar, step * STEP)
         return self._tilts_known[step]
 
     def _ask(
@@ -201,9 +185,6 @@ class StandingSets:
 
 
 def slack(name: str, value: float) -> float:
-    """Return within what a margin is proven.
-
-    ``name``: one of `MARGINS`.
-    """
+    """Return within what one of `MARGINS` is proven."""
     share, least = NARROW[name]
     return max(share * abs(value), least)

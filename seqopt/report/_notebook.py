@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 from base64 import b64encode
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import singledispatch
 from html import escape
 from typing import TYPE_CHECKING, NamedTuple
@@ -22,7 +23,6 @@ from seqopt.network.network import Network
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Problem
-from seqopt.problem.requirements import Limit
 from seqopt.report._pages import WORDS
 from seqopt.report.comparison import largest
 from seqopt.report.text import typed
@@ -53,10 +53,7 @@ class _Card(NamedTuple):
 
 
 def card(value: object) -> str:
-    """Return a table of a value and small pictures of it, as HTML.
-
-    Without pictures where matplotlib is not installed.
-    """
+    """Return a table of a value and, with matplotlib, small pictures of it, as HTML."""
     shown = facts(value)
     title = escape(shown.title)
     cells = "".join(
@@ -64,10 +61,9 @@ def card(value: object) -> str:
         f'<td style="text-align:left">{escape(str(content))}</td></tr>'
         for name, content in shown.rows.items()
     )
-    try:
+    pictures: list[str] = []
+    with suppress(ExtraError):
         pictures = [b64encode(_small(figure)).decode() for figure in shown.draw()]
-    except ExtraError:
-        pictures = []
     images = "".join(
         f'<img alt="{title}" src="data:image/png;base64,{png}" '
         'style="display:block;max-width:100%;height:auto;background:#fff;border-radius:6px;'
@@ -115,11 +111,9 @@ def _scene(value: Scene) -> _Card:
         "robots": "; ".join(teams),
         "nodes that may be held": 2 * len(value.bricks) - len(value.blocked_nodes),
     }
-    return _Card(f"Scene {value.name}", rows, lambda: _of_scene(value))
-
-
-def _of_scene(scene: Scene) -> list[Figure]:
-    return [display("scene_picture")(scene, width=WIDTH)]
+    return _Card(
+        f"Scene {value.name}", rows, lambda: [display("scene_picture")(value, width=WIDTH)]
+    )
 
 
 @facts.register
@@ -150,9 +144,8 @@ def _schedule(value: Schedule) -> _Card:
         rows["choices of all grips"] = f"10^{np.log10(counts).sum():.0f}"
     if value.left_out:
         rows["left out"] = value.left_out
-    steps = (1, min(len(value.steps), STEPS))
-    draw = lambda: [display("gantt_picture")(value.scene, value.steps, None, steps)]  # noqa: E731
-    return _Card(f"Schedule {value.method}", rows, draw)
+    last = min(len(value.steps), STEPS)
+    return _Card(f"Schedule {value.method}", rows, lambda: [value.gantt(1, last)])
 
 
 @facts.register
@@ -164,11 +157,12 @@ def _problem(value: Problem) -> _Card:
     else:
         team = value.moves.robots or tuple(robot.name for robot in scene.robots)
         rows = {"scene": scene.name, "bricks": len(scene.bricks), "robots": ", ".join(team)}
-        name, draw = "Problem: who does what next, and where", lambda: _of_scene(scene)
+        name, draw = "Problem: who does what next, and where", _scene(scene).draw
+    limits = ", ".join(f"{limit.response} up to {limit.bound:.4g}" for limit in value.limits)
     more = {
         "to be least, in this order": ", ".join(map(str, value.goals)),
         "criterion": value.criterion.name,
-        "limits": _limits(value.limits),
+        "limits": limits or "none",
         "budgets": ", ".join(value.budgets),
         "every step must stand": "yes" if value.stands is not None else "",
         "scenarios": f"{len(value.scenarios)}, {value.over}" if value.scenarios else "",
@@ -176,10 +170,6 @@ def _problem(value: Problem) -> _Card:
         "engine": repr(value.engine),
     }
     return _Card(name, {**rows, **{name: said for name, said in more.items() if said}}, draw)
-
-
-def _limits(limits: tuple[Limit, ...]) -> str:
-    return ", ".join(f"{limit.response} up to {limit.bound:.4g}" for limit in limits) or "none"
 
 
 @facts.register
@@ -201,29 +191,26 @@ def _build(value: ShownBuild) -> _Card:
     rows |= {"result": value.result, "steps": len(value.steps), **(_worst(value) if small else {})}
     if value.seconds:
         rows["time to find it, s"] = f"{sum(value.seconds.values()):.3g}"
-    return _Card(f"Plan for {scene.name}", rows, lambda: _of_build(value, small=small))
+
+    def draw() -> list[Figure]:  # some steps and, of a small build, its first grips
+        paint, count = display("steps_picture"), len(value.steps)
+        from seqopt.report._pictures import spread_steps  # noqa: PLC0415  # matplotlib is an extra
+
+        shown = spread_steps(value.steps, 3) if small else count // 2 + 1
+        pictures = [paint(value.engine, value.steps, shown)]
+        return [*pictures, *([value.gantt(1, min(count, STEPS))] if small else [])]
+
+    return _Card(f"Plan for {scene.name}", rows, draw)
 
 
 def _worst(value: ShownBuild) -> Rows:
     """Return the largest responses of any step."""
     found = largest(value.engine.network.scene, value.responses())
-    rows = {f"largest {WORDS[name]}": number_text(found[name]) for name in WORDS}
+    rows = {f"largest {said}": number_text(found[name]) for name, said in WORDS.items()}
     grips = value.grips()
     row = grips.iloc[int(grips["largest_force_N"].argmax())]
-    rows["at the largest grip force"] = (
-        f"{row['robot']} at node {row['node']} of brick {row['brick']}, step {row['at_step']}"
-    )
-    return rows
-
-
-def _of_build(value: ShownBuild, *, small: bool) -> list[Figure]:
-    """Return pictures of some steps and, of a small build, of its first grips."""
-    draw, count = display("steps_picture"), len(value.steps)
-    from seqopt.report._pictures import spread_steps  # noqa: PLC0415  # matplotlib is an extra
-
-    shown = spread_steps(value.steps, 3) if small else count // 2 + 1
-    pictures = [draw(value.engine, value.steps, shown)]
-    return [*pictures, value.gantt(1, min(count, STEPS))] if small else pictures
+    where = f"{row['robot']} at node {row['node']} of brick {row['brick']}, step {row['at_step']}"
+    return rows | {"at the largest grip force": where}
 
 
 @facts.register

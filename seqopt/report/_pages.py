@@ -61,31 +61,23 @@ def _outside(builds: Sequence[Build]) -> str:
     return f"{OUTSIDE.capitalize()}: {'; '.join(said)}. {REMEDY} " if said else ""
 
 
-def _overloads(scene: Scene, build: Build) -> str:
-    """Return in how many steps payloads are exceeded, and by how much."""
-    over = build.overloads(scene)
-    if not over:
-        return ""
-    steps = {number for excess in over for number in excess.steps}
-    worst = max(over, key=lambda excess: excess.largest / excess.limit.bound)
-    return (
-        f"in {len(steps):,} of {len(build.steps):,} a robot would hold more than its payload, up "
-        f"to {worst.largest:,.0f} N where {worst.robot} can hold {worst.limit.bound:.4g} N"
-    )
-
-
-def _worst(scene: Scene, table: pd.DataFrame) -> str:
-    """Return the largest responses of any step, each with its unit."""
-    values = largest(scene, table)
-    said = {name: f"{number_text(values[name])} {LARGEST[name]}" for name in WORDS}
-    said["D_max"] = length_text(1e-6 * values["D_max"])
-    return ", ".join(f"{word.split(',')[0]} {said[name]}" for name, word in WORDS.items())
-
-
 def _with_legend(caption: str, table: pd.DataFrame) -> str:
     """Return the caption of a table of builds, with a legend where it marks what is wrong."""
     said = "".join(f". {name.capitalize()}: {why}" for name, why in LEGEND.items() if name in table)
     return f"{caption}{said}. Such steps are marked in red" if said else caption
+
+
+def _page(
+    engine: Engine,
+    builds: Sequence[Build],
+    sentence: str,
+    tables: Sequence[tuple[str, pd.DataFrame]],
+    scatter: Scatter | None = None,
+) -> str:
+    """Return a page of several builds, whose sentence also says what is wrong with some."""
+    count = sum(bool(build.overloads(engine.network.scene)) for build in builds)
+    over = f"; in {count} of them a robot would hold more than its payload" if count else ""
+    return report_page(engine, builds, f"{_outside(builds)}{sentence}{over}.", tables, scatter)
 
 
 def _worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFrame]:
@@ -100,20 +92,6 @@ def _worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFra
         found[OUTSIDE] = ["yes" if build.departures else "" for build in builds]
     caption = _with_legend("Largest responses", found)
     return caption, found.rename(columns=WORDS).rename_axis("build").reset_index()
-
-
-def _page(
-    engine: Engine,
-    builds: Sequence[Build],
-    sentence: str,
-    tables: Sequence[tuple[str, pd.DataFrame]],
-    scatter: Scatter | None = None,
-) -> str:
-    """Return a page of several builds, whose sentence also says what is wrong with some."""
-    scene = engine.network.scene
-    count = sum(bool(build.overloads(scene)) for build in builds)
-    over = f"; in {count} of them a robot would hold more than its payload" if count else ""
-    return report_page(engine, builds, f"{_outside(builds)}{sentence}{over}.", tables, scatter)
 
 
 def plan_page(  # a plan, what there is to say about it, and what is beside it
@@ -134,17 +112,27 @@ def plan_page(  # a plan, what there is to say about it, and what is beside it
     if len(scene.bricks) <= SMALL:
         tables |= {key: each for key, each in fixed_methods(engine).items() if key not in tables}
     first, *rest = _builds(scene, tables, LinearRange(engine).of_builds(tables))
-    first = replace(first, stands=stands)
+    builds = [replace(first, stands=stands), *rest]
     robots = int(sum(table[f"{robot.name}_node"].notna().any() for robot in scene.robots))
-    over = _overloads(scene, first)
-    who = "1 robot" if robots == 1 else f"{robots} robots"
-    does = "cannot build" if over else "builds" if robots == 1 else "build"
+    does = "1 robot builds" if robots == 1 else f"{robots} robots build"
+    how = ""
+    if over := first.overloads(scene):
+        steps = {number for excess in over for number in excess.steps}
+        worst = max(over, key=lambda excess: excess.largest / excess.limit.bound)
+        does = f"{robots} robot{'s' * (robots != 1)} cannot build"
+        how = (
+            f" like this: in {len(steps):,} of {len(table):,} a robot would hold more than its "
+            f"payload, up to {worst.largest:,.0f} N where {worst.robot} can hold "
+            f"{worst.limit.bound:.4g} N"
+        )
+    values = largest(scene, table)
+    shown = {n: f"{number_text(values[n])} {LARGEST[n]}" for n in WORDS}
+    shown["D_max"] = length_text(1e-6 * values["D_max"])
+    most = ", ".join(f"{word.split(',')[0]} {shown[n]}" for n, word in WORDS.items())
     sentence = (
-        f"{_outside([first])}{who} {does} {scene.name} in {len(table):,} steps"
-        f"{' like this: ' if over else ''}{over} ({name}: {said}). "
-        f"The largest of any step: {_worst(scene, table)}."
+        f"{_outside(builds[:1])}{does} {scene.name} in {len(table):,} steps{how} ({name}: {said}). "
+        f"The largest of any step: {most}."
     )
-    builds = [first, *rest]
     return report_page(engine, builds, sentence, [_worst_table(scene, builds)])
 
 
@@ -162,8 +150,13 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     if result.printed is not None:
         printed = result.printed.add_suffix(", printed").rename_axis("largest").reset_index()
         tables.append(("What the paper prints", printed))
+    scatter, found = None, result.table.loc[result.table["gap"].notna(), ["seconds", "gap"]]
+    if not found.empty:  # how long each formulation took and how far from the best its choice is
+        axes = ("seconds to choose, responses being known", "above the best, %")
+        points = found.assign(gap=100 * found["gap"]).set_axis(axes, axis=1)
+        scatter = Scatter("Speed against accuracy: a click shows the plan", points, axes[:1])
     sentence = f"{len(builds)} ways to build {scene.name}, step by step and side by side"
-    return _page(engine, builds, sentence, tables, _speed_and_accuracy(result))
+    return _page(engine, builds, sentence, tables, scatter)
 
 
 def folder_page(engine: Engine, folder: Path) -> str:
@@ -199,7 +192,10 @@ def front_page(
     names = [f"point {number}" for number in range(1, len(plans) + 1)]
     left = dict(zip(names, departures, strict=True))
     builds = _builds(scene, dict(zip(names, plans, strict=True)), left)
-    points = _in_words(table).set_axis(names)
+    words = {name: WORDS.get(FORCES.get(name, name), name) for name in map(str, table)}
+    points = table.rename(columns=words).set_axis(names)
+    lengths = [name for name in points if str(name).endswith("1e-3 mm")]
+    points = points.assign(**{str(name): 1e6 * points[name] for name in lengths})
     shown = points.rename_axis("plan").reset_index()
     if any(departures):
         shown[OUTSIDE] = ["yes" if each else "" for each in departures]
@@ -209,24 +205,6 @@ def front_page(
     scatter = Scatter("The Pareto set: every point is a plan; a click shows it", points)
     shows = [(_with_legend("The Pareto set; a click shows a plan", shown), shown)]
     return _page(engine, builds, sentence, shows, scatter)
-
-
-def _speed_and_accuracy(result: Comparison) -> Scatter | None:
-    """Return how long each formulation took and how far from the best its choice is."""
-    found = result.table.loc[result.table["gap"].notna(), ["seconds", "gap"]]
-    if found.empty:
-        return None
-    axes = ("seconds to choose, responses being known", "above the best, %")
-    points = found.assign(gap=100 * found["gap"]).set_axis(axes, axis=1)
-    return Scatter("Speed against accuracy: a click shows the plan", points, axes[:1])
-
-
-def _in_words(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the points of a Pareto set with columns in words, displacements in 1e-3 mm."""
-    words = {name: WORDS.get(FORCES.get(name, name), name) for name in map(str, table)}
-    lengths = [name for name in words.values() if name.endswith("1e-3 mm")]
-    shown = table.rename(columns=words)
-    return shown.assign(**{name: 1e6 * shown[name] for name in lengths})
 
 
 def build_page(plan: ShownBuild, *others: ShownBuild) -> Page:

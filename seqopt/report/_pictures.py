@@ -51,15 +51,11 @@ LETTER = 0.06  # width of one, inches
 def _panels(
     scene: Scene, count: int, width: float = WIDTH, room: float = 0.35
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure with panels of the shape of the whole structure, in rows of three.
-
-    Over every row there is room for a title; width and room are inches.
-    """
+    """Return a figure with panels of a structure's shape, in rows of three with room for titles."""
     columns = min(count, 3)
     rows = -(-count // columns)
-    low, high = _seen_box(scene)
-    across, up = high - low
-    ratio = min(max(up / across, 0.25), 1.6)
+    (left, low), (right, high) = _seen_box(scene)
+    ratio = min(max((high - low) / (right - left), 0.25), 1.6)
     figure = new_picture(width, rows * (width / columns * ratio + room))
     panels = [figure.add_subplot(rows, columns, i + 1) for i in range(count)]
     for axes in panels:
@@ -77,22 +73,18 @@ def _seen_box(scene: Scene) -> tuple[Floats, Floats]:
 @styled
 def scene_picture(scene: Scene, bricks: int | None = None, width: float = WIDTH) -> Figure:
     """Return a picture of a scene, or of its first bricks in build order, the others pale."""
-    network = build_network(scene)
-    count = _bricks(scene, bricks)
+    network, most, count = build_network(scene), len(scene.bricks), _bricks(scene, bricks)
     figure, (axes,) = _panels(scene, 1, width)
-    if count < len(scene.bricks):
-        draw_bricks(axes, network, len(scene.bricks), VIEW, alpha=0.15)
+    if count < most:
+        draw_bricks(axes, network, most, VIEW, alpha=0.15)
     draw_bricks(axes, network, count, VIEW)
-    axes.set_title(f"{scene.name}: {count} of {len(scene.bricks)} bricks")
+    axes.set_title(f"{scene.name}: {count} of {most} bricks")
     return figure
 
 
 @styled
 def network_picture(network: Network, bricks: int | None = None, width: float = WIDTH) -> Figure:
-    """Return a picture of a network, or of its part of the first bricks in build order.
-
-    Nodes that robots may hold carry their numbers where there are few.
-    """
+    """Return a picture of a network, or of its part of the first bricks in build order."""
     count = _bricks(network.scene, bricks)
     figure, (axes,) = _panels(network.scene, 1, width, 0.5)
     draw_network(axes, network, count, VIEW, numbers=count <= NUMBERED and width >= WIDTH)
@@ -129,24 +121,35 @@ def steps_picture(
     """
     picked, scene = _picked(steps, chosen), engine.network.scene
     figure, panels = _panels(scene, len(picked))
-    largest = _largest_force(engine, picked) if forces else None
+    largest = None
+    if forces:  # of any edge in these steps, N
+        each = (_fields(engine, step).edge_force for step in picked)
+        largest = max(float(np.abs(force).max(initial=0.0)) for force in each)
+    key: dict[int, Line2D] = {}
     for axes, step in zip(panels, picked, strict=True):
         _draw_step(axes, engine, step, forces=forces, magnify=magnify, largest_force=largest)
         if len(picked) == 1:
             draw_grips(axes, engine.network, step.grips, VIEW)
         else:
-            _mark_grips(axes, scene, step.grips)
+            key |= _mark_grips(axes, scene, step.grips)
         _frame(axes, scene, step, len(steps))
-    holding = range(len(scene.robots) if len(picked) > 1 else 0)
-    key = [
-        Line2D([], [], **_mark(i), label=f"{scene.robots[i].name} holds")
-        for i in holding
-        if any(step.grips[i] is not None for step in picked)
-    ]
-    key += [] if largest is None else force_key(largest)
-    if key:
-        figure.legend(handles=key, loc="outside lower center", ncols=4)
+    handles = [key[robot] for robot in sorted(key)]
+    handles += [] if largest is None else force_key(largest)
+    if handles:
+        figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
+
+
+def _mark_grips(axes: Axes, scene: Scene, grips: Grips) -> dict[int, Line2D]:
+    """Mark the nodes that robots hold; return the entry of a legend of each, by its index."""
+    key = {}
+    for i, node in enumerate(grips):
+        if node is not None:
+            mark: Any = {**grip_mark(i), "ms": 9, "mec": "white", "ls": "none", "zorder": 5}
+            x, y = VIEW.axes()[:2] @ np.array(scene.node_position(node))
+            axes.plot([x], [y], **mark, gid=f"{scene.robots[i].name} at {node}")
+            key[i] = Line2D([], [], **mark, label=f"{scene.robots[i].name} holds")
+    return key
 
 
 def _draw_step(
@@ -171,19 +174,6 @@ def _draw_step(
         draw_bricks(axes, network, bricks, VIEW, alpha=0.15)
         how["twist"] = fields.brick_twist[0]
     draw_bricks(axes, network, bricks, VIEW, **how)
-
-
-def _mark_grips(axes: Axes, scene: Scene, grips: Grips) -> None:
-    """Mark the nodes that robots hold, a color and a shape for each robot."""
-    for i, node in enumerate(grips):
-        if node is not None:
-            x, y = VIEW.axes()[:2] @ np.array(scene.node_position(node))
-            axes.plot([x], [y], **_mark(i), gid=f"{scene.robots[i].name} at {node}")
-
-
-def _mark(robot: int) -> dict[str, Any]:
-    """Return how the grip of a robot is drawn."""
-    return {**grip_mark(robot), "ms": 9, "mec": "white", "ls": "none", "zorder": 5}
 
 
 def _frame(axes: Axes, scene: Scene, step: Step, count: int) -> None:
@@ -212,31 +202,22 @@ def _fields(engine: Engine, step: Step) -> Fields:
     return engine.solve(step.bricks, held, Want.EDGES | Want.DISPLACEMENTS | Want.BRICKS)
 
 
-def _largest_force(engine: Engine, steps: Sequence[Step]) -> float:
-    """Return the largest axial force of any edge in some steps, N."""
-    return max(float(np.abs(_fields(engine, step).edge_force).max(initial=0.0)) for step in steps)
-
-
 def _picked(steps: Sequence[Step], chosen: int | Sequence[int] | None) -> list[Step]:
     """Return the steps of some numbers, from 1."""
-    count = len(steps)
     if chosen is None:
         chosen = spread_steps(steps, FRAMES)
     numbers: list[Any] = [*chosen] if isinstance(chosen, tuple | list | range) else [chosen]
     if not 1 <= len(numbers) <= MOST:
         raise StepError(f"{len(numbers)} steps to draw: give 1 to {MOST}")
     for number in numbers:
-        if not isinstance(number, Integral) or not 1 <= int(number) <= count:
-            raise StepError(f"step {short(number)}: the build has steps 1 to {count}")
+        if not isinstance(number, Integral) or not 1 <= int(number) <= len(steps):
+            raise StepError(f"step {short(number)}: the build has steps 1 to {len(steps)}")
     return [steps[int(number) - 1] for number in numbers]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Film:
-    """A build as a film: a notebook plays it, `save` writes it.
-
-    Each step is shown for some seconds; with ``forces`` the network, colored by axial force.
-    """
+    """A build as a film: a notebook plays it, `save` writes it; see `steps_picture`."""
 
     engine: Engine
     steps: Sequence[Step]
@@ -255,35 +236,30 @@ class Film:
         source = f"data:image/gif;base64,{b64encode(film).decode()}"
         return f'<img alt="{len(self.steps)} steps of a build" src="{source}">'
 
+    @styled
     def save(self, path: str | Path) -> Path:
         """Write the film to a file that ends in ``.gif``."""
         path = Path(path)
         if path.suffix != ".gif":
             raise FileError(f"film {path}: give a name that ends in .gif")
-        try:
-            self._write(path)
-        except OSError as error:
-            raise FileError(f"cannot write {path}: {error.strerror}; name another") from error
-        return path
-
-    @styled
-    def _write(self, path: Path) -> None:
-        """Draw every step and hand it to the writer."""
         scene = self.engine.network.scene
-        low, high = _seen_box(scene)
-        width, height = high - low
-        high_enough = max(FILM_WIDTH * height / width, 2.0) + 0.5
-        figure = new_picture(FILM_WIDTH, high_enough, constrained=False)
+        (left, low), (right, high) = _seen_box(scene)
+        high_enough = max(FILM_WIDTH * (high - low) / (right - left), 2.0) + 0.5
+        figure = new_picture(FILM_WIDTH, high_enough, "none")
         axes = figure.add_axes((0.02, 0.02, 0.96, 0.88))
         rate: Any = 1.0 / self.seconds  # the writer takes fractions
         writer = PillowWriter(fps=rate)
-        with writer.saving(figure, path, FILM_DPI):
-            for step in self.steps:
-                axes.clear()
-                _draw_step(axes, self.engine, step, forces=self.forces, magnify=self.magnify)
-                draw_grips(axes, self.engine.network, step.grips, VIEW)
-                _frame(axes, scene, step, len(self.steps))
-                writer.grab_frame()
+        try:
+            with writer.saving(figure, path, FILM_DPI):
+                for step in self.steps:
+                    axes.clear()
+                    _draw_step(axes, self.engine, step, forces=self.forces, magnify=self.magnify)
+                    draw_grips(axes, self.engine.network, step.grips, VIEW)
+                    _frame(axes, scene, step, len(self.steps))
+                    writer.grab_frame()
+        except OSError as error:
+            raise FileError(f"cannot write {path}: {error.strerror}; name another") from error
+        return path
 
 
 @styled
@@ -315,38 +291,27 @@ def gantt_picture(
     figure = new_picture(width, 0.62 * len(scene.robots) + 1.2)
     axes = figure.add_subplot()
     inch = (width - 1.6) / (last - first + 1)
-    shade = None if responses is None else _shade(scene, responses)
+    forces, shade = None, None
+    if responses is not None:  # N, by step and robot
+        forces = responses[[force_column(robot) for robot in scene.robots]].to_numpy(float)
+        most = np.nanmax(forces, initial=0.0) or 1.0
+        shade = ScalarMappable(Normalize(0.0, most), colormaps[SHADES])
     for hold in holds(scene, steps):
         if hold.last >= first and hold.first <= last:
-            force = None if responses is None else _forces(scene, responses, hold)
-            _bar(axes, hold, (force, shade))
-            _label(axes, _words(scene, hold), hold, inch)
+            _bar(axes, hold, forces, shade)
+            _label(axes, scene, hold, inch)
     _lanes(axes, scene, (first, last), len(steps))
     _key(figure, axes, shade, is_open=any(getattr(step, "moves", ()) for step in steps))
     return figure
 
 
-def _shade(scene: Scene, responses: pd.DataFrame) -> ScalarMappable:
-    """Return the shades of forces, from none to the largest of the build, N."""
-    columns = [force_column(robot) for robot in scene.robots]
-    largest = np.nanmax(responses[columns].to_numpy(float), initial=0.0)
-    return ScalarMappable(Normalize(0.0, largest or 1.0), colormaps[SHADES])
-
-
-def _forces(scene: Scene, responses: pd.DataFrame, hold: Hold) -> Floats:
-    """Return the force of a grip in each of its steps, N."""
-    column = responses[force_column(scene.robots[hold.robot])].to_numpy(float)
-    return np.asarray(column[hold.first - 1 : hold.last])
-
-
-def _bar(axes: Axes, hold: Hold, shaded: tuple[Floats | None, ScalarMappable | None]) -> None:
+def _bar(axes: Axes, hold: Hold, forces: Floats | None, shade: ScalarMappable | None) -> None:
     """Draw a grip: shaded step by step, framed as a whole, marked where it places a brick."""
-    forces, shade = shaded
     low = hold.robot - LANE / 2
     if forces is not None and shade is not None:
-        for i, force in enumerate(forces):
-            color = shade.to_rgba(force)
-            axes.add_patch(Rectangle((hold.first + i - 0.5, low), 1, LANE, fc=color, lw=0))
+        for number in range(hold.first, hold.last + 1):
+            color = shade.to_rgba(forces[number - 1, hold.robot])
+            axes.add_patch(Rectangle((number - 0.5, low), 1, LANE, fc=color, lw=0))
     look: Any = {"fc": PALE if forces is None else "none", "ec": DARK, "lw": 0.9}
     look |= {"hatch": "//"} if hold.node is None else {}
     name = f"hold {hold.robot} {hold.first} {hold.last}"
@@ -356,18 +321,14 @@ def _bar(axes: Axes, hold: Hold, shaded: tuple[Floats | None, ScalarMappable | N
         axes.plot([hold.first - 0.5] * 2, [low, low + LANE], color=DARK, lw=3.2)
 
 
-def _words(scene: Scene, hold: Hold) -> str:
-    """Return what a bar says: brick and node, or the number of the open grip."""
-    if hold.node is None:
-        return f"?{(hold.move or 0) + 1}"
-    return f"{scene.brick_of_node[hold.node].name} · {hold.node}"
-
-
-def _label(axes: Axes, words: str, hold: Hold, inch: float) -> None:
-    """Write words into a bar, upright where it is narrow; nothing where they do not fit."""
+def _label(axes: Axes, scene: Scene, hold: Hold, inch: float) -> None:
+    """Write brick and node, or the number of an open grip, into a bar as far as they fit."""
     room = inch * (hold.last - hold.first + 1)
     if room < 0.12:
         return
+    words = f"?{(hold.move or 0) + 1}"
+    if hold.node is not None:
+        words = f"{scene.brick_of_node[hold.node].name} · {hold.node}"
     flat = room >= LETTER * len(words) + 0.06
     look: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": DARK, "clip_on": True}
     look["bbox"] = {"boxstyle": "square,pad=0.1", "fc": (1, 1, 1, 0.72), "lw": 0}
@@ -378,14 +339,12 @@ def _label(axes: Axes, words: str, hold: Hold, inch: float) -> None:
 def _lanes(axes: Axes, scene: Scene, shown: tuple[int, int], steps: int) -> None:
     """Set lanes, limits and names."""
     count = len(scene.robots)
-    axes.set_xlim(shown[0] - 0.7, shown[1] + 0.7)
-    axes.set_ylim(count - 0.5, -0.5)
+    said = "step" if shown == (1, steps) else f"step, {shown[0]} to {shown[1]} of {steps}"
+    limits: Any = {"xlim": (shown[0] - 0.7, shown[1] + 0.7), "ylim": (count - 0.5, -0.5)}
+    axes.set(xlabel=said, **limits, axisbelow=True)
     axes.set_yticks(range(count), [robot.name for robot in scene.robots])
-    whole = shown == (1, steps)
-    axes.set_xlabel("step" if whole else f"step, {shown[0]} to {shown[1]} of {steps}")
     axes.tick_params(left=False)
     axes.grid(visible=True, axis="x", lw=0.3)
-    axes.set_axisbelow(True)
     axes.spines[["top", "right", "left"]].set_visible(False)
 
 

@@ -62,9 +62,9 @@ class _Picture(Figure):
         return buffer.getvalue()
 
 
-def new_picture(width: float, height: float, *, constrained: bool = True) -> Figure:
+def new_picture(width: float, height: float, layout: Any = None) -> Figure:
     """Return an empty figure, inches, that a notebook shows where it is returned."""
-    layout = ConstrainedLayoutEngine(h_pad=0.08, w_pad=0.06) if constrained else None
+    layout = layout or ConstrainedLayoutEngine(h_pad=0.08, w_pad=0.06)
     return _Picture(figsize=(width, height), layout=layout)
 
 
@@ -87,11 +87,7 @@ class Look:
 
 
 def look(number: int) -> Look:
-    """Return the look of a series, by its number from 0: the first 70 all differ.
-
-    Two of them differ in color or in marker; of the first seven each color is one's own, of the
-    first ten each marker.
-    """
+    """Return the look of a series, by its number from 0: the first 70 all differ."""
     return Look(*(each[number % len(each)] for each in (COLORS, MARKERS, DASHES)))
 
 
@@ -102,9 +98,7 @@ def looks(names: Iterable[str]) -> dict[str, Look]:
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:
     """Return an empty figure, inches, as wide as the site shows it by default."""
-    figure = new_picture(width, height, constrained=False)
-    figure.set_layout_engine("constrained")
-    return figure
+    return new_picture(width, height, "constrained")
 
 
 def dress(*panels: Axes) -> None:

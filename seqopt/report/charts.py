@@ -60,7 +60,6 @@ LABELS = {
     "C_max": "compression C_max [N]",
     "D_max": "displacement D_max [1e-3 mm]",
     "steps": "steps of the plan",
-    "regrips": "regrips",
     "bond": "bond needed [kPa]",
     "friction": "friction needed",
     "tilt": "tilt survived [deg]",
@@ -86,14 +85,13 @@ def _maxima(result: Comparison) -> Figure:
     figure = new_figure(1.4 + 2 * ROW * len(names))
     figure.suptitle("Largest response of any step", x=0.01, ha="left")
     panels = figure.subplots(2, 2, sharey=True).ravel()
+    colors = [VERMILION if name == PUBLISHED else BLUE for name in names]
     for panel, (column, unit) in zip(panels, LARGEST.items(), strict=True):
-        colors = [VERMILION if name == PUBLISHED else BLUE for name in names]
         values = result.table[column].astype(float)
         bars = panel.barh([typed(name) for name in names], values, color=colors, height=0.7)
         panel.bar_label(bars, [f" {value:.3g}" for value in values], fontsize=SMALL)
         panel.set_title(f"{TITLES[column]}, {column} [{unit}]")
         panel.margins(x=0.14)
-        panel.spines[["top", "right"]].set_visible(False)
         panel.tick_params(axis="y", length=0)
     panels[0].invert_yaxis()
     if PUBLISHED in names:
@@ -105,8 +103,10 @@ def _maxima(result: Comparison) -> Figure:
 @styled
 def _responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
     """Return the largest responses at every number of bricks; equal builds share a line."""
-    plans = merged(builds)
-    tables = {_together(names): _worst_steps(builds[one]) for one, names in plans.items()}
+    tables = {}
+    for first, names in merged(builds).items():
+        called = typed(first) if len(names) == 1 else f"the same plan: {', '.join(names)}"
+        tables[called] = _worst_steps(builds[first])
     figure = new_figure(6.6 + 0.2 * len(tables))
     figure.suptitle("Worst step at every number of bricks", x=0.01, ha="left")
     axes = figure.subplots(len(COLUMNS), 1, sharex=True)
@@ -117,11 +117,6 @@ def _responses_figure(builds: Mapping[str, pd.DataFrame]) -> Figure:
     axes[-1].set_yscale("log")
     plain(axes[-1].yaxis)
     return figure
-
-
-def _together(names: Sequence[str]) -> str:
-    """Return what a line is called that several plans share."""
-    return typed(names[0]) if len(names) == 1 else f"the same plan: {', '.join(names)}"
 
 
 @styled
@@ -146,7 +141,6 @@ def _gaps(result: Comparison) -> Figure:
             beside: Any = {"textcoords": "offset points", "va": "center", "fontsize": SMALL}
             panel.annotate(words, (value, row), (6, 0), **beside)
         panel.set_title(title)
-        panel.spines[["top", "right"]].set_visible(False)
         panel.tick_params(axis="y", length=0, pad=8)
     panels[0].set_yticks(rows, [typed(str(name)) for name in solved.index])
     panels[0].set_ylim(len(solved) - 0.5, -0.5)
@@ -155,25 +149,20 @@ def _gaps(result: Comparison) -> Figure:
 
 @styled
 def trace_figure(plans: Sequence[Plan]) -> Figure:
-    """Return the choices and bounds of plans for one problem against time.
-
-    Choices are filled, bounds hollow, as steps over the time since a formulation began.
-    """
+    """Return the choices (filled) and bounds (hollow) of plans for one problem against time."""
     figure = new_figure(3.6)
     axes = figure.subplots()
     known_by = looks(plan.formulation.name for plan in plans)
+    hollow: dict[str, Any] = {"mfc": "white", "lw": 0.8}
     for plan in plans:
         name = plan.formulation.name
-        trace = plan.trace
-        seconds = np.array([found.seconds for found in trace])
-        bounds: dict[str, Any] = {"mfc": "white", "lw": 0.8}
-        for values, more in (
-            ([found.objective for found in trace], {"label": typed(name)}),
-            ([found.bound for found in trace], bounds),
-        ):
-            known, look = np.isfinite(values), known_by[name].line() | more
-            axes.step(seconds[known], np.array(values)[known], where="post", **look)
-    axes.plot([], [], "o-", color=GRAY, mfc="white", lw=0.8, label="lower bound")
+        rows = [(found.seconds, found.objective, found.bound) for found in plan.trace]
+        seconds, *curves = np.array(rows, dtype=float).reshape(-1, 3).T
+        for values, more in zip(curves, ({"label": typed(name)}, hollow), strict=True):
+            known = np.isfinite(values)
+            look = known_by[name].line() | more
+            axes.step(seconds[known], values[known], where="post", **look)
+    axes.plot([], [], "o-", color=GRAY, **hollow, label="lower bound")
     axes.set(xscale="log", xlabel="time [s]", ylabel="objective, and what bounds it below")
     dress(axes)
     axes.legend()
@@ -188,23 +177,19 @@ def draw_responses(
     A step stands at the share of the build that it ends, so that methods of different length align.
     """
     styles = looks(tables)
-    ended = {name: _ended(table) for name, table in tables.items()}
-    for axis, (column, label) in zip(axes, columns.items(), strict=True):
-        for number, (name, table) in enumerate(tables.items()):
-            every = max(1, len(table) // MARKS)
-            look = styles[name].line() | {"lw": 1.2, "ms": 4.5, "mfc": "white"}
-            look |= {"markevery": (number % every, every), "label": name}
-            axis.plot(ended[name], table[column], **look)
+    for number, (name, table) in enumerate(tables.items()):
+        steps = table.groupby("bricks")
+        ended = table["bricks"] - 1 + (steps.cumcount() + 1) / steps["step"].transform("count")
+        every = max(1, len(table) // MARKS)
+        look = styles[name].line() | {"lw": 1.2, "ms": 4.5, "mfc": "white"}
+        look |= {"markevery": (number % every, every), "label": name}
+        for axis, column in zip(axes, columns, strict=True):
+            axis.plot(ended, table[column], **look)
+    for axis, label in zip(axes, columns.values(), strict=True):
         axis.set_ylabel(label)
         dress(axis)
     axes[-1].set_xlabel("bricks placed")
     axes[0].legend(frameon=False, ncols=min(len(tables), 4), fontsize=SMALL)
-
-
-def _ended(table: pd.DataFrame) -> pd.Series[float]:
-    """Return where every step stands along the build: at the bricks placed when it ends."""
-    steps = table.groupby("bricks")
-    return table["bricks"] - 1 + (steps.cumcount() + 1) / steps["step"].transform("count")
 
 
 def _worst_steps(table: pd.DataFrame) -> pd.DataFrame:
@@ -215,17 +200,16 @@ def _worst_steps(table: pd.DataFrame) -> pd.DataFrame:
 def merged(tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[str, ...]]:
     """Return the names of tables by the first with the same numbers: a line would hide another."""
     out: dict[str, tuple[str, ...]] = {}
-    for name, table in tables.items():
-        twin = next((first for first in out if _same(tables[first], table)), name)
+    numbers = {name: table.select_dtypes("number") for name, table in tables.items()}
+    for name, own in numbers.items():
+        alike = (
+            n
+            for n in out
+            if numbers[n].shape == own.shape and np.allclose(numbers[n], own, equal_nan=True)
+        )
+        twin = next(alike, name)
         out[twin] = (*out.get(twin, ()), name)
     return out
-
-
-def _same(one: pd.DataFrame, other: pd.DataFrame) -> bool:
-    numbers = [table.select_dtypes("number") for table in (one, other)]
-    return numbers[0].shape == numbers[1].shape and bool(
-        np.allclose(numbers[0], numbers[1], equal_nan=True)
-    )
 
 
 @styled
@@ -264,8 +248,7 @@ def front_figure(
     for axes in panels[len(others) :]:
         axes.set_axis_off()
     words: dict[str, Any] = {"label": "points of the set: steps of the plan"}
-    words["ticks"] = MaxNLocator(integer=True)
-    figure.colorbar(dots, ax=list(panels), shrink=0.7, **words)
+    figure.colorbar(dots, ax=list(panels), shrink=0.7, ticks=MaxNLocator(integer=True), **words)
     handles, labels = panels[0].get_legend_handles_labels()
     if handles:
         figure.legend(handles, labels, loc="outside lower center", ncols=4)
@@ -274,31 +257,30 @@ def front_figure(
 
 def _mark(axes: Axes, marks: Mapping[str, Mapping[str, float]], names: tuple[str, str]) -> None:
     """Mark where methods stand that make no choice."""
+    look: dict[str, Any] = {"color": VERMILION, "mfc": "none", "ms": 8, "ls": "none", "mew": 2}
     for marker, (method, worst) in zip(MARKERS, marks.items(), strict=False):
         if all(name in worst for name in names):
             at = [in_shown_unit(worst[name], name) for name in names]
-            look: dict[str, Any] = {"color": VERMILION, "mfc": "none", "ms": 8, "ls": "none"}
-            axes.plot(*at, marker, label=in_words(method), zorder=3, mew=2, **look)
+            axes.plot(*at, marker, label=in_words(method), zorder=3, **look)
 
 
 def _widen(axes: Axes) -> None:
     """Keep rounding from looking like a trade-off: axes span a hundredth of what they show."""
     for axis in (axes.xaxis, axes.yaxis):
-        low, high = axis.get_view_interval()
-        middle, least = (low + high) / 2, LEAST * max(abs(low), abs(high))
-        if axis.get_scale() == "linear" and high - low < least:
-            axis.set_view_interval(middle - least / 2, middle + least / 2, ignore=True)
         if axis.get_scale() == "linear":
+            low, high = axis.get_view_interval()
+            middle, least = (low + high) / 2, LEAST * max(abs(low), abs(high))
+            if high - low < least:
+                axis.set_view_interval(middle - least / 2, middle + least / 2, ignore=True)
             axis.set_major_formatter(ScalarFormatter(useOffset=False))
 
 
 def plan_figures(engine: Engine, builds: Sequence[Build]) -> dict[str, bytes]:
     """Return figures of plans as PNG and SVG, by file name: steps, grips, and all responses."""
-    scene = engine.network.scene
     files: dict[str, bytes] = {}
     for build in builds:
         files |= picture_files(f"{build.name}_steps", steps_picture(engine, build.steps))
-        grips = gantt_picture(scene, build.steps, build.table)
+        grips = gantt_picture(engine.network.scene, build.steps, build.table)
         files |= picture_files(f"{build.name}_grips", grips)
     tables = {build.name: build.table for build in builds}
     return files | picture_files("responses", _responses_figure(tables))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,17 +55,12 @@ PATIENCE = 10.0  # s, after which the best plan so far is the row
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopFacts(Terse):
-    """What the formulations of one loop have in common.
-
-    The ``seconds`` that all of them share are those to ``respond`` (computing responses) and to
-    ``rank`` (costs); ``paper_models`` are what Bruun et al. count for three robots, cascading and
-    with full overlap; ``ranks`` says where the published plan's nodes rank, see `rank_choice`.
-    """
+    """What the formulations of one loop have in common."""
 
     method: str
-    seconds: Mapping[str, float]
-    paper_models: tuple[int, int] | None
-    ranks: pd.DataFrame | None
+    seconds: Mapping[str, float]  # to ``respond`` (computing responses) and to ``rank`` (costs)
+    paper_models: tuple[int, int] | None  # of Bruun et al., cascading and with full overlap
+    ranks: pd.DataFrame | None  # of the published plan's nodes, see `rank_choice`
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -134,11 +130,6 @@ def compare(
     Returns
     -------
     Comparison
-
-    Raises
-    ------
-    StepError
-        If no method can build the scene.
     """
     scene = engine.network.scene
     tables, notes = method_tables(engine, robots)
@@ -150,28 +141,24 @@ def compare(
     rows |= {name: _row(plan) for name, plan in plans.items()}
     loop = None if problem is None else _facts(problem, rows, robots)
     own = _free_criterion(criterion, [largest(scene, tables[str(name)]) for name in maxima])
-    free, why_not = _free_plan(engine, own, robots, progress)
-    notes += [why_not] if why_not else []
+    free, refused = _free_plan(engine, own, robots, progress)
+    notes += refused
+    criteria = {} if problem is None else {problem.schedule.method: problem.criterion}
     if free is not None:
         tables[FREE], rows[FREE] = free.responses(), _free_row(free)
+        criteria[FREE] = free.states.criterion
     if problem is not None:
         notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
-    left = LinearRange(engine).of_builds(tables)
-    table = _table(rows, left)
+    table = _table(rows, left := LinearRange(engine).of_builds(tables))
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
-    known = (tuple(notes), refusal, left, _criteria(problem, free))
-    return Comparison(maxima, printed, table, tables, loop, *known)
+    return Comparison(maxima, printed, table, tables, loop, tuple(notes), refusal, left, criteria)
 
 
-def _table(
-    rows: dict[str, dict[str, object]], left: Mapping[str, tuple[Departure, ...]]
-) -> pd.DataFrame:
+def _table(rows: dict[str, dict[str, object]], left: Iterable[str]) -> pd.DataFrame:
     """Return rows as a table, and which of them leave the linear range."""
     table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS)
-    table[RANKS] = table[RANKS].astype(float)
-    table["outside"] = [name in left for name in table.index]
-    return table
+    return table.astype(dict.fromkeys(RANKS, float)).assign(outside=table.index.isin([*left]))
 
 
 def _add_largest(
@@ -186,19 +173,10 @@ def _add_largest(
     return notes
 
 
-def _criteria(problem: Layers | None, free: Plan | None) -> dict[str, Criterion]:
-    """Return the criteria as they were posed, by problem."""
-    found = {} if problem is None else {problem.schedule.method: problem.criterion}
-    return found if free is None else found | {FREE: free.states.criterion}
-
-
 def _plans(
     engine: Engine, criterion: Criterion, progress: Tell, robots: Sequence[str]
 ) -> tuple[dict[str, Plan], Layers | None, str]:
-    """Return the plan of the modified sequential method and of every formulation on the loop.
-
-    And the problem of the loop; none, and the reason, where the robots cannot build by it.
-    """
+    """Return the plans of all formulations and the problem of the loop, or why there is none."""
     network, plans = engine.network, {}
     count = len(robots) or min(len(network.scene.robots), MOST)
     try:
@@ -239,12 +217,11 @@ def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
 
 def _quantities(scene: Scene, table: pd.DataFrame) -> pd.Series[float]:
     """Return the largest responses of any step, the force of every robot for itself."""
-    values = {
-        f"{robot_response(r.name)} [N]": table[force_column(r)].abs().max() for r in scene.robots
-    }
-    for name, value in largest(scene, table).items():
-        values |= {} if name == "F_rob" else {f"{name} [{LARGEST[name]}]": value}
-    return pd.Series(values)
+    worst = largest(scene, table)
+    columns = {f"{robot_response(r.name)} [N]": force_column(r) for r in scene.robots}
+    forces = {said: table[column].abs().max() for said, column in columns.items()}
+    del worst["F_rob"]
+    return pd.Series(forces | {f"{name} [{LARGEST[name]}]": worst[name] for name in worst})
 
 
 def _row(plan: Plan) -> dict[str, object]:
@@ -268,22 +245,17 @@ def _row(plan: Plan) -> dict[str, object]:
 def _facts(
     problem: Layers, rows: Mapping[str, dict[str, object]], robots: Sequence[str]
 ) -> LoopFacts:
-    method = problem.schedule.method
+    """Return the facts of a loop, and add to the published plan's row what it is worth."""
+    method, ranks = problem.schedule.method, None
+    if PUBLISHED in rows and not robots:
+        choice = published_choice(problem)
+        value = problem.sums.cost(choice)
+        gap = (value - least_sum(problem.sums)) / max(abs(value), TINY)
+        rows[PUBLISHED] |= {"problem": method, "objective": value, "gap": gap}
+        rows[PUBLISHED] |= under_both(problem, choice)
+        ranks = rank_choice(problem, choice)
     counted = paper_models(problem.schedule) if method == "three-robot" else None
-    ranks = None if robots else _published_ranks(problem, rows)
     return LoopFacts(method, problem.seconds(Aim.SUM), counted, ranks)
-
-
-def _published_ranks(problem: Layers, rows: Mapping[str, dict[str, object]]) -> pd.DataFrame | None:
-    """Return where the published plan's nodes rank, and add to its row what it is worth."""
-    if PUBLISHED not in rows:
-        return None
-    choice = published_choice(problem)
-    value = problem.sums.cost(choice)
-    gap = (value - least_sum(problem.sums)) / max(abs(value), TINY)
-    rows[PUBLISHED].update(problem=problem.schedule.method, objective=value, gap=gap)
-    rows[PUBLISHED].update(under_both(problem, choice))
-    return rank_choice(problem, choice)
 
 
 def method_tables(
@@ -305,11 +277,6 @@ def method_tables(
     notes : list of str
         Why other methods cannot build the scene or are not what they are called, and which robots
         never grip.
-
-    Raises
-    ------
-    StepError
-        If no method can build it.
     """
     scene = engine.network.scene
     tables: dict[str, pd.DataFrame] = {}
@@ -348,31 +315,28 @@ def _free_criterion(criterion: Criterion, rows: Sequence[Mapping[str, float]]) -
     if not isinstance(criterion, RankSum):
         return criterion
     units = {"D_max": 1e-6}  # m of 1e-3 mm
-    least = {
-        name.replace("F_rob", "F_largest"): units.get(name, 1.0) * min(r[name] for r in rows) or 1.0
-        for name in LARGEST
-    }
-    return WorstRatio("worst-ratio-to-rows", tuple(least.items()))
+    least = {n: units.get(n, 1.0) * min(r[n] for r in rows) or 1.0 for n in LARGEST}
+    limits = [("F_largest", least.pop("F_rob")), *least.items()]
+    return WorstRatio("worst-ratio-to-rows", tuple(limits))
 
 
 def _free_plan(
     engine: Engine, criterion: Criterion, robots: Sequence[str], progress: Tell
-) -> tuple[Plan | None, str]:
+) -> tuple[Plan | None, list[str]]:
     """Return the shortest free schedule with the smallest worst step, or why there is none."""
     try:
         rules = FreeRules(robots=tuple(robots))
         problem = build_states(engine, rules, criterion, "minmax,steps")
-        return solve(problem, "schedule_search", time_limit=PATIENCE, progress=progress), ""
+        return solve(problem, "schedule_search", time_limit=PATIENCE, progress=progress), []
     except SeqoptError as error:
-        return None, f"{FREE}: {error}"
+        return None, [f"{FREE}: {error}"]
 
 
 def fixed_methods(engine: Engine) -> dict[str, pd.DataFrame]:
     """Return the responses of every method without open grips, as `method_tables`; or of none."""
-    try:
+    with suppress(StepError):
         return method_tables(engine)[0]
-    except StepError:
-        return {}
+    return {}
 
 
 def _free_row(plan: Plan) -> dict[str, object]:
@@ -409,10 +373,7 @@ def in_shown_unit(value: pd.Series[float] | float, name: str) -> pd.Series[float
 
 
 def shown_table(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the table of a Pareto set with the tilt that is survived, in degrees.
-
-    In the set a tilt is how far it is from a right angle, rad.
-    """
+    """Return the table of a Pareto set with the tilt that is survived, in degrees."""
     if "tilt" not in table:
         return table.copy()
     out = table.assign(tilt=in_shown_unit(table["tilt"], "tilt"))

@@ -11,7 +11,7 @@ one.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -41,14 +41,13 @@ INK, TENSION, COMPRESSION = "#2b2b2b", VERMILION, BLUE
 THIN, THICK = 1.2, 7.0  # points: edges without force, and with the largest
 SPARE = 0.3  # share of a node's area where the colors of edges count
 Faces = tuple[tuple[int, ...], ...]
-Color = tuple[float, float, float, float]
 FACES: Faces = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 CLAY = np.array([0.80, 0.52, 0.38])
 MARKED = np.array([0.46, 0.63, 0.76])
 ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#b35900", "#444444")
 ROBOT_MARKERS = "XPDs"
 LINE = 11.0  # points from one line of text to the next
-NEAR_UP, NEAR_ASIDE = 0.08, 0.3  # share of a picture within which labels are neighbors
+NEAR = (0.3, 0.08)  # share of a picture within which labels are neighbors, aside and up
 
 
 @dataclass(frozen=True)
@@ -81,15 +80,13 @@ def aside(marks: Floats, segments: Sequence[Floats]) -> list[tuple[float, float]
     reach = SHARE * float(np.ptp(marks, axis=0).max())
     around = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
     ends = np.asarray(segments, dtype=float).reshape(-1, 2, 2)
-    placed: list[Floats] = []
+    placed = np.empty((0, 2))
     out = []
-    for mark in marks:
-        spots = mark + reach * around
-        room = _from_lines(spots, ends)
-        for other in placed:
-            room = np.minimum(room, np.linalg.norm((spots - other) / [WIDE, 1.0], axis=1))
-        best = int(room.argmax())
-        placed.append(spots[best])
+    for spots in marks[:, None] + reach * around:
+        parts = (spots[:, None] - placed) / [WIDE, 1.0]
+        others = np.linalg.norm(parts, axis=2).min(axis=1, initial=np.inf)
+        best = int(np.minimum(_from_lines(spots, ends), others).argmax())
+        placed = np.concatenate([placed, spots[best : best + 1]])
         x, y = (POINTS * around[best]).tolist()
         out.append((x, y))
     return out
@@ -122,22 +119,16 @@ def _drawing_order(corners: Floats, toward: Floats) -> list[int]:
     pairs = _overlapping(seen[..., :2])
     behind: list[set[int]] = [set() for _ in corners]
     hides: list[list[int]] = [[] for _ in corners]
-    for (i, j), side in zip(pairs.tolist(), _in_front(seen, pairs).tolist(), strict=True):
+    for pair, side in zip(pairs.tolist(), _in_front(seen, pairs).tolist(), strict=True):
         if side:
-            far, near = (i, j) if side > 0 else (j, i)
+            far, near = pair[::side]
             behind[near].add(far)
             hides[far].append(near)
-    return _sorted_by_depth(seen[..., 2].mean(axis=1).tolist(), behind, hides)
-
-
-def _sorted_by_depth(
-    depth: list[float], behind: list[set[int]], hides: list[list[int]]
-) -> list[int]:
-    """Return all in an order, the farthest first; a circle starts at its farthest."""
+    depth = seen[..., 2].mean(axis=1).tolist()
     ready = [(depth[i], i) for i, waits in enumerate(behind) if not waits]
     heapq.heapify(ready)
     order, left = [], dict.fromkeys(range(len(depth)))
-    while left:
+    while left:  # a circle starts at its farthest
         i = heapq.heappop(ready)[1] if ready else min(left, key=lambda k: depth[k])
         if i not in left:
             continue
@@ -204,36 +195,25 @@ def draw_network(  # noqa: PLR0913  # what is drawn, and how, each by its name
         points += magnify * displacement
     seen = points @ view.axes()[:2].T
     segments = list(seen[network.edge_nodes[:edges]])
-    axes.add_collection(_lines(segments, edge_force, largest_force))
-    _draw_nodes(axes, network.node_kind[:nodes], seen, 1.0 if edge_force is None else SPARE)
+    look: Any = {"colors": INK, "linewidths": THIN}
+    if edge_force is not None:
+        size = largest_force or np.abs(edge_force).max() or 1.0
+        look["colors"] = [TENSION if force > 0 else COMPRESSION for force in edge_force]
+        look["linewidths"] = (THIN + (THICK - THIN) * np.abs(edge_force) / size).tolist()
+    axes.add_collection(LineCollection(segments, **look))
+    kind = network.node_kind[:nodes]
+    _draw_nodes(axes, kind, seen, 1.0 if edge_force is None else SPARE)
     if numbers:
-        _write_numbers(axes, network, seen, segments)
+        inner = np.flatnonzero(kind == PartKind.INNER.value)
+        for i, shift in zip(inner, aside(seen[inner], segments), strict=True):
+            _write(axes, str(network.node_name[i]), seen[i], shift, ha="center", zorder=4)
     _frame(axes)
-
-
-def _write_numbers(axes: Axes, network: Network, seen: Floats, segments: Sequence[Floats]) -> None:
-    """Write the numbers of the nodes that robots may hold beside what is seen (N, 2)."""
-    inner = np.flatnonzero(network.node_kind[: len(seen)] == PartKind.INNER.value)
-    for i, shift in zip(inner, aside(seen[inner], segments), strict=True):
-        _write(axes, str(network.node_name[i]), seen[i], shift, ha="center", zorder=4)
 
 
 def _write(axes: Axes, text: str, at: Any, shift: tuple[float, float], **how: Any) -> None:
     """Write text beside a point, shifted by points, with a halo."""
     beside: Any = {"textcoords": "offset points", "va": "center", "fontsize": SMALL}
     axes.annotate(text, at, shift, path_effects=HALO, **beside, **how)
-
-
-def _lines(
-    segments: list[Floats], edge_force: Floats | None, largest: float | None
-) -> LineCollection:
-    """Return edges (E) of (2, 2), colored by their forces (E,) if given."""
-    if edge_force is None:
-        return LineCollection(segments, colors=INK, linewidths=1.2)
-    size = largest or np.abs(edge_force).max() or 1.0
-    colors = [TENSION if force > 0 else COMPRESSION for force in edge_force]
-    widths = THIN + (THICK - THIN) * np.abs(edge_force) / size
-    return LineCollection(segments, colors=colors, linewidths=widths.tolist())
 
 
 def force_key(largest_force: float) -> list[Line2D]:
@@ -272,16 +252,21 @@ def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
     The twist of every brick (b, 6), m and rad, is drawn so many times larger; bricks of marked
     names have another color.
     """
-    boxed = _moved(network, bricks, twist, magnify)
+    boxed = boxes(network.scene.placed[:bricks]).corners()
+    if twist is not None:
+        turned = np.cross(twist[:bricks, None, 3:], boxed - boxed.mean(axis=1, keepdims=True))
+        boxed = boxed + magnify * (twist[:bricks, None, :3] + turned)
     polygons, colors = [], []
     for b in _drawing_order(boxed, view.axes()):
-        own = MARKED if (brick := network.scene.placed[b]).name in marked else CLAY
+        brick = network.scene.placed[b]
         points, faces = _solid(brick, boxed[b], None if twist is None else magnify * twist[b])
         seen = points @ view.axes().T
-        for face in _in_order(faces, seen, whole=brick.shape is None):
-            polygons.append(seen[list(face), :2])
-            red, green, blue = (_light(points, face) * own).tolist()
-            colors.append((red, green, blue, alpha))
+        for face in sorted(map(list, faces), key=lambda face: float(seen[face, 2].mean())):
+            if brick.shape is None or normal_of(seen[face])[2] > 0:  # not turned away
+                polygons.append(seen[face, :2])
+                normal = normal_of(points[face])  # whose direction says how bright a face is
+                light = 0.55 + 0.45 * abs(normal @ [0.3, -0.5, 0.8]) / np.linalg.norm(normal)
+                colors.append((*(light * (MARKED if brick.name in marked else CLAY)), alpha))
     rim = (0.25, 0.15, 0.1, alpha)
     axes.add_collection(PolyCollection(polygons, facecolors=colors, edgecolors=rim, linewidths=0.4))
     _frame(axes)
@@ -294,12 +279,15 @@ def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: 
         for i, node in enumerate(grips)
         if node is not None
     }
-    shifts = _apart(at, max(axes.dataLim.width, axes.dataLim.height, 0.0))
+    beside, above = (share * max(axes.dataLim.width, axes.dataLim.height, 0.0) for share in NEAR)
     for i, (x, y) in at.items():
+        # labels of neighbors stand in lines, one above the other
+        near = [j for j, (u, v) in at.items() if abs(v - y) <= above and abs(u - x) <= beside]
+        line = sorted(near, key=lambda j: float(at[j][1])).index(i) - (len(near) - 1) / 2
         mark = grip_mark(i)
         axes.scatter([x], [y], 90, **mark, edgecolors="white", zorder=5)
         name = f"{network.scene.robots[i].name} at {grips[i]}"
-        _write(axes, name, (x, y), (10, shifts[i]), color=mark["color"], zorder=6)
+        _write(axes, name, (x, y), (10, LINE * line), color=mark["color"], zorder=6)
 
 
 def grip_mark(robot: int) -> dict[str, Any]:
@@ -308,53 +296,11 @@ def grip_mark(robot: int) -> dict[str, Any]:
     return {"color": color, "marker": marker}
 
 
-def _apart(at: Mapping[int, Floats], size: float) -> dict[int, float]:
-    """Return how far up every label goes, points, so that those of neighbors stand in lines.
-
-    ``at`` has where marks are (2,), ``size`` how large the picture is, both m.
-    """
-    out = {}
-    for i, (x, y) in at.items():
-        near = [
-            j
-            for j, (u, v) in at.items()
-            if abs(v - y) <= NEAR_UP * size and abs(u - x) <= NEAR_ASIDE * size
-        ]
-        below = sorted(near, key=lambda j: float(at[j][1]))
-        out[i] = LINE * (below.index(i) - (len(near) - 1) / 2)
-    return out
-
-
-def _moved(network: Network, bricks: int, twist: Floats | None, magnify: float) -> Floats:
-    """Return the corners of the first bricks, (b, 8, 3), m, moved by twists (b, 6) if given."""
-    corners = boxes(network.scene.placed[:bricks]).corners()
-    if twist is None:
-        return corners
-    arm = corners - corners.mean(axis=1, keepdims=True)
-    turned = np.cross(twist[:bricks, None, 3:], arm)
-    return np.asarray(corners + magnify * (twist[:bricks, None, :3] + turned))
-
-
 def _solid(brick: Brick, corners: Floats, motion: Floats | None) -> tuple[Floats, Faces]:
-    """Return vertices (V, 3), m, and faces of a brick: the corners of its box, or of its shape.
-
-    Those of a shape are moved by a twist if given; those of a box are.
-    """
+    """Return vertices (V, 3), m, and faces of a brick: of its moved box, or of its shape, moved."""
     if brick.shape is None:
         return corners, FACES
     points, faces = vertices_of(brick)
     if motion is not None:
         points = points + motion[:3] + np.cross(motion[3:], points - brick.position)
     return points, tuple(map(tuple, faces))
-
-
-def _in_order(faces: Faces, seen: Floats, *, whole: bool) -> list[tuple[int, ...]]:
-    """Return faces, as vertices (V, 3) are seen, the farthest first; turned away ones if whole."""
-    drawn = [face for face in faces if whole or normal_of(seen[list(face)])[2] > 0]
-    return sorted(drawn, key=lambda face: float(seen[list(face), 2].mean()))
-
-
-def _light(corners: Floats, face: tuple[int, ...]) -> float:
-    """Return how bright a face of corners (V, 3) is, from 0.55 to 1."""
-    normal = normal_of(corners[list(face)])
-    return float(0.55 + 0.45 * abs(normal @ [0.3, -0.5, 0.8]) / np.linalg.norm(normal))

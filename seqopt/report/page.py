@@ -10,7 +10,7 @@ from __future__ import annotations
 import gzip
 import json
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
 from html import escape
@@ -19,6 +19,7 @@ from itertools import cycle
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike
 
 from seqopt._files import csv_text
 from seqopt.arrays import Floats
@@ -83,8 +84,8 @@ class Scatter:
 
     def data(self) -> dict[str, object]:
         """Return it as lists, ready for JSON; what is not known is None."""
-        known = self.points.astype(float).map(lambda value: value if np.isfinite(value) else None)
-        known = known.astype(object).where(self.points.notna(), None)
+        known = self.points.astype(float)
+        known = known.astype(object).where(np.isfinite(known), None)
         return {
             "title": self.title,
             "builds": [str(name) for name in self.points.index],
@@ -95,36 +96,30 @@ class Scatter:
 
 
 def _structure_data(network: Network) -> dict[str, object]:
-    """Return a structure as lists, ready for JSON.
-
-    Edges have the points at their ends and the brick count from which they are there; ``carried``
-    has the bricks that every point moves with.
-    """
+    """Return a structure as lists, ready for JSON; edges end with their brick count."""
     scene = network.scene
-    solids = _solids(scene)
-    ends = [[int(i) for i in row] for row in network.edge_nodes]
+    rows = zip(scene.placed, network.centroid, _solids(scene), strict=True)
     return {
         "name": scene.name,
         "bricks": [
             {
                 "name": brick.name,
-                "center": _rounded(network.centroid[i]),
-                "corners": _rounded(solids[i][0]),
-                "faces": solids[i][1],
+                "center": _rounded(center),
+                "corners": _rounded(corners),
+                "faces": faces,
             }
-            for i, brick in enumerate(scene.placed)
+            for brick, center, (corners, faces) in rows
         ],
         "nodes": {
-            str(node): {"at": _rounded(np.array(scene.node_position(node))), "brick": i}
+            str(node): {"at": _rounded(scene.node_position(node)), "brick": i}
             for i, brick in enumerate(scene.placed)
             for node in brick.nodes
         },
-        "points": [_rounded(point) for point in network.node_position],
+        "points": _rounded(network.node_position),
         "carried": _carried(network),
-        "edges": [[*ends[e], int(network.edge_since[e])] for e in range(len(network.edge_nodes))],
+        "edges": np.column_stack([network.edge_nodes, network.edge_since]).tolist(),
         "grounds": [
-            {"at": _rounded(np.array(ground.anchor)), "brick": ground.brick}
-            for ground in scene.grounds
+            {"at": _rounded(ground.anchor), "brick": ground.brick} for ground in scene.grounds
         ],
         "robots": [
             {"name": robot.name, "payload": robot.payload, "color": color}
@@ -134,16 +129,14 @@ def _structure_data(network: Network) -> dict[str, object]:
     }
 
 
-def _solids(scene: Scene) -> list[tuple[Floats, Sequence[Sequence[int]]]]:
-    """Return corners (k, 3) and faces of all bricks; the viewer draws a face as a fan."""
-    out: list[tuple[Floats, Sequence[Sequence[int]]]] = []
+def _solids(scene: Scene) -> Iterator[tuple[Floats, Sequence[Sequence[int]]]]:
+    """Yield corners (k, 3) and faces of all bricks; the viewer draws a face as a fan."""
     for brick, corners in zip(scene.placed, boxes(scene.placed).corners(), strict=True):
         if brick.shape is None:
-            out.append((corners, FACES))
-            continue
-        points, faces = vertices_of(brick)
-        out.append((points, [_fan(points, tuple(face)) for face in faces]))
-    return out
+            yield corners, FACES
+        else:
+            points, faces = vertices_of(brick)
+            yield points, [_fan(points, tuple(face)) for face in faces]
 
 
 def _fan(points: Floats, face: tuple[int, ...]) -> tuple[int, ...]:
@@ -204,7 +197,8 @@ def _marks(scene: Scene, build: Build) -> list[str]:
     for step in build.steps:
         said = [f"{each.robot} exceeds its payload" for each in over if step.number in each.steps]
         left = [each.what for each in build.departures if step.number in each.steps]
-        out.append("; ".join(said + ([f"{OUTSIDE}: {', '.join(left)}"] if left else [])))
+        said += [f"{OUTSIDE}: {', '.join(left)}"] if left else []
+        out.append("; ".join(said))
     return out
 
 
@@ -234,8 +228,8 @@ def _packed(values: Floats) -> dict[str, object]:
     return {"scale": [float(f"{s:.6g}") for s in scale], "width": flat.shape[1], "data": data}
 
 
-def _rounded(values: Floats) -> object:
-    return np.round(values, 6).tolist()
+def _rounded(values: ArrayLike) -> object:
+    return np.asarray(values).round(6).tolist()
 
 
 def report_page(
@@ -260,20 +254,12 @@ def report_page(
     >>> len(report_page(engine, [build], "Two robots take turns.")) > 5e5
     True
     """
+    data = json.dumps(_data(engine, builds, scatter), separators=(",", ":"))
     return _filled(
         title=f"{escape(engine.network.scene.name)}, step by step",
         sentence=escape(sentence),
         tables="".join(_table(caption, table) for caption, table in tables),
-        data=_json(_data(engine, builds, scatter)),
-    )
-
-
-def _policy(style: str, **scripts: str) -> str:
-    """Return what a browser may run and load of the page: its own scripts and style, no other."""
-    own = " ".join(map(_hashed, scripts.values()))
-    return (
-        f"default-src 'none'; script-src {own}; style-src {_hashed(style)}; img-src data: blob:; "
-        "base-uri 'none'; form-action 'none'"
+        data=data.replace("<", "\\u003c"),  # so that it cannot end the script it stands in
     )
 
 
@@ -282,16 +268,16 @@ def _hashed(text: str) -> str:
     return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"
 
 
-def _json(data: object) -> str:
-    """Return JSON that cannot end the script that it stands in."""
-    return json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
-
-
 def _filled(**parts: str) -> str:
     """Return the page with its parts in their places, and the policy that lets its own run."""
     own = {part: _asset(name) for part, name in PARTS.items()}
+    style, *scripts = map(_hashed, own.values())
+    policy = (
+        f"default-src 'none'; script-src {' '.join(scripts)}; style-src {style}; "
+        "img-src data: blob:; base-uri 'none'; form-action 'none'"
+    )
     page = _asset("page.html")
-    for name, content in {"policy": _policy(**own), **parts, **own}.items():
+    for name, content in {"policy": policy, **parts, **own}.items():
         page = page.replace(f"<!-- {name} -->", content, 1)
     return page
 

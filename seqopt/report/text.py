@@ -57,13 +57,11 @@ def format_comparison(comparison: Comparison, scene: Scene, criterion: Criterion
     str
         Of many lines.
     """
-    blocks = [_methods(comparison, scene), _notes(comparison)]
-    loop = comparison.loop
-    if loop is None:
-        blocks.append(f"Loop of robots: not possible here; {comparison.refusal}")
-    else:
-        blocks.append(_formulations(comparison.table, loop, criterion))
-    return "\n\n".join([*blocks, *_expert(comparison)])
+    notes = "\n".join(["Notes", *(_wrapped(f"- {note}") for note in comparison.notes or ["none"])])
+    plans = f"Loop of robots: not possible here; {comparison.refusal}"
+    if comparison.loop is not None:
+        plans = _formulations(comparison.table, comparison.loop, criterion)
+    return "\n\n".join([_methods(comparison, scene), notes, plans, *_expert(comparison)])
 
 
 def format_details(comparison: Comparison, scene: Scene) -> str:
@@ -88,27 +86,29 @@ def _methods(comparison: Comparison, scene: Scene) -> str:
     if paper is not None:
         lines.append(f"{'':16}" + f"{'seqopt':>13}{'paper':>8}" * maxima.shape[1])
     for row, quantity in enumerate(maxima.index):
-        cells = ""
-        for column, own in enumerate(map(_number, maxima.iloc[row])):
-            beside = "" if paper is None else f"{_number(paper.iloc[row, column]):>8}"
-            cells += f"{own:>12}" if paper is None else f"{own:>13}{beside}"
-        lines.append(f"{quantity:16}{cells}")
+        cells = [f"{_number(own):>{width}}" for own in maxima.iloc[row]]
+        if paper is not None:
+            pairs = zip(maxima.iloc[row], paper.iloc[row], strict=True)
+            cells = [f"{_number(own):>13}{_number(beside):>8}" for own, beside in pairs]
+        lines.append(f"{quantity:16}{''.join(cells)}")
     return "\n".join(lines)
 
 
-def _notes(comparison: Comparison) -> str:
-    return "\n".join(["Notes", *(_wrapped(f"- {note}") for note in comparison.notes or ["none"])])
-
-
 def _formulations(table: pd.DataFrame, loop: LoopFacts, criterion: Criterion) -> str:
-    """Return a line for every method and formulation."""
-    lines = [
-        *_heading(loop, criterion),
-        "",
-        f"{'':22}{'objective':>11}{'gap':>8}"
-        + "".join(f"{name:>8}" for name in LARGEST)
-        + f"{'models':>8}{'seconds':>9}",
-        *_groups(table),
+    """Return a line for every method and formulation, those of one problem under its name."""
+    title = f"{loop.method.capitalize()} loop, criterion {criterion.name}; models"
+    lines = [f"{title}: the different ones that each looks at"]
+    if loop.paper_models is not None:
+        cascading, overlap = loop.paper_models
+        lines = [
+            f"{title} counted as in the paper: {cascading:,} cascading,",
+            f"{overlap:,} with the full overlap; below, the different ones that each looks at",
+        ]
+    names = "".join(f"{name:>8}" for name in LARGEST)
+    lines += ["", f"{'':22}{'objective':>11}{'gap':>8}{names}{'models':>8}{'seconds':>9}"]
+    for problem, rows in table.groupby("problem", sort=False):
+        lines += [f"{problem}:", *(_line(f"  {name}", row) for name, row in rows.iterrows())]
+    lines += [
         "(N, N m, N, 1e-3 mm; ! a payload is exceeded; gap to the exact optimum of the same aim:",
         "minimax has its own, free the worst step over what the fixed methods reach; seconds to",
         "choose and to check: all formulations of the loop share",
@@ -118,37 +118,16 @@ def _formulations(table: pd.DataFrame, loop: LoopFacts, criterion: Criterion) ->
     return "\n".join(lines)
 
 
-def _heading(loop: LoopFacts, criterion: Criterion) -> list[str]:
-    """Return what was solved, and how many models the paper counts for it."""
-    title = f"{loop.method.capitalize()} loop, criterion {criterion.name}"
-    if loop.paper_models is None:
-        return [f"{title}; models: the different ones that each looks at"]
-    cascading, overlap = loop.paper_models
-    return [
-        f"{title}; models counted as in the paper: {cascading:,} cascading,",
-        f"{overlap:,} with the full overlap; below, the different ones that each looks at",
-    ]
-
-
-def _groups(table: pd.DataFrame) -> Iterator[str]:
-    """Return a line for every row, those of one problem under its name."""
-    for problem, rows in table.groupby("problem", sort=False):
-        yield f"{problem}:"
-        yield from (_line(f"  {name}", row) for name, row in rows.iterrows())
-
-
 def _line(name: str, row: pd.Series[float]) -> str:
-    def cell(value: float, width: int, text: str) -> str:
-        return f"{text if np.isfinite(value) else '-':>{width}}"
+    def cell(value: float, width: int, form: str) -> str:
+        return f"{format(value, form) if np.isfinite(value) else '-':>{width}}"
 
     return (
-        f"{name:22}"
-        + cell(row["objective"], 11, f"{row['objective']:.2f}")
-        + cell(row["gap"], 8, f"{100 * row['gap']:.2f}%")
-        + f"{_number(row['F_rob']):>7}{'!' if row['overloaded'] else ' '}"
+        f"{name:22}{cell(row['objective'], 11, '.2f')}{cell(row['gap'], 8, '.2%')}"
+        f"{_number(row['F_rob']):>7}{'!' if row['overloaded'] else ' '}"
         + "".join(f"{_number(row[column]):>8}" for column in LARGEST if column != "F_rob")
-        + cell(row["models"], 8, f"{row['models']:.0f}")
-        + cell(row["seconds"], 9, f"{row['seconds']:.4f}")
+        + cell(row["models"], 8, ".0f")
+        + cell(row["seconds"], 9, ".4f")
     )
 
 
@@ -178,8 +157,7 @@ def _ranks(table: pd.DataFrame) -> str:
     lines = ["Where the published plan's nodes rank, optimization by optimization"]
     for column, label in ways.items():
         ranks = table[column]
-        first, three = (ranks == 1).sum(), (ranks <= 3).sum()
-        said = f"first in {first} of {len(ranks)}, among three in {three}"
+        said = f"first in {(ranks == 1).sum()} of {len(ranks)}, among three in {(ranks <= 3).sum()}"
         lines.append(_wrapped(f"  {label:21}{said}: {' '.join(map(str, ranks))}", 23))
     return "\n".join(lines)
 

@@ -40,23 +40,19 @@ class RuleBook:
     @cached_property
     def takes(self) -> dict[tuple[int, int], tuple[int, ...]]:
         """By robot and brick count, the nodes of bricks that stand that it may take hold of."""
-        counts = range(len(self.network.scene.placed) + 1)
-        near = [self.rules.near(self.network.scene, b) for b in counts]
-        return {
-            (r, b): tuple(n for n in nodes if n in near[b])
-            for (r, b), nodes in self.reached.items()
-        }
+        scene = self.network.scene
+        near = [self.rules.near(scene, b) for b in range(len(scene.placed) + 1)]
+        return {at: tuple(n for n in own if n in near[at[1]]) for at, own in self.reached.items()}
 
     @cached_property
     def newest_nodes(self) -> dict[tuple[int, int], tuple[int, ...]]:
         """By robot and brick count, at which nodes it holds the newest brick."""
-        out = {}
+        scene, out = self.network.scene, {}
         for r in self.team:
-            robot = self.network.scene.robots[r]
-            for b, brick in enumerate(self.network.scene.placed, start=1):
+            for b, brick in enumerate(scene.placed, start=1):
                 nodes = tuple(node for node in brick.nodes if node in self.reached[r, b])
                 if self.rules.newest is Newest.PLACING and nodes:
-                    nodes = (placing_node(self.network, robot, brick),)
+                    nodes = (placing_node(self.network, scene.robots[r], brick),)
                 out[r, b] = nodes
         return out
 
@@ -66,18 +62,13 @@ class RuleBook:
         return {b: islands(self.network, b) for b in counts}
 
     def fault(self, bricks: int, grips: Grips) -> str:
-        """Return which rule a state breaks, the ending aside.
-
-        ``grips``: node that each of the scene's robots holds. Result: in a few words; empty if it
-        breaks none.
-        """
+        """Return which rule a state breaks, in a few words, the ending aside; empty if none."""
         held = [node for node in grips if node is not None]
         if bricks > 1 and len(held) < self.rules.least_grips:
             return f"{len(held)} grips, fewer than least_grips={self.rules.least_grips}"
-        if self.rules.newest is not Newest.FREE:
-            on = [r for r in self.team if grips[r] in self.newest_nodes[r, bricks]]
-            if not on:
-                return f"nobody holds the newest brick (newest={self.rules.newest.value})"
+        on = any(grips[r] in self.newest_nodes[r, bricks] for r in self.team)
+        if not on and self.rules.newest is not Newest.FREE:
+            return f"nobody holds the newest brick (newest={self.rules.newest.value})"
         names = {self.network.scene.brick_of_node[node].name for node in held}
         if any(not names & island for island in self._islands[bricks]):
             return "a part that no joint ties to the ground is held by nobody"
@@ -86,10 +77,7 @@ class RuleBook:
     def follow(
         self, bricks: int, grips: Grips, regrips: int
     ) -> Iterator[tuple[StepKind, int, Grips, int]]:
-        """Yield every step that is possible from a state.
-
-        ``bricks``: zero before the first; ``regrips``: grips taken since the last brick.
-        """
+        """Yield every step that is possible from a state; regrips count since the last brick."""
         last = len(self.network.scene.placed)
         keeps = bricks > 0 and not self.fault(bricks, grips)
         if keeps and (self.rules.regrips is None or regrips < self.rules.regrips):
@@ -140,11 +128,7 @@ class RuleBook:
 
 
 def check_free(network: Network, rules: FreeRules, steps: Sequence[Step]) -> None:
-    """Require that a sequence keeps the rules of a free schedule, payloads aside.
-
-    ``steps``: of one that `seqopt.sequence.steps.check_sequence` accepts. Raises `StepError` if a
-    step is not among those that were possible; the message says which.
-    """
+    """Require that a checked sequence keeps the rules of a free schedule, payloads aside."""
     book = RuleBook(network, rules)
     state: tuple[int, Grips, int] = (0, (None,) * len(network.scene.robots), 0)
     for step in steps:

@@ -11,8 +11,10 @@ the node that it held last, -n.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -34,164 +36,123 @@ class Moves(NamedTuple):
     way: Floats  # (m,); how far the robot goes that takes a grip, m; zero where ways do not count
 
 
-def _grip_pairs(
-    states: Ints, slot: int, nodes: Ints, robots_and_ways: tuple[int, Floats | None]
-) -> Moves:
-    """Return the moves in which the robot of a column takes one of some nodes that nobody holds.
-
-    ``states`` (n, c): in which that robot is free. ``slot``: its column. ``nodes`` (m,): from 0.
-    ``robots_and_ways``: how many columns are robots; distances between nodes, (2B + 1, 2B + 1), m,
-    or None where ways do not count. Result: the entries of a kind are not sorted.
-    """
-    robots, distance = robots_and_ways
-    taken = np.zeros((len(states), int(max(nodes.max() + 1, states[:, :robots].max())) + 1), bool)
-    for column in range(robots):
-        taken[np.arange(len(states)), states[:, column].clip(min=0)] = True
-    source, node = np.nonzero(~taken[:, nodes + 1])
-    number = nodes[node] + 1
-    new = states[source]
-    way = np.zeros(len(new)) if distance is None else distance[-new[:, slot], number]
-    new[:, slot] = number
-    return Moves(source, new, way)
-
-
 def sort_entries(states: Ints, first: int, end: int) -> None:
-    """Sort the entries of the robots of a kind, largest first, in place.
-
-    ``states`` (n, c); ``first``, ``end``: its first column, and the one after its last.
-    """
+    """Sort the entries of a kind's robots, columns of (n, c), largest first, in place."""
     if end - first > 1:
         states[:, first:end] = -np.sort(-states[:, first:end], axis=1)
 
 
 def _join_moves(parts: Sequence[Moves], states: Ints) -> Moves:
-    """Return several moves as one. ``states`` (n, c): that they lead from."""
-    none = np.zeros(0, dtype=np.int64)
-    whole = [Moves(none, states[:0], np.zeros(0)), *parts]
-    return Moves(*map(np.concatenate, zip(*whole, strict=True)))
-
-
-def number_rows(states: Ints, robots: int, least: int, most: int) -> Ints:
-    """Return a number for every state that no other one has.
-
-    ``states`` (n, c): columns after those of robots count first; ``robots``: how many columns are
-    robots; ``least``, ``most``: between which their entries are. Result (n,).
-    """
-    further = states.shape[1] > robots
-    out = np.zeros(len(states), dtype=np.int64)
-    out += states[:, -1] if further else 0
-    for column in range(robots):
-        out *= 1 + most - least
-        out += states[:, column]
-        out -= least
-    return np.asarray(out)
+    """Return several moves as one, from states (n, c)."""
+    none = Moves(np.zeros(0, dtype=np.int64), states[:0], np.zeros(0))
+    return Moves(*map(np.concatenate, zip(none, *parts, strict=True)))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RobotKind(FrozenValue):
-    """Robots that reach the same nodes, may carry as much, and may place or not.
+    """Robots that reach the same nodes, may carry as much, and may place or not."""
 
-    Nodes are counted as in ``network.inner.ravel()``: brick by brick in build order.
-
-    ``robots``: indices of the scene's robots; ``reach`` (2B,): nodes that they may hold: within
-    reach and not blocked; ``newest`` (2B,): nodes at which they hold a brick when they place it,
-    and as the newest one; ``places``: whether they may place; ``cap``: largest force of a grip, N.
-    """
-
-    robots: tuple[int, ...]
-    reach: Bools
-    newest: Bools
-    places: bool
-    cap: float
+    robots: tuple[int, ...]  # indices of the scene's robots
+    reach: Bools  # (2B,); nodes that they may hold, as in ``network.inner.ravel()``
+    newest: Bools  # (2B,); at which they hold a brick when they place it, and as the newest
+    places: bool  # whether they may place
+    cap: float  # largest force of a grip, N
 
 
 def sort_robots(
     network: Network, rules: FreeRules, caps: Mapping[str, float] | None = None
 ) -> tuple[RobotKind, ...]:
-    """Return the robots that take part, sorted by kind.
+    """Return the robots that take part, by kind, in the order of their first robots.
 
-    ``caps``: largest force of a robot's grip beside its payload, by its name, N. Result: in the
-    order of their first robots.
+    ``caps``: largest force of a robot's grip beside its payload, by its name, N.
     """
-    alike: dict[tuple[object, ...], list[int]] = {}
-    parts: dict[tuple[object, ...], RobotKind] = {}
-    for i in rules.team(network.scene):
-        robot = network.scene.robots[i]
-        reach = _reached(network, robot)
+    scene = network.scene
+    alike: dict[tuple[object, ...], RobotKind] = {}
+    for i in rules.team(scene):
+        robot = scene.robots[i]
+        reach = np.array(
+            [
+                node not in scene.blocked_nodes and robot.reach.covers(scene.node_position(node))
+                for node in node_numbers(network)
+            ]
+        )
         newest = reach if rules.newest is not Newest.PLACING else _placing(network, robot, reach)
         places = not rules.placers or robot.name in rules.placers
         cap = robot.payload if rules.payload is Payload.KEPT else np.inf
         cap = min(cap, (caps or {}).get(robot.name, np.inf))
         key = (reach.tobytes(), newest.tobytes(), places, cap)
-        alike.setdefault(key, []).append(i)
-        parts.setdefault(key, RobotKind((), reach, newest, places, cap))
-    return tuple(
-        RobotKind(tuple(robots), parts[key].reach, parts[key].newest, parts[key].places, key[3])  # type: ignore[arg-type]
-        for key, robots in alike.items()
-    )
+        first = alike.setdefault(key, RobotKind((), reach, newest, places, cap))
+        alike[key] = replace(first, robots=(*first.robots, i))
+    return tuple(alike.values())
 
 
 def node_numbers(network: Network) -> list[int]:
-    """Return the scene's numbers of all inner nodes, brick by brick in build order.
-
-    Result: (2B,).
-    """
+    """Return the scene's numbers of all inner nodes (2B,), brick by brick in build order."""
     return [node for brick in network.scene.placed for node in brick.nodes]
-
-
-def _reached(network: Network, robot: Robot) -> Bools:
-    """Return which nodes a robot may hold: within its reach and not blocked. Result (2B,)."""
-    scene = network.scene
-    return np.array(
-        [
-            node not in scene.blocked_nodes and robot.reach.covers(brick.node_position(node))
-            for brick in scene.placed
-            for node in brick.nodes
-        ]
-    )
 
 
 def _placing(network: Network, robot: Robot, reach: Bools) -> Bools:
     """Return at which node a robot places every brick."""
     out = np.zeros_like(reach)
     for k, brick in enumerate(network.scene.placed):
-        try:
+        with suppress(StepError):  # it reaches none
             out[2 * k + brick.nodes.index(placing_node(network, robot, brick))] = True
-        except StepError:  # it reaches none
-            continue
     return out
 
 
 _PAIRS = 4_000_000  # of states and nodes that are looked at together
 
 
-@dataclass(frozen=True, repr=False)
-class FreeSpace(Terse):
-    """The states of a free schedule and the moves between them.
-
-    ``kinds``: the robots that take part; ``parks``: whether free robots stay where they were, for
-    their travel.
-    """
+class StateRows(Terse):
+    """What spaces of states have in common: rows with a column for every robot."""
 
     network: Network
-    rules: FreeRules
     kinds: tuple[RobotKind, ...]
-    parks: bool = False
+    parks: bool
 
     @property
     def robots(self) -> int:
         """How many robots take part."""
         return sum(len(kind.robots) for kind in self.kinds)
 
-    @property
-    def bricks(self) -> int:
-        """How many bricks there are."""
-        return len(self.network.inner)
+    @cached_property
+    def slots(self) -> tuple[tuple[int, int], ...]:
+        """First column of every kind, and the one after its last."""
+        return tuple(pairwise(np.cumsum([0, *(len(kind.robots) for kind in self.kinds)]).tolist()))
+
+    def codes(self, states: Ints) -> Ints:
+        """Return a number (n,) for every state (n, c) that no other one of its level has."""
+        last = 2 * len(self.network.inner)
+        least = -last if self.parks else 0
+        out = states[:, self.robots :].sum(axis=1, dtype=np.int64)  # grips since the last brick
+        for column in range(self.robots):
+            out *= 1 + last - least
+            out += states[:, column]
+            out -= least
+        return np.asarray(out)
+
+    def held(self, states: Ints) -> Ints:
+        """Return which nodes are held (n, robots), sorted, zeros for robots that are free first."""
+        return np.sort(states[:, : self.robots].clip(min=0), axis=1)
+
+    def grips(self, states: Ints) -> Ints:
+        """Return how many grips are held, (n,)."""
+        return np.asarray((states[:, : self.robots] > 0).sum(axis=1))
+
+
+@dataclass(frozen=True, repr=False)
+class FreeSpace(StateRows):
+    """The states of a free schedule and the moves between them."""
+
+    network: Network
+    rules: FreeRules
+    kinds: tuple[RobotKind, ...]
+    parks: bool = False  # free robots stay where they were, for their travel
 
     @property
     def levels(self) -> int:
         """How many bricks there are: states of one brick count are a level."""
-        return self.bricks
+        return len(self.network.inner)
 
     def bricks_at(self, level: int) -> int:
         """Return how many bricks stand on a level."""
@@ -206,8 +167,8 @@ class FreeSpace(Terse):
     def fewest_steps(self) -> int:
         """How many steps a build has at least: all but a grip per robot are let go one by one."""
         if self.rules.ending is Ending.ONE_BY_ONE:
-            return 2 * self.bricks
-        return max(self.bricks, 2 * self.bricks - self.robots) + self.ends_bare
+            return 2 * self.levels
+        return max(self.levels, 2 * self.levels - self.robots) + self.ends_bare
 
     def within(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
         """Return the moves that place no brick, and whether they are regrips."""
@@ -218,16 +179,6 @@ class FreeSpace(Terse):
         return ((self.places(level, states), False),)
 
     @cached_property
-    def slots(self) -> tuple[tuple[int, int], ...]:
-        """First column of every kind, and the one after its last."""
-        ends = np.cumsum([len(kind.robots) for kind in self.kinds]).tolist()
-        return tuple(zip([0, *ends[:-1]], ends, strict=True))
-
-    @cached_property
-    def _counts(self) -> bool:
-        return self.rules.regrips is not None
-
-    @cached_property
     def _distance(self) -> Floats:
         """Distances of nodes, (2B + 1, 2B + 1), m; none from or to node 0."""
         at = self.network.node_position[self.network.inner.ravel()]
@@ -236,71 +187,32 @@ class FreeSpace(Terse):
         return frozen(out)
 
     def start(self) -> Ints:
-        """Return the one state before the first brick.
+        """Return the one state before the first brick, (1, c).
 
-        Result (1, c): of the smallest type that holds every node: there may be tens of millions of
-        states.
+        It is of the smallest type that holds every node: there may be tens of millions of states.
         """
-        kind = np.min_scalar_type(-max(2 * self.bricks, self.rules.regrips or 0) - 1)
-        return np.zeros((1, self.robots + self._counts), dtype=kind)
-
-    def codes(self, states: Ints) -> Ints:
-        """Return a number for every state that no other one of its brick count has.
-
-        ``states`` (n, c). Result (n,).
-        """
-        last = 2 * self.bricks
-        return number_rows(states, self.robots, -last if self.parks else 0, last)
-
-    def held(self, states: Ints) -> Ints:
-        """Return which nodes are held, sorted, zeros for robots that are free first.
-
-        ``states`` (n, c). Result (n, robots).
-        """
-        return np.sort(states[:, : self.robots].clip(min=0), axis=1)
-
-    def grips(self, states: Ints) -> Ints:
-        """Return how many grips are held. ``states`` (n, c). Result (n,)."""
-        return np.asarray((states[:, : self.robots] > 0).sum(axis=1))
+        kind = np.min_scalar_type(-max(2 * self.levels, self.rules.regrips or 0) - 1)
+        return np.zeros((1, self.robots + (self.rules.regrips is not None)), dtype=kind)
 
     def places(self, bricks: int, states: Ints) -> Moves:
-        """Return the moves that place the next brick; a free robot then holds it.
-
-        ``bricks``: how many bricks stand before; ``states`` (n, c). Result: to lawful states.
-        """
+        """Return the moves that place the next brick; a free robot then holds it."""
         nodes = np.array([2 * bricks, 2 * bricks + 1])
-        parts = []
-        for k, kind in enumerate(self.kinds):
-            if kind.places:
-                parts += self._take(k, states, nodes[kind.newest[nodes]])
-        moves = _join_moves(parts, states)
-        if self._counts:
-            moves.states[:, -1] = 0
+        moves = self._takes(states, [nodes[k.newest[nodes] & k.places] for k in self.kinds])
+        moves.states[:, self.robots :] = 0
         return self._lawful_only(bricks + 1, moves)
 
     def holds(self, bricks: int, states: Ints) -> Moves:
-        """Return the moves in which a free robot takes a grip on a brick that stands.
-
-        ``states`` (n, c). Result: to lawful states, as many of them as rules allow.
-        """
+        """Return the moves in which a free robot takes a grip on a brick that stands."""
         able = self.lawful(bricks, states)
         if self.rules.regrips is not None:
             able &= states[:, -1] < self.rules.regrips
-        rows = np.flatnonzero(able)
-        parts, near = [], self._near(bricks)
-        for k, kind in enumerate(self.kinds):
-            parts += self._take(k, states[rows], near[kind.reach[near]])
-        moves = _join_moves(parts, states)
-        if self._counts:
-            moves.states[:, -1] += 1
+        rows, near = np.flatnonzero(able), self._near(bricks)
+        moves = self._takes(states[rows], [near[kind.reach[near]] for kind in self.kinds])
+        moves.states[:, self.robots :] += 1
         return Moves(rows[moves.source], moves.states, moves.way)
 
     def releases(self, bricks: int, states: Ints) -> Moves:
-        """Return the moves in which one robot lets go, or at the end all do.
-
-        ``states`` (n, c). Result: to lawful states, and at the last brick to those that the rules'
-        ending allows.
-        """
+        """Return the moves in which one robot lets go, or at the end all do, as rules allow."""
         parts = []
         for first, end in self.slots:
             for slot in range(first, end):
@@ -310,17 +222,14 @@ class FreeSpace(Terse):
                 sort_entries(new, first, end)
                 parts.append(Moves(rows, new, np.zeros(len(rows))))
         moves = _join_moves(parts, states)
-        if bricks < self.bricks or self.rules.ending is not Ending.ONE_BY_ONE:
+        if bricks < self.levels or self.rules.ending is not Ending.ONE_BY_ONE:
             moves = self._lawful_only(bricks, moves)
-        if bricks < self.bricks or self.rules.ending is Ending.HELD:
+        if bricks < self.levels or self.rules.ending is Ending.HELD:
             return moves
-        return self._let_go(bricks, states, moves)
+        return self._let_go(states, moves)
 
     def lawful(self, bricks: int, states: Ints) -> Bools:
-        """Return which states keep the rules as long as the build goes on.
-
-        ``states`` (n, c). Result (n,).
-        """
+        """Return which states (n, c) keep the rules as long as the build goes on, (n,)."""
         held = states[:, : self.robots]
         ok = np.asarray(self.grips(states) >= (self.rules.least_grips if bricks > 1 else 0))
         if self.rules.newest is not Newest.FREE:
@@ -335,21 +244,18 @@ class FreeSpace(Terse):
         return ok
 
     def ended(self, states: Ints) -> Bools:
-        """Return which states with all bricks end the build. ``states`` (n, c). Result (n,)."""
+        """Return which states with all bricks end the build, (n,)."""
         if self.rules.ending is Ending.HELD:
-            return self.lawful(self.bricks, states)
-        return np.asarray((states[:, : self.robots] <= 0).all(axis=1))
+            return self.lawful(self.levels, states)
+        return np.asarray(self.grips(states) == 0)
 
-    def _let_go(self, bricks: int, states: Ints, moves: Moves) -> Moves:
+    def _let_go(self, states: Ints, moves: Moves) -> Moves:
         """Return the moves and those in which all let go; who lets go forgets where it was."""
         if self.rules.ending is Ending.RELEASED:
-            rows = np.flatnonzero((states[:, : self.robots] > 0).any(axis=1))
-            none = states[rows]
-            none[:, : self.robots] = 0
-            parts = [moves, Moves(rows, none, np.zeros(len(rows)))]
-            moves = _join_moves(parts, states)
-        bare = (moves.states[:, : self.robots] <= 0).all(axis=1)
-        moves.states[bare, : self.robots] = 0
+            rows = np.flatnonzero(self.grips(states))
+            moves = _join_moves([moves, Moves(rows, states[rows], np.zeros(len(rows)))], states)
+            moves.states[len(moves.source) - len(rows) :, : self.robots] = 0
+        moves.states[self.grips(moves.states) == 0, : self.robots] = 0
         return moves
 
     def _near(self, bricks: int) -> Ints:
@@ -366,36 +272,43 @@ class FreeSpace(Terse):
     def _near_of(self) -> dict[int, Ints]:
         return {}
 
-    @property
-    def _free_grips(self) -> tuple[int, Floats | None]:
-        """How many columns are robots, and distances where ways count."""
-        return self.robots, self._distance if self.parks else None
-
     @cached_property
     def _loose(self) -> tuple[list[list[int]], ...]:
         """By brick count the parts that no joint ties to the ground: places in build order."""
         at = {brick.name: i for i, brick in enumerate(self.network.scene.placed)}
-        counts = range(1, self.bricks + 1)
-        parts = ((), *(islands(self.network, count) for count in counts))
+        parts = ((), *(islands(self.network, count + 1) for count in range(self.levels)))
         return tuple([[at[name] for name in part] for part in level] for level in parts)
 
-    def _take(self, k: int, states: Ints, nodes: Ints) -> list[Moves]:
-        """Return the moves in which a free robot of a kind takes one of some nodes."""
-        first, end = self.slots[k]
-        slots = range(first, end) if self.parks else [end - 1]  # entries are sorted
-        step = max(1, _PAIRS // max(1, len(nodes)))
+    def _takes(self, states: Ints, nodes_of: Sequence[Ints]) -> Moves:
+        """Return the moves in which a free robot takes one of some nodes, by kind."""
         parts = []
-        for slot in slots if len(nodes) else ():
-            free = states[:, slot] <= 0
-            if slot > first and self.parks:  # one of two that stay at one node
-                free &= states[:, slot] != states[:, slot - 1]
-            rows = np.flatnonzero(free)
-            for start in range(0, len(rows), step):
-                block = rows[start : start + step]
-                moves = _grip_pairs(states[block], slot, nodes, self._free_grips)
-                sort_entries(moves.states, first, end)
-                parts.append(Moves(block[moves.source], moves.states, moves.way))
-        return parts
+        for (first, end), nodes in zip(self.slots, nodes_of, strict=True):
+            slots = range(first, end) if self.parks else [end - 1]  # entries are sorted
+            step = max(1, _PAIRS // max(1, len(nodes)))
+            for slot in slots if len(nodes) else ():
+                free = states[:, slot] <= 0
+                if slot > first and self.parks:  # one of two that stay at one node
+                    free &= states[:, slot] != states[:, slot - 1]
+                rows = np.flatnonzero(free)
+                for start in range(0, len(rows), step):
+                    block = rows[start : start + step]
+                    moves = self._grip_pairs(states[block], slot, nodes)
+                    sort_entries(moves.states, first, end)
+                    parts.append(Moves(block[moves.source], moves.states, moves.way))
+        return _join_moves(parts, states)
+
+    def _grip_pairs(self, states: Ints, slot: int, nodes: Ints) -> Moves:
+        """Return the moves in which a column's robot, free in all states, takes a free node."""
+        held = states[:, : self.robots].clip(min=0)
+        taken = np.zeros((len(states), int(max(nodes.max() + 1, held.max())) + 1), dtype=bool)
+        for nodes_held in held.T:
+            taken[np.arange(len(states)), nodes_held] = True
+        source, node = np.nonzero(~taken[:, nodes + 1])
+        number = nodes[node] + 1
+        new = states[source]
+        way = self._distance[-new[:, slot], number] if self.parks else np.zeros(len(new))
+        new[:, slot] = number
+        return Moves(source, new, way)
 
     def _lawful_only(self, bricks: int, moves: Moves) -> Moves:
         ok = self.lawful(bricks, moves.states)
@@ -412,8 +325,7 @@ def free_space(
     """Return the states of a free schedule in a scene.
 
     ``caps``: largest force of a robot's grip beside its payload, by its name, N; ``parks``: whether
-    free robots stay where they were, for their travel. Raises `StepError` if robots do not fit the
-    rules, or states cannot be numbered.
+    free robots stay where they were, for their travel.
 
     Examples
     --------
@@ -424,10 +336,10 @@ def free_space(
     [[2, 0, 0], [0, 2, 0], [0, 0, 2]]
     """
     space = FreeSpace(network, rules, sort_robots(network, rules, caps), parks)
-    base = 1 + (2 if parks else 1) * 2 * space.bricks
+    base = 1 + (2 if parks else 1) * 2 * space.levels
     if base**space.robots * (1 + (rules.regrips or 0)) >= 2**62:
         raise StepError(
-            f"scene {network.scene.name}: {space.bricks} bricks and {space.robots} robots have "
+            f"scene {network.scene.name}: {space.levels} bricks and {space.robots} robots have "
             "more states than can be numbered; let fewer robots take part"
         )
     return space

@@ -14,27 +14,22 @@ from math import prod
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, Ints, Terse
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import StepError
 from seqopt.network.network import Network
-from seqopt.sequence._rule_space import Moves, RobotKind, node_numbers, number_rows
-from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
+from seqopt.sequence._rule_space import Moves, RobotKind, StateRows, node_numbers
+from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 
 @dataclass(frozen=True, repr=False)
-class ScheduleSpace(Terse):
-    """The states of a schedule and the moves between them; a level for every step.
-
-    ``caps``: largest force of a robot's grip, by its name, N; none of those that are not named;
-    ``parks``: whether free robots stay where they were, for their travel. Raises `StepError` if the
-    states cannot be numbered.
-    """
+class ScheduleSpace(StateRows):
+    """The states of a schedule and the moves between them; a level for every step."""
 
     network: Network
     schedule: Schedule
-    caps: Mapping[str, float]
-    parks: bool = False
+    caps: Mapping[str, float]  # largest forces of robots' grips, by their names, N
+    parks: bool = False  # free robots stay where they were, for their travel
 
     def __post_init__(self) -> None:
         base = 1 + (2 if self.parks else 1) * 2 * len(self.network.inner)
@@ -43,11 +38,6 @@ class ScheduleSpace(Terse):
                 f"scene {self.network.scene.name}: so many nodes and robots have more states than "
                 "can be numbered; let fewer robots take part"
             )
-
-    @property
-    def robots(self) -> int:
-        """How many robots the scene has."""
-        return len(self.network.scene.robots)
 
     @property
     def levels(self) -> int:
@@ -69,36 +59,17 @@ class ScheduleSpace(Terse):
         return self.schedule.steps[level - 1].bricks if level else 0
 
     @cached_property
-    def kinds(self) -> tuple[RobotKind, ...]:
+    def kinds(self) -> tuple[RobotKind, ...]:  # type: ignore[override]  # no field here
         """Every robot by itself: of a schedule none could change places."""
         every = np.ones(2 * len(self.network.inner), dtype=bool)
-        robots = enumerate(self.network.scene.robots)
         return tuple(
             RobotKind((i,), every, every, places=True, cap=self.caps.get(robot.name, np.inf))
-            for i, robot in robots
+            for i, robot in enumerate(self.network.scene.robots)
         )
 
     def start(self) -> Ints:
         """Return the one state before the first step, (1, robots) int."""
         return np.zeros((1, self.robots), dtype=np.int32)
-
-    def codes(self, states: Ints) -> Ints:
-        """Return a number for every state that no other one of its step has, (n,)."""
-        last = 2 * len(self.network.inner)
-        return number_rows(states, self.robots, -last if self.parks else 0, last)
-
-    def held(self, states: Ints) -> Ints:
-        """Return which nodes are held, sorted, zeros for robots that are free first."""
-        return np.sort(states.clip(min=0), axis=1)
-
-    def grips(self, states: Ints) -> Ints:
-        """Return how many grips are held, (n,)."""
-        return np.asarray((states > 0).sum(axis=1))
-
-    @property
-    def slots(self) -> tuple[tuple[int, int], ...]:
-        """First column of every robot, and the one after it."""
-        return tuple((robot, robot + 1) for robot in range(self.robots))
 
     def within(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
         """Return the moves that stay in a step: there are none."""
@@ -106,29 +77,26 @@ class ScheduleSpace(Terse):
 
     def onward(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
         """Return the moves to the next step, and whether they are regrips."""
-        step, before = self.schedule.steps[level], self._before(level)
+        step = self.schedule.steps[level]
+        before = self.schedule.steps[level - 1].grips if level else (None,) * self.robots
         after, fresh = states.copy(), []
         for robot, grip in enumerate(step.grips):
             if grip is None:
                 after[:, robot] = -np.abs(states[:, robot]) if self.parks else 0
             elif not isinstance(grip, OpenGrip):
                 after[:, robot] = self._place[grip]
-            elif before is None or before.grips[robot] != grip:
+            elif before[robot] != grip:
                 fresh.append((robot, self._places[grip.move]))
         grids = np.meshgrid(*(places for _, places in fresh), indexing="ij")
         count = prod(len(places) for _, places in fresh)
-        chosen = np.array([grid.ravel() for grid in grids], dtype=int).reshape(len(fresh), count)
-        source = np.repeat(np.arange(len(states)), chosen.shape[1])
-        after = after[source]
-        for (robot, _), places in zip(fresh, chosen, strict=True):
-            after[:, robot] = np.tile(places, len(states))
-        kept = _apart(after)
+        source, after = (np.repeat(rows, count, axis=0) for rows in (np.arange(len(states)), after))
+        for (robot, _), places in zip(fresh, grids, strict=True):
+            after[:, robot] = np.tile(places.ravel(), len(states))
+        held = self.held(after)
+        kept = ~((held[:, 1:] == held[:, :-1]) & (held[:, 1:] > 0)).any(axis=1)  # a node each
         source, after = source[kept], after[kept]
         way = self._ways(states[source], after) if self.parks else np.zeros(len(source))
         return ((Moves(source, after, way), step.kind is StepKind.REPOSITION),)
-
-    def _before(self, level: int) -> OpenStep | None:
-        return self.schedule.steps[level - 1] if level else None
 
     def _ways(self, before: Ints, after: Ints) -> Floats:
         """Return how far robots go that take grips, m."""
@@ -139,7 +107,7 @@ class ScheduleSpace(Terse):
     @cached_property
     def _at(self) -> Floats:
         at = self.network.node_position[self.network.inner.ravel()]
-        return np.concatenate([np.zeros((1, 3)), at])
+        return np.pad(at, ((1, 0), (0, 0)))
 
     @cached_property
     def _place(self) -> dict[int, int]:
@@ -156,16 +124,10 @@ class ScheduleSpace(Terse):
 
     def steps(self, rows: Ints) -> tuple[Step, ...]:
         """Return the checked steps of states (levels, robots), one after the other."""
-        numbers = [None, *node_numbers(self.network)]
-        pairs = zip(self.schedule.steps, rows.tolist(), strict=True)
+        numbers = np.array([None, *node_numbers(self.network)])
+        grips = numbers[rows.clip(min=0)].tolist()
         steps = [
-            Step(s.number, s.kind, s.bricks, tuple(numbers[max(n, 0)] for n in row))
-            for s, row in pairs
+            Step(s.number, s.kind, s.bricks, tuple(nodes))
+            for s, nodes in zip(self.schedule.steps, grips, strict=True)
         ]
         return check_sequence(self.network.scene, steps)
-
-
-def _apart(states: Ints) -> Bools:
-    """Return in which states no two robots hold the same node."""
-    held = np.sort(states.clip(min=0), axis=1)
-    return np.asarray(~((held[:, 1:] == held[:, :-1]) & (held[:, 1:] > 0)).any(axis=1))

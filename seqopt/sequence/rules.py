@@ -89,9 +89,9 @@ class FreeRules:
             object.__setattr__(self, name, _choice(name, kind, getattr(self, name)))
         for name in ("robots", "placers"):
             object.__setattr__(self, name, _names(name, getattr(self, name)))
-        object.__setattr__(self, "least_grips", _count("least_grips", self.least_grips, 0))
-        if self.regrips is not None:
-            object.__setattr__(self, "regrips", _count("regrips", self.regrips, 0))
+        for name in ("least_grips", "regrips"):
+            if name == "least_grips" or self.regrips is not None:
+                object.__setattr__(self, name, _count(name, getattr(self, name)))
         if self.candidates:
             object.__setattr__(self, "candidates", Near(self.candidates).rule)
 
@@ -103,34 +103,30 @@ class FreeRules:
         return frozenset(Near(self.candidates).nodes(scene, bricks, nodes))
 
     def team(self, scene: Scene) -> tuple[int, ...]:
-        """Return which of a scene's robots take part.
-
-        Result: indices of its robots, ascending. Raises `StepError` if a robot is not in the scene,
-        too few or too many take part, or fewer than must hold.
-        """
+        """Return which of a scene's robots take part: their indices, ascending."""
         known = [robot.name for robot in scene.robots]
         for name in (*self.robots, *self.placers):
             if name not in known:
-                listed = ", ".join(known)
                 hint = did_you_mean(name, known)
-                raise StepError(f"robot {name!r} does not exist{hint}; give some of {listed}")
-        team = tuple(i for i, name in enumerate(known) if name in self.robots or not self.robots)
+                raise StepError(
+                    f"robot {name!r} does not exist{hint}; give some of {', '.join(known)}"
+                )
+        team = {name: i for i, name in enumerate(known) if name in self.robots or not self.robots}
         if not 2 <= len(team) <= _MOST_ROBOTS:
             raise StepError(
                 f"the free schedule: {len(team)} robots take part; name two to {_MOST_ROBOTS}"
             )
-        outside = [name for name in self.placers if known.index(name) not in team]
+        outside = [name for name in self.placers if name not in team]
         if outside:
             raise StepError(
-                f"rule placers: {outside[0]} takes no part; name some of "
-                f"{', '.join(known[i] for i in team)}"
+                f"rule placers: {outside[0]} takes no part; name some of {', '.join(team)}"
             )
         if self.least_grips > len(team):
             raise StepError(
                 f"rule least_grips: {self.least_grips} grips of {len(team)} robots; "
                 f"give at most {len(team)}"
             )
-        return team
+        return tuple(team.values())
 
     def described(self, scene: Scene) -> dict[str, object]:
         """Return the rules with their values, ready for JSON. Result: by name."""
@@ -171,10 +167,9 @@ _LOOSEST = (
 
 
 def with_robots(scene: Scene, count: int) -> Scene:
-    """Return a scene with a number of robots: its own first, then mobile ones that reach all.
+    """Return a scene with two to five robots: its own first, then mobile ones.
 
-    ``count``: from two to five. Result: further robots reach every node and have the largest
-    payload of the scene's own. Raises `StepError` if there would be fewer or more.
+    Further robots reach every node and have the largest payload of the scene's own.
 
     Examples
     --------
@@ -213,7 +208,7 @@ def _names(name: str, given: object) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _count(name: str, given: object, least: int) -> int:
-    if not isinstance(given, Integral) or isinstance(given, bool) or given < least:
-        raise StepError(f"rule {name}: {short(given)}; give a whole number from {least} on")
+def _count(name: str, given: object) -> int:
+    if not isinstance(given, Integral) or isinstance(given, bool) or given < 0:
+        raise StepError(f"rule {name}: {short(given)}; give a whole number from 0 on")
     return int(given)

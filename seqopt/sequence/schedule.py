@@ -7,34 +7,31 @@ the whole, however it is found.
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property, partial
+from itertools import groupby
 from numbers import Integral
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
+import networkx as nx
+import numpy as np
 import pandas as pd
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from seqopt._showing import Shown, display
-from seqopt.arrays import Terse
-from seqopt.errors import StepError
+from seqopt.arrays import Ints, Terse
+from seqopt.errors import StepError, did_you_mean
+from seqopt.network.network import GROUND, Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-import math
-import re
-from collections.abc import Iterable
-
-import networkx as nx
-import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-
-from seqopt.arrays import Ints
-from seqopt.errors import did_you_mean
-from seqopt.network.network import GROUND, Network
 
 _RULE = re.compile(r"(near|within):([0-9]+\.?[0-9]*|\.[0-9]+)")
 _NEWEST = 2  # bricks that make the working end: a build from both ends has two of them
@@ -45,8 +42,7 @@ class Near:
     """A rule that keeps nodes near the working end of a build.
 
     ``rule``: ``near:12`` keeps the nodes of bricks that at most 12 joints part from the bricks
-    placed last, ``within:1.5`` the nodes at most 1.5 m from these bricks' centroids. Raises
-    `StepError` if there is no such rule.
+    placed last, ``within:1.5`` the nodes at most 1.5 m from these bricks' centroids.
     """
 
     rule: str
@@ -73,12 +69,10 @@ class Near:
 def _joints_away(scene: Scene, bricks: int) -> dict[int, float]:
     """Return how many joints part the nodes of placed bricks from the newest."""
     placed = scene.placed[:bricks]
-    names = {brick.name for brick in placed}
-    graph: nx.Graph[int] = nx.Graph()
+    names = [brick.name for brick in placed]
+    graph: nx.Graph[int] = nx.Graph(joint.bricks for joint in scene.joints).subgraph(names).copy()
     graph.add_nodes_from(names)
-    graph.add_edges_from(joint.bricks for joint in scene.joints if names.issuperset(joint.bricks))
-    newest = {brick.name for brick in placed[-_NEWEST:]}
-    away = nx.multi_source_dijkstra_path_length(graph, newest)
+    away = nx.multi_source_dijkstra_path_length(graph, {*names[-_NEWEST:]})
     return {n: float(away.get(b.name, math.inf)) for b in placed for n in b.nodes}
 
 
@@ -93,26 +87,18 @@ def _meters_away(scene: Scene, bricks: int) -> dict[int, float]:
 
 @dataclass(frozen=True)
 class Hold:
-    """One grip, for as long as it lasts.
+    """One grip, for as long as it lasts."""
 
-    ``robot``: index among the scene's robots. ``first``, ``last``: numbers of the first and the
-    last step in which it is held. ``node``: that is held; None where it is still to be chosen.
-    ``move``: index of the move that chooses it, from 0; None where it is given. ``places``: name of
-    the brick that is placed with it in its first step; None if none is.
-    """
-
-    robot: int
-    first: int
-    last: int
-    node: int | None
-    move: int | None
-    places: int | None
+    robot: int  # index among the scene's robots
+    first: int  # number of the first step in which it is held
+    last: int  # and of the last
+    node: int | None  # None where it is still to be chosen
+    move: int | None  # index of the move that chooses it, from 0; None where it is given
+    places: int | None  # name of the brick that is placed with it in its first step
 
 
 def holds(scene: Scene, steps: Sequence[AnyStep]) -> tuple[Hold, ...]:
-    """Return every grip of a sequence or schedule, for as long as it lasts.
-
-    ``steps``: of a method, a plan or a schedule, in order. Result: by robot, then by first step.
+    """Return every grip of a sequence or schedule for as long as it lasts, by robot, then by step.
 
     Examples
     --------
@@ -123,28 +109,17 @@ def holds(scene: Scene, steps: Sequence[AnyStep]) -> tuple[Hold, ...]:
     """
     out = []
     for robot in range(len(scene.robots)):
-        start = 0
-        grips = [step.grips[robot] for step in steps]
-        for i in range(1, len(steps) + 1):
-            if i == len(steps) or grips[i] != grips[start]:
-                if grips[start] is not None:
-                    out.append(_hold(scene, robot, steps[start], steps[i - 1].number))
-                start = i
+        grips = [(step.grips[robot], step) for step in steps]
+        for grip, run in groupby(grips, key=itemgetter(0)):
+            if grip is not None:
+                during = [step for _, step in run]
+                first, last = during[0], during[-1].number
+                node = int(grip) if isinstance(grip, Integral) else None
+                move = getattr(grip, "move", None)  # an open grip names its move
+                is_placing = first.kind is StepKind.PLACE
+                places = scene.placed[first.bricks - 1].name if is_placing else None
+                out.append(Hold(robot, first.number, last, node, move, places))
     return tuple(out)
-
-
-def _hold(scene: Scene, robot: int, first: AnyStep, last: int) -> Hold:
-    """Return the hold that a robot begins in a step: what is begun as a brick comes places it."""
-    grip = first.grips[robot]
-    is_placing = first.kind is StepKind.PLACE
-    return Hold(
-        robot=robot,
-        first=first.number,
-        last=last,
-        node=int(grip) if isinstance(grip, Integral) else None,
-        move=getattr(grip, "move", None),  # an open grip names its move
-        places=scene.placed[first.bricks - 1].name if is_placing else None,
-    )
 
 
 @dataclass(frozen=True)
@@ -162,17 +137,12 @@ ScheduledGrips = tuple[int | OpenGrip | None, ...]
 
 @dataclass(frozen=True)
 class OpenStep:
-    """A step whose grips are nodes, open moves, or none.
+    """A step whose grips are nodes, open moves, or none."""
 
-    ``number``: from 1; ``kind``: what the step does; ``bricks``: how many bricks stand, in build
-    order; ``grips`` (int, OpenGrip or None): what each of the scene's robots holds: a node, a grip
-    to be chosen, or nothing.
-    """
-
-    number: int
+    number: int  # from 1
     kind: StepKind
-    bricks: int
-    grips: ScheduledGrips
+    bricks: int  # how many stand, in build order
+    grips: ScheduledGrips  # of each of the scene's robots
 
     @cached_property
     def moves(self) -> tuple[int, ...]:
@@ -182,17 +152,12 @@ class OpenStep:
 
 @dataclass(frozen=True, repr=False)
 class Move(Terse):
-    """One repositioning to be decided.
+    """One repositioning to be decided."""
 
-    ``robot``: name of the robot that moves; ``step``: number of the step in which it takes its
-    grip; ``bricks``: bricks placed at that step; ``candidates``: nodes open to it: within reach,
-    and held by no other robot while it stays.
-    """
-
-    robot: str
-    step: int
-    bricks: int
-    candidates: tuple[int, ...]
+    robot: str  # name of the robot that moves
+    step: int  # in which it takes its grip
+    bricks: int  # placed at that step
+    candidates: tuple[int, ...]  # within reach, and held by no other robot while it stays
 
 
 @dataclass(frozen=True, repr=False)
@@ -249,10 +214,7 @@ class Schedule(Shown):
     @property
     def _crowded(self) -> OpenStep | None:
         """The first step that moves share which are more than two, or do not follow each other."""
-        for step in self.steps:
-            if len(step.moves) > 2 or (len(step.moves) == 2 and step.moves[1] != step.moves[0] + 1):
-                return step
-        return None
+        return next((s for s in self.steps if s.moves and s.moves[-1] - s.moves[0] > 1), None)
 
     def __repr__(self) -> str:
         counts = [len(move.candidates) for move in self.moves]
@@ -261,12 +223,12 @@ class Schedule(Shown):
         return f"<Schedule {self.method} of {self.scene.name}: {what}>"
 
     def table(self) -> pd.DataFrame:
-        """Return what is to be chosen.
+        """Return what is to be chosen, a row per open grip.
 
-        Result: a row per open grip. Columns: ``move`` (from 1), ``robot``, ``step`` in which it
-        takes the grip, ``to_step``, the last before it lets go, ``bricks`` that stand, ``newest``,
-        the brick placed last, ``places``, whether the robot places it with this grip,
-        ``candidates``, how many nodes it may take, and these ``nodes``.
+        Columns: ``move`` (from 1), ``robot``, ``step`` in which it takes the grip, ``to_step``, the
+        last before it lets go, ``bricks`` that stand, ``newest``, the brick placed last,
+        ``places``, whether the robot places it with this grip, ``candidates``, how many nodes it
+        may take, and these ``nodes``.
         """
         open_holds = {hold.move: hold for hold in holds(self.scene, self.steps)}
         rows = [
@@ -286,12 +248,7 @@ class Schedule(Shown):
         return pd.DataFrame(rows)
 
     def gantt(self, first: int = 1, last: int | None = None) -> Figure:
-        """Draw the grips over the steps, a lane per robot; those to be chosen are hatched.
-
-        ``first``, ``last``: numbers of the first and the last step that are drawn; by default all.
-        Raises `ExtraError` if matplotlib is not installed (extra ``plot``); `StepError` if there
-        are no such steps.
-        """
+        """Draw the grips over some steps, a lane per robot; those to be chosen are hatched."""
         figure: Figure = display("gantt_picture")(self.scene, self.steps, None, (first, last))
         return figure
 
@@ -304,30 +261,20 @@ class Schedule(Shown):
         return {moves: tuple(steps) for moves, steps in found.items()}
 
     def fill(self, nodes: Sequence[int]) -> tuple[Step, ...]:
-        """Return the checked sequence in which every move takes the node chosen for it.
-
-        ``nodes``: a node for every move. Result: as many as the schedule has. Raises `StepError` if
-        there is not one node per move, or a step is impossible with them.
-        """
+        """Return the checked sequence in which every move takes the node chosen for it."""
         if len(nodes) != len(self.moves):
             raise StepError(f"{len(nodes)} nodes for {len(self.moves)} moves; give one each")
-        steps = [
-            Step(
-                step.number,
-                step.kind,
-                step.bricks,
-                tuple(nodes[g.move] if isinstance(g, OpenGrip) else g for g in step.grips),
-            )
-            for step in self.steps
-        ]
+        steps = []
+        for s in self.steps:
+            grips = tuple(nodes[g.move] if isinstance(g, OpenGrip) else g for g in s.grips)
+            steps.append(Step(s.number, s.kind, s.bricks, grips))
         return check_sequence(self.scene, steps)
 
 
 def thin(schedule: Schedule, rule: str) -> Schedule:
-    """Return a schedule with the candidates near the working end alone.
+    """Return a schedule with the candidates near the working end alone, by a rule of `Near`.
 
-    ``rule``: as of `Near`. Where it keeps none, the nearest stay. Result: that
-    says what was left out; the same where nothing is. Raises `StepError` if there is no such rule.
+    It says what was left out.
 
     Examples
     --------
@@ -352,20 +299,17 @@ _Island = frozenset[int]
 
 
 def acting_bodies(network: Network, bricks: int) -> Ints:
-    """Return which bricks the springs of a partial structure join.
+    """Return which bricks (s, 2) the springs of a partial structure join, by places in build order.
 
-    Result (s, 2): indices in build order; `seqopt.network.network.GROUND` first for a ground end. A
-    spring without any stiffness joins nothing.
+    `seqopt.network.network.GROUND` is first for a ground end. A spring without any stiffness joins
+    nothing.
     """
     springs = network.springs
-    acting = (springs.since <= bricks) & springs.stiffness.any(axis=1)
-    return np.asarray(springs.bodies[acting])
+    return np.asarray(springs.bodies[(springs.since <= bricks) & springs.stiffness.any(axis=1)])
 
 
 def islands(network: Network, bricks: int) -> tuple[_Island, ...]:
-    """Return the parts of a partial structure that no joint ties to a ground end.
-
-    Result: names of the bricks of every island, in build order of their first bricks.
+    """Return the bricks of every part of a partial structure that no joint ties to a ground end.
 
     Examples
     --------
@@ -379,38 +323,33 @@ def islands(network: Network, bricks: int) -> tuple[_Island, ...]:
     pairs = acting_bodies(network, bricks) + 1  # the ground is body 0
     ones = np.ones(len(pairs), dtype=bool)
     graph = coo_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(bricks + 1, bricks + 1))
-    count, part = connected_components(graph, directed=False)
-    if count == 1:
-        return ()
-    found: dict[int, set[int]] = {}
+    part = connected_components(graph, directed=False)[1].tolist()
+    found: dict[int, set[int]] = {label: set() for label in part if label != part[0]}
     for brick, label in zip(network.scene.placed, part[1:], strict=False):
-        if label != part[0]:
-            found.setdefault(int(label), set()).add(brick.name)
-    return tuple(frozenset(names) for names in found.values())
+        if label in found:
+            found[label].add(brick.name)
+    return tuple(map(frozenset, found.values()))
 
 
 def check_support(
     network: Network, steps: Sequence[Step] | Sequence[OpenStep], moves: Sequence[Move] = ()
 ) -> None:
-    """Require that every island is held at every step, whatever is chosen for open grips.
-
-    ``steps``: of a sequence or a schedule; ``moves``: of the schedule, with their candidates.
-    """
+    """Require that every island is held at every step, whatever is chosen for open grips."""
     if _always_tied(network):
         return
-    scene = network.scene
-    known: dict[int, tuple[_Island, ...]] = {}
+    on = network.scene.brick_of_node
+    loose = cache(partial(islands, network))
     for step in steps:
-        if step.bricks not in known:
-            known[step.bricks] = islands(network, step.bricks)
         holds = []
-        for grip in step.grips if known[step.bricks] else ():
+        for grip in step.grips if loose(step.bricks) else ():
             nodes = moves[grip.move].candidates if isinstance(grip, OpenGrip) else (grip,)
-            holds.append({scene.brick_of_node[node].name for node in nodes if node is not None})
-        for island in known[step.bricks]:
+            holds.append({on[node].name for node in nodes if node is not None})
+        for island in loose(step.bricks):
             if not any(names and names <= island for names in holds):
+                listed = ", ".join(map(str, sorted(island)))
+                hang = f"bricks {listed} hang" if len(island) > 1 else f"brick {listed} hangs"
                 raise StepError(
-                    f"step {step.number} ({step.kind.value}): {_hang(island)} free: no joint "
+                    f"step {step.number} ({step.kind.value}): {hang} free: no joint "
                     "connects to the ground and no robot is sure to hold on; place it later, or "
                     "write a schedule in which one more robot holds it"
                 )
@@ -421,15 +360,8 @@ def _always_tied(network: Network) -> bool:
     springs = network.springs
     acting = springs.stiffness.any(axis=1)
     supported = {GROUND}
-    for (first, second), since in zip(
-        springs.bodies[acting].tolist(), springs.since[acting].tolist(), strict=True
-    ):
+    rows = np.column_stack([springs.bodies, springs.since])[acting].tolist()
+    for first, second, since in rows:
         if first in supported and since == second + 1:
             supported.add(second)
     return len(supported) == 1 + len(network.scene.placed)
-
-
-def _hang(names: Iterable[int]) -> str:
-    """Return the subject and the verb."""
-    listed = ", ".join(map(str, sorted(names)))
-    return f"bricks {listed} hang" if "," in listed else f"brick {listed} hangs"

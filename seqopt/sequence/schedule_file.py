@@ -10,7 +10,7 @@ from pathlib import Path
 
 from seqopt._files import harmless, plain, read_text
 from seqopt.errors import StepError, did_you_mean
-from seqopt.network.build import build_network
+from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene._checks import short, whole
 from seqopt.scene.parts import Robot
@@ -20,7 +20,7 @@ from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule, ScheduledGrip
 from seqopt.sequence.steps import Step, StepKind, check_sequence, check_step
 from seqopt.sequence.three_robots import SCHEDULES, make_schedule, open_schedule, robot_loop
 
-Row = dict[str, str]
+_Row = dict[str, str]
 
 
 def read_plan(scene: Scene, path: Path) -> tuple[Step, ...]:
@@ -62,15 +62,18 @@ def read_plan(scene: Scene, path: Path) -> tuple[Step, ...]:
 
 
 def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
-    """Return the checked steps of a plan.
+    """Return the checked steps of a plan, numbered from 1.
 
-    ``scene``: in which every step must be possible. ``text``: CSV with the columns ``step``,
-    ``type``, ``bricks`` and, for every robot, ``NAME_node`` and, if present, ``NAME_brick``; an
-    empty cell means that the robot does not grip. Other columns are ignored. Result: numbered from
-    1. Raises `StepError` if the text is not such a table or a step is impossible.
+    The text is CSV with the columns ``step``, ``type``, ``bricks`` and, for every robot,
+    ``NAME_node`` and, if present, ``NAME_brick``; an empty cell means that the robot does not grip.
+    Other columns are ignored.
     """
-    rows = _read_rows(scene, text, f"plan {source}")
-    steps = [_given_step(scene, row, f"plan {source}, line {line}") for line, row in rows]
+    steps = []
+    for line, row in _read_rows(scene, text, f"plan {source}"):
+        where = f"plan {source}, line {line}"
+        cells = _read_cells(row, where)
+        grips = tuple(_read_grip(scene, robot, row, where) for robot in scene.robots)
+        steps.append(Step(*cells, grips))
     for expected, step in enumerate(steps, start=1):
         if step.number != expected:
             raise StepError(
@@ -79,56 +82,35 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     return check_sequence(scene, steps)
 
 
-def _read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, Row]]:
-    """Return the rows of a table of steps.
-
-    ``scene``: whose robots have a column each; ``text``: CSV, as in `parse_plan`. Result (int, dict
-    of str to str): the number of the line, and its cells by column. Raises `StepError` if a column
-    is missing or occurs twice, or the text is not a CSV file.
-    """
+def _read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, _Row]]:
+    """Return the rows of a table of steps: the number of the line, and its cells by column."""
+    reader = csv.DictReader(io.StringIO(text), restval="")
+    wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
     try:
-        return _rows(scene, csv.DictReader(io.StringIO(text), restval=""), what)
+        columns = [plain(name or "") for name in reader.fieldnames or ()]
+        for column in wanted:
+            if column not in columns:
+                raise StepError(f"{what}: column {column} is missing; give {', '.join(wanted)}")
+        for column in wanted:
+            if columns.count(column) > 1:
+                raise StepError(f"{what}: column {column} occurs twice; keep one")
+        reader.fieldnames = columns
+        return [(reader.line_num, row) for row in reader]
     except csv.Error as error:
         raise StepError(f"{what}: not a readable CSV file: {error}") from error
 
 
-def _rows(scene: Scene, reader: csv.DictReader[str], what: str) -> list[tuple[int, Row]]:
-    reader.fieldnames = [plain(name or "") for name in reader.fieldnames or ()]
-    wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
-    missing = [column for column in wanted if column not in (reader.fieldnames or ())]
-    if missing:
-        raise StepError(f"{what}: column {missing[0]} is missing; give {', '.join(wanted)}")
-    twice = [column for column in wanted if (reader.fieldnames or ()).count(column) > 1]
-    if twice:
-        raise StepError(f"{what}: column {twice[0]} occurs twice; keep one")
-    return [(reader.line_num, row) for row in reader]
-
-
-def _given_step(scene: Scene, row: Row, where: str) -> Step:
-    number, kind, bricks = _read_cells(row, where)
-    grips = tuple(_read_grip(scene, robot, row, where) for robot in scene.robots)
-    return Step(number, kind, bricks, grips)
-
-
-def _read_cells(row: Row, where: str) -> tuple[int, StepKind, int]:
-    """Return what a row says beside its grips.
-
-    ``row``: cells by column. Raises `StepError` if a cell is not a whole number, or there is no
-    such type.
-    """
+def _read_cells(row: _Row, where: str) -> tuple[int, StepKind, int]:
+    """Return what a row says beside its grips."""
     kinds = {kind.value: kind for kind in StepKind}
     if row["type"] not in kinds:
         raise StepError(f"{where}: type is {short(row['type'])}; give one of {', '.join(kinds)}")
-    number, bricks = _integer(row, "step", where), _integer(row, "bricks", where)
+    number, bricks = (_integer(row, column, where) for column in ("step", "bricks"))
     return number, kinds[row["type"]], bricks
 
 
-def _read_grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
-    """Return the node a robot holds; its brick, if named, must be the node's.
-
-    ``row``: cells by column. Raises `StepError` if a cell is not a whole number, or the node is on
-    another brick.
-    """
+def _read_grip(scene: Scene, robot: Robot, row: _Row, where: str) -> int | None:
+    """Return the node a robot holds; its brick, if named, must be the node's."""
     if not row[f"{robot.name}_node"].strip():
         return None
     node = _integer(row, f"{robot.name}_node", where)
@@ -142,7 +124,7 @@ def _read_grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
     return node
 
 
-def _integer(row: Row, column: str, where: str) -> int:
+def _integer(row: _Row, column: str, where: str) -> int:
     """Return a whole number; 48.0, as tables with empty cells are often written, is one too."""
     text = row[column].strip()
     try:
@@ -194,22 +176,25 @@ def read_schedule(where: Network | Scene, path: Path) -> Schedule:
 
 
 def parse_schedule(where: Network | Scene, text: str, source: str) -> Schedule:
-    """Return the checked schedule of a table.
+    """Return the checked schedule of a table, named after the last part of its source.
 
-    ``where``: in which every step must be possible. ``text``: CSV with the columns of a plan
-    (`parse_plan`). A cell of a robot is empty where it does not grip, the number of a node where
-    this is given, and ``?`` where the grip is open; in the rows that follow, ``?`` is the same
-    grip, until the robot lets go. Open grips may carry the number of their move, ``?1``, ``?2``, in
-    the order in which they are taken; it must be right. ``source``: what to call the table in
-    messages; its last part without suffix names the schedule. Raises `StepError` if the text is not
-    such a table or a step is impossible.
+    The text is CSV with the columns of a plan (`parse_plan`). A cell of a robot is empty where it
+    does not grip, the number of a node where this is given, and ``?`` where the grip is open; in
+    the rows that follow, ``?`` is the same grip, until the robot lets go. Open grips may carry the
+    number of their move, ``?1``, ``?2``, in the order in which they are taken; it must be right.
     """
-    network = where if isinstance(where, Network) else build_network(where)
+    network = network_of(where)
     scene, what = network.scene, f"schedule {source}"
     rows = _read_rows(scene, text, what)
     if not rows:
         raise StepError(f"{what}: it has no steps; give at least one")
-    _check_columns(scene, text, what)
+    known = [f"{robot.name}_node" for robot in scene.robots]
+    for column in filter(None, rows[0][1]):  # None stands for cells without a column
+        if column.endswith("_node") and column not in known:
+            raise StepError(
+                f"{what}: column {column}: no robot of scene {scene.name} is called so; "
+                f"give {', '.join(known)}"
+            )
     steps: list[OpenStep] = []
     for line, row in rows:
         steps.append(_step(scene, row, steps, f"{what}, line {line}"))
@@ -220,9 +205,7 @@ def parse_schedule(where: Network | Scene, text: str, source: str) -> Schedule:
 
 
 def schedule_text(schedule: Schedule) -> str:
-    """Return a schedule as the table that `parse_schedule` reads.
-
-    Result: CSV; open grips are marked with the numbers of their moves, from 1.
+    """Return a schedule as the table that `parse_schedule` reads, its open grips numbered from 1.
 
     Examples
     --------
@@ -238,23 +221,14 @@ def schedule_text(schedule: Schedule) -> str:
     writer = csv.writer(out, lineterminator="\n")
     names = [f"{robot.name}_node" for robot in schedule.scene.robots]
     writer.writerow(["step", "type", "bricks", *map(harmless, names)])
-    for step in schedule.steps:
-        cells = [f"?{g.move + 1}" if isinstance(g, OpenGrip) else g for g in step.grips]
-        writer.writerow([step.number, step.kind.value, step.bricks, *cells])
+    writer.writerows([s.number, s.kind.value, s.bricks, *s.grips] for s in schedule.steps)
     return out.getvalue()
 
 
 def find_schedule(
     network: Network, schedule: Schedule | Path | str | None = None, robots: Sequence[str] = ()
 ) -> Schedule:
-    """Return a schedule by name, from a file, or itself; the usual loop where none is given.
-
-    ``schedule``: a schedule of the same scene, a file, or a key of `SCHEDULES`; by default the loop
-    of the robots that are named, else of three, or of two where the scene has no third. ``robots``:
-    of a loop or a schedule by name: robots in the order of their roles. Raises `FileError` if the
-    file cannot be read; `StepError` if there is no such schedule, it is impossible in the scene or
-    belongs to another one.
-    """
+    """Return a schedule by name, from a file, or itself; the usual loop where none is given."""
     if schedule is None:
         return robot_loop(network, robots or min(len(network.scene.robots), MOST))
     if isinstance(schedule, str) and schedule in SCHEDULES:
@@ -288,18 +262,7 @@ def _from_file(network: Network, schedule: object) -> Schedule:
     return read_schedule(network, path)
 
 
-def _check_columns(scene: Scene, text: str, what: str) -> None:
-    """Require that no column belongs to a robot which the scene does not have."""
-    known = [f"{robot.name}_node" for robot in scene.robots]
-    for column in map(plain, next(csv.reader(io.StringIO(text)))):
-        if column.endswith("_node") and column not in known:
-            raise StepError(
-                f"{what}: column {column}: no robot of scene {scene.name} is called so; "
-                f"give {', '.join(known)}"
-            )
-
-
-def _step(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> OpenStep:
+def _step(scene: Scene, row: _Row, before: Sequence[OpenStep], where: str) -> OpenStep:
     """Return the step of a row, which must be possible after those before."""
     number, kind, bricks = _read_cells(row, where)
     if number != len(before) + 1:
@@ -314,7 +277,7 @@ def _step(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> Ope
     return step
 
 
-def _grips(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> ScheduledGrips:
+def _grips(scene: Scene, row: _Row, before: Sequence[OpenStep], where: str) -> ScheduledGrips:
     """Return what the robots hold in a row: a mark goes on, or is a new move."""
     last = before[-1].grips if before else (None,) * len(scene.robots)
     count = len({move for step in before for move in step.moves})
@@ -324,7 +287,11 @@ def _grips(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> Sc
         cell = row[column].strip()
         mark = _MARK.fullmatch(cell)
         if mark is None:
-            grips.append(_given(scene, row, column, where))
+            if not re.fullmatch(r"([+-]?\d+)?", cell):
+                raise StepError(
+                    f"{where}: {column} is {cell!r}; give a node, ? for an open grip, or nothing"
+                )
+            grips.append(_read_grip(scene, robot, row, where))
             continue
         grip = held if isinstance(held, OpenGrip) else OpenGrip(count)
         count += grip is not held
@@ -336,14 +303,3 @@ def _grips(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> Sc
             )
         grips.append(grip)
     return tuple(grips)
-
-
-def _given(scene: Scene, row: Row, column: str, where: str) -> int | None:
-    """Return the node of a cell that has no mark."""
-    cell = row[column].strip()
-    if cell and not re.fullmatch(r"[+-]?\d+", cell):
-        raise StepError(
-            f"{where}: {column} is {cell!r}; give a node, ? for an open grip, or nothing"
-        )
-    robot = next(robot for robot in scene.robots if f"{robot.name}_node" == column)
-    return _read_grip(scene, robot, row, where)

@@ -82,9 +82,7 @@ class AnyStep(Protocol):
 
 
 def idle_robots(scene: Scene, steps: Iterable[AnyStep]) -> tuple[str, ...]:
-    """Return the robots of a scene that never grip.
-
-    ``steps``: of a sequence, a schedule or a plan. Result: names, in the order of the scene.
+    """Return the names of the robots of a scene that never grip, in its order.
 
     Examples
     --------
@@ -98,10 +96,7 @@ def idle_robots(scene: Scene, steps: Iterable[AnyStep]) -> tuple[str, ...]:
 
 
 def require_steps(steps: Sequence[Step]) -> Sequence[Step]:
-    """Return steps if that is what they are.
-
-    Raises `StepError` if they are something else, a schedule whose grips are open, say.
-    """
+    """Return steps if that is what they are; a schedule whose grips are open is not."""
     if not isinstance(steps, Sequence) or not all(isinstance(step, Step) for step in steps):
         raise StepError(
             f"a {type(steps).__name__} is not a sequence of steps; "
@@ -111,33 +106,21 @@ def require_steps(steps: Sequence[Step]) -> Sequence[Step]:
 
 
 def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
-    """Return the nodes of the first bricks that a robot may hold.
-
-    ``scene``: with the bricks, and the nodes that are blocked; ``robot``: whose reach counts.
-    Result: in build order; neither blocked nor out of reach.
-    """
+    """Return the nodes of the first bricks that a robot may hold, in build order."""
     return tuple(chain.from_iterable(scene.within_reach(robot)[:bricks]))
 
 
 def check_sequence(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
-    """Return the steps if each is possible after the one before.
-
-    ``scene``: what is built, and by which robots; ``steps``: from the first brick on.
-    """
+    """Return the steps, from the first brick on, if each is possible after the one before."""
     if not steps:
         raise StepError("the sequence has no steps; give at least one")
-    before = None
-    for step in steps:
+    for before, step in zip((None, *steps), steps, strict=False):
         check_step(scene, before, step)
-        before = step
     return tuple(steps)
 
 
 def check_step(scene: Scene, before: AnyStep | None, step: AnyStep) -> None:
-    """Require that a step is possible after the one before, whatever its open grips become.
-
-    ``before``: None for the first step.
-    """
+    """Require that a step is possible after the one before, whatever its open grips become."""
     _check_state(scene, step)
     _check_change(scene, before or Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots)), step)
 
@@ -176,7 +159,10 @@ def _check_grip(scene: Scene, step: AnyStep, robot: Robot, node: int) -> None:
         reason = "the node is out of its reach"
     else:
         return
-    possible = _list(reachable(scene, robot, step.bricks))
+    nodes = reachable(scene, robot, step.bricks)
+    possible = ", ".join(map(str, nodes)) or "no node"
+    if len(nodes) > 12:
+        possible = f"{len(nodes)} nodes from {nodes[0]} to {nodes[-1]}"
     raise StepError(
         f"step {step.number}: {robot.name} at node {node}: {reason}; it can hold {possible}"
     )
@@ -190,40 +176,26 @@ def _check_change(scene: Scene, before: AnyStep, step: AnyStep) -> None:
         raise StepError(
             f"{where}: {step.bricks} bricks after {before.bricks}; give {expected} or another kind"
         )
+    taken: list[object] = []
+    dropped: list[object] = []
     for robot, old, new in zip(scene.robots, before.grips, step.grips, strict=True):
         if None not in (old, new) and old != new:
             raise StepError(
                 f"{where}: {robot.name} moves from node {old} to {new}; let it release first"
             )
-    taken = [
-        n for o, n in zip(before.grips, step.grips, strict=True) if o is None and n is not None
-    ]
-    dropped = [
-        o for o, n in zip(before.grips, step.grips, strict=True) if n is None and o is not None
-    ]
-    wanted = (
-        "takes none and drops some" if step.kind is StepKind.RELEASE else "takes one, drops none"
-    )
-    if (len(taken), not dropped) != ((0, False) if step.kind is StepKind.RELEASE else (1, True)):
+        if old != new:
+            (dropped if new is None else taken).append(old if new is None else new)
+    releases = step.kind is StepKind.RELEASE
+    if (len(taken), bool(dropped)) != ((0, True) if releases else (1, False)):
+        given, left = (", ".join(map(str, grips)) for grips in (taken, dropped))
+        wanted = "takes none and drops some" if releases else "takes one, drops none"
         raise StepError(
-            f"{where}: it takes grips {_bracketed(taken)} and drops {_bracketed(dropped)}; "
-            f"such a step {wanted}"
+            f"{where}: it takes grips [{given}] and drops [{left}]; such a step {wanted}"
         )
     brick = scene.placed[step.bricks - 1]
-    given = step.kind is StepKind.PLACE and isinstance(taken[0], Integral)
-    if given and taken[0] not in brick.nodes:
+    given_node = step.kind is StepKind.PLACE and isinstance(taken[0], Integral)
+    if given_node and taken[0] not in brick.nodes:
         raise StepError(
             f"{where}: its new grip is on node {taken[0]}; "
             f"hold brick {brick.name} at one of {list(brick.nodes)}"
         )
-
-
-def _bracketed(grips: Iterable[object]) -> str:
-    return f"[{', '.join(map(str, grips))}]"
-
-
-def _list(nodes: Iterable[int]) -> str:
-    numbers = list(nodes)
-    if len(numbers) > 12:
-        return f"{len(numbers)} nodes from {numbers[0]} to {numbers[-1]}"
-    return ", ".join(map(str, numbers)) or "no node"

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple
 
 from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import network_of
@@ -14,13 +13,14 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, check_support
 from seqopt.sequence.steps import Step, StepKind, reachable
 from seqopt.sequence.two_robots import (
+    Method,
     alternate,
     cast,
     find_robots,
+    find_turns,
     in_words,
     placing_node,
     sequential,
-    take_turns,
 )
 
 
@@ -28,20 +28,14 @@ def open_schedule(method: str, network: Network, steps: Sequence[OpenStep]) -> S
     """Return the schedule of open steps, with the candidates of every move.
 
     Open to a move is every free node within reach when it is made that no given grip holds while
-    it lasts; to a move that places a brick, the nodes of this brick alone.
-
-    ``method``: name of the schedule; ``steps``: moves numbered from 0 in the order in which they
-    are made. Raises `StepError` if more than two moves are open at once, nothing is open to a move,
-    or an island is not sure to be held.
+    it lasts; to a move that places a brick, the nodes of this brick alone. Moves are numbered from
+    0 in the order in which they are made.
     """
-    moves = tuple(_move(network, steps, k) for k in range(1 + max(_numbers(steps), default=-1)))
+    count = 1 + max((number for step in steps for number in step.moves), default=-1)
+    moves = tuple(_move(network, steps, k) for k in range(count))
     schedule = Schedule(method, network.scene, tuple(steps), moves)
     check_support(network, steps, moves)
     return schedule
-
-
-def _numbers(steps: Sequence[OpenStep]) -> list[int]:
-    return [number for step in steps for number in step.moves]
 
 
 def _move(network: Network, steps: Sequence[OpenStep], number: int) -> Move:
@@ -50,10 +44,10 @@ def _move(network: Network, steps: Sequence[OpenStep], number: int) -> Move:
     present = [step for step in steps if number in step.moves]
     first = present[0]
     robot = scene.robots[first.grips.index(OpenGrip(number))]
-    held = {grip for step in present for grip in step.grips if isinstance(grip, int)}
     nodes = reachable(scene, robot, first.bricks)
     if first.kind is StepKind.PLACE:  # what places a brick holds it
         nodes = tuple(n for n in nodes if n in scene.placed[first.bricks - 1].nodes)
+    held = {grip for step in present for grip in step.grips}
     free = tuple(node for node in nodes if node not in held)
     if not free:
         raise StepError(
@@ -71,10 +65,7 @@ def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sch
     chosen among those of this brick, and holds it there until the brick after is placed; then the
     first one releases. A move lasts from its placing to the release after the next placing; it
     shares that placing with the move after it. At least one robot grips, and the newest brick is
-    held, at every step before the last.
-
-    ``network``: of a scene with at least two robots; ``robots``: as in `seqopt.sequential`. Result:
-    with one move for every brick. Filled with the nodes of the sequential method, it is this.
+    held, at every step before the last. Robots are those of `seqopt.sequential`.
 
     Examples
     --------
@@ -86,10 +77,8 @@ def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sch
     [(1,), (2,), (4,)]
     """
     network = network_of(network)
-    chosen = find_robots(network.scene, robots, "two-robot", 2)
-    starts = [(chosen[0], chosen[1])] if robots else []
     every = {brick.name for brick in network.scene.bricks}
-    pairs = take_turns(network, every, chosen, starts)
+    pairs = find_turns(network, "two-robot", every, robots)
     parts = alternate(network, every, pairs, lambda _, bricks: OpenGrip(bricks - 1))
     steps = [OpenStep(number, *part) for number, part in enumerate(parts, start=1)]
     return open_schedule("two-robot", network, steps)
@@ -105,11 +94,8 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
     they placed, the newest among them, and one holds where it was chosen. With three robots this is
     the loop of Bruun et al.; with two it is `_two_robot_loop`.
 
-    ``network``: of a scene with at least one brick more than robots take part. ``robots``: how many
-    robots take part, or their names in the order in which they place the first bricks; by default
-    all robots of the scene. Which of them takes which role follows from reach. Result: with one
-    move for every brick except the last n; with two robots for every brick. Raises `StepError` if
-    there are fewer robots or bricks, or none is left that reaches all bricks of a role.
+    ``robots``: how many take part, or their names in the order in which they place the first
+    bricks; by default all robots of the scene. Which of them takes which role follows from reach.
 
     Examples
     --------
@@ -131,12 +117,15 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
             f"this method needs {in_words(count)} robots and {in_words(count + 1)} bricks"
         )
     turns = _rotation(count, len(scene.placed) - count)
-    steps = _loop(network, _order(network, names, turns), turns)
+    chosen = find_robots(scene, names, f"the loop of {count}", count)
+    roles = [{role} for role in range(count)]
+    for brick, turn in enumerate(turns, start=count):
+        roles[turn.placer].add(brick)
+    steps = _loop(network, chosen if names else cast(scene, roles, chosen), turns)
     return open_schedule(f"{in_words(count)}-robot", network, steps)
 
 
-@dataclass(frozen=True)
-class _Turn:
+class _Turn(NamedTuple):
     """The roles of one turn of the loop: who moves, who places next, who releases after that."""
 
     mover: int
@@ -153,16 +142,6 @@ def _rotation(count: int, turns: int) -> list[_Turn]:
         holding.append(placer)
         mover, placer = out[-1].oldest, mover
     return out
-
-
-def _order(network: Network, names: Sequence[str], turns: Sequence[_Turn]) -> list[int]:
-    """Return which robot has which role, the first way in which each can place its bricks."""
-    count = turns[0].mover + 1
-    chosen = find_robots(network.scene, names, f"the loop of {count}", count)
-    roles = [{role} for role in range(count)]
-    for k, turn in enumerate(turns):
-        roles[turn.placer].add(count + k)
-    return chosen if names else cast(network.scene, roles, chosen)
 
 
 def _loop(network: Network, order: Sequence[int], turns: Sequence[_Turn]) -> list[OpenStep]:
@@ -189,24 +168,6 @@ def _loop(network: Network, order: Sequence[int], turns: Sequence[_Turn]) -> lis
         place(turn.placer, bricks + 1)
         add(StepKind.RELEASE, bricks + 1, turn.oldest, None)
     return steps
-
-
-class _ScheduleMethod(Protocol):
-    """A rule that makes a schedule."""
-
-    def __call__(self, network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
-        """Return the schedule of the build.
-
-        Parameters
-        ----------
-        network : Network or Scene
-        robots : sequence of str, optional
-            Names of the robots in the order of their roles; found from their reach by default.
-
-        Returns
-        -------
-        Schedule
-        """
 
 
 def three_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
@@ -328,7 +289,7 @@ def _free(scene: Scene, window: Sequence[Step], helpers: Sequence[int]) -> int:
     )
 
 
-SCHEDULES: dict[str, _ScheduleMethod] = {
+SCHEDULES: dict[str, Method[Schedule]] = {
     "three-robot": three_robot_loop,
     "modified-sequential": modified_sequential,
     "two-robot": _two_robot_loop,
@@ -337,12 +298,7 @@ SCHEDULES: dict[str, _ScheduleMethod] = {
 
 
 def make_schedule(name: str, network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
-    """Return a schedule by name.
-
-    ``name``: a key of `SCHEDULES`; ``"loop"`` is the loop of all robots of the scene. ``robots``:
-    names of the robots in the order of their roles; found from their reach by default. Raises
-    `StepError` if there is none of that name, or the scene cannot be built by it.
-    """
+    """Return a schedule of `SCHEDULES` by name, with robots in the order of their roles."""
     if name not in SCHEDULES:
         why = f"does not exist{did_you_mean(name, SCHEDULES)}; give one of {', '.join(SCHEDULES)}"
         raise StepError(f"schedule {name!r} {why}")

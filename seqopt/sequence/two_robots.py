@@ -26,11 +26,9 @@ _Ways = dict[_Pair, tuple[int, tuple[_Pair, ...]]]  # by pair: changes so far, p
 
 
 def find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> list[int]:
-    """Return which robots a method may use, in the order of its roles.
+    """Return the indices of the robots that a method may use, in the order of its roles.
 
-    ``names``: of robots, in the order of the roles; none for all robots of the scene. ``roles``:
-    how many roles the method has. Result: indices of the scene's robots. Raises `StepError` if
-    there are not as many as roles, or one is not in the scene or named twice.
+    Without names these are all robots of the scene, which must be as many as roles at least.
     """
     known = [robot.name for robot in scene.robots]
     if not names:
@@ -43,23 +41,12 @@ def find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> 
         if name not in known:
             why = f"does not exist{did_you_mean(name, known)}; give some of {', '.join(known)}"
             raise StepError(f"robot {name!r} {why}")
+    listed = f"robots {', '.join(names)}"
     if len({*names}) < len(names):
-        raise StepError(f"robots {', '.join(names)}: one occurs twice; name different ones")
+        raise StepError(f"{listed}: one occurs twice; name different ones")
     if len(names) != roles:
-        wanted = in_words(roles)
-        raise StepError(f"robots {', '.join(names)}: {len(names)} named; {method} takes {wanted}")
+        raise StepError(f"{listed}: {len(names)} named; {method} takes {in_words(roles)}")
     return [known.index(name) for name in names]
-
-
-def _can_place(scene: Scene, robot: Robot, brick: Brick) -> bool:
-    """Return whether a robot reaches a node by which it can place a brick.
-
-    ``scene``: with the nodes that are blocked.
-    """
-    return any(
-        node not in scene.blocked_nodes and robot.reach.covers(brick.node_position(node))
-        for node in brick.nodes
-    )
 
 
 def take_turns(
@@ -67,13 +54,11 @@ def take_turns(
 ) -> list[_Pair]:
     """Return who places every brick and who holds meanwhile, two robots at a time.
 
-    After some bricks the one that placed stays and holds, after the others the one that held. The
-    two are the same all along where their reach allows it; otherwise a third robot takes the place
-    of the one that is free, as seldom as possible. Ties go to the order of the robots.
-
-    ``swap_after``: names of the bricks after which who placed stays. ``robots``: indices of the
-    robots that may take part. ``starts`` (int, int): who may place the first brick, and who is its
-    partner; by default any two. Result (int, int): for every brick in build order.
+    After some bricks (``swap_after``: their names) the one that placed stays and holds, after the
+    others the one that held. The two are the same all along where their reach allows it; otherwise
+    a third of the robots takes the place of the one that is free, as seldom as possible. Ties go to
+    the order of the robots. ``starts`` has who may place the first brick, and who is its partner;
+    by default any two.
     """
     scene = network.scene
     rank = {robot: i for i, robot in enumerate(robots)}
@@ -82,7 +67,7 @@ def take_turns(
         for placer, holder in starts or permutations(robots, 2)
     }
     for k, brick in enumerate(scene.placed):
-        able = {robot for robot in rank if _can_place(scene, scene.robots[robot], brick)}
+        able = {robot for robot in rank if scene.within_reach(scene.robots[robot])[k]}
         possible = {pair: way for pair, way in ways.items() if pair[0] in able}
         if not possible:
             raise _nobody(scene, [pair[0] for pair in ways], able, k)
@@ -118,28 +103,20 @@ def _nobody(scene: Scene, free: Sequence[int], able: Set[int], k: int) -> StepEr
 def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list[int]:
     """Return a different robot for every role that reaches all bricks which the role places.
 
-    ``roles``: by role, which bricks it places: indices in build order. ``robots``: who may take a
-    role; of all ways the first in this order is taken, role by role. Result: indices of the scene's
-    robots.
+    Bricks are places in build order; of all ways the first is taken, role by role.
     """
-    fits = [
-        [
-            r
-            for r in robots
-            if all(_can_place(scene, scene.robots[r], scene.placed[b]) for b in role)
-        ]
-        for role in roles
-    ]
+    reach = {r: scene.within_reach(scene.robots[r]) for r in robots}
+    fits = [[r for r in robots if all(reach[r][b] for b in role)] for role in roles]
     found = _first_match(fits)
     if found:
         return found
     role = min(range(len(roles)), key=lambda r: len(fits[r]))
-    names = ", ".join(scene.robots[robot].name for robot in robots)
+    names, fit = (", ".join(scene.robots[r].name for r in some) for some in (robots, fits[role]))
     bricks = ", ".join(str(scene.placed[b].name) for b in sorted(roles[role]))
-    fit = ", ".join(scene.robots[robot].name for robot in fits[role]) or "none"
     raise StepError(
         f"robots {names}: not every role has a robot of its own: one places bricks {bricks}, all "
-        f"within reach of {fit}; extend a reach, name other robots, or write a schedule of your own"
+        f"within reach of {fit or 'none'}; extend a reach, name other robots, or write a schedule "
+        "of your own"
     )
 
 
@@ -156,9 +133,7 @@ def _matched(fits: Sequence[Sequence[int]]) -> bool:
     """Return whether every role can have a robot that no other has."""
     if not fits or not all(fits):
         return not fits
-    able = np.zeros((len(fits), 1 + max(map(max, fits))), dtype=bool)
-    for role, robots in enumerate(fits):
-        able[role, list(robots)] = True
+    able = np.array([np.isin(np.arange(1 + max(map(max, fits))), fit) for fit in fits])
     return bool((maximum_bipartite_matching(csr_array(able), perm_type="column") >= 0).all())
 
 
@@ -169,25 +144,17 @@ def in_words(number: int) -> str:
 
 
 def lies_along(network: Network) -> frozenset[int]:
-    """Return the bricks that lie along the structure: joints meet both of their inner nodes.
-
-    Result: names of the bricks.
-    """
+    """Return the names of bricks along the structure: joints meet both of their inner nodes."""
     half = network.edge_kind == PartKind.JOINT.value
-    touched = np.zeros(len(network.node_kind), dtype=bool)
-    touched[network.edge_nodes[half, 0]] = True
-    placed = network.scene.placed
-    along = np.flatnonzero(touched[network.inner].all(axis=1))
-    return frozenset(placed[i].name for i in along.tolist())
+    along = np.isin(network.inner, network.edge_nodes[half, 0]).all(axis=1)
+    return frozenset(network.scene.placed[i].name for i in np.flatnonzero(along).tolist())
 
 
 def _begins_elsewhere(network: Network) -> frozenset[int]:
-    """Return the bricks with which the cantilever method turns to another part of the structure.
+    """Return the names of bricks at which the cantilever method turns to another part.
 
     A stretch is a brick that is held while others are placed, and these others. A brick begins
     elsewhere if no joint ties it to the stretch that is being built; so does the first one.
-
-    Result: names of the bricks.
     """
     placed = network.scene.placed
     along, stretch, out = lies_along(network), set[int](), set[int]()
@@ -204,10 +171,7 @@ def _begins_elsewhere(network: Network) -> frozenset[int]:
 
 
 def degeneration(network: Network, method: str) -> str:
-    """Return why a method becomes another one on a structure, or nothing.
-
-    ``method``: a key of `seqopt.sequence.two_robots.METHODS`. Result: a sentence; empty if the
-    method is what its name says.
+    """Return why a method of `METHODS` becomes another one on a structure; empty if it does not.
 
     Examples
     --------
@@ -216,45 +180,35 @@ def degeneration(network: Network, method: str) -> str:
     >>> degeneration(seqopt.build_network(seqopt.arch_scene(shape)), "cantilever")
     'every brick lies along the structure: it is the sequential method here'
     """
-    between = [brick.name for brick in network.scene.placed[1:-1]]  # after the last all let go
+    between = {brick.name for brick in network.scene.placed[1:-1]}  # after the last all let go
     if method != "cantilever":
         return ""
     if not between:
         return "no bricks lie between the first and the last: it is the sequential method here"
-    along, elsewhere = lies_along(network), _begins_elsewhere(network)
-    if along.issuperset(between):
+    along = lies_along(network)
+    if along >= between:
         return "every brick lies along the structure: it is the sequential method here"
-    if along | elsewhere >= {*between}:
+    swaps = along | _begins_elsewhere(network)
+    if swaps >= between:
         return (
             "no brick extends one that is held: each begins elsewhere or lies along; "
             "it is the sequential method here"
         )
-    if not (along | elsewhere) & {*between}:
-        first = network.scene.placed[0].name
-        return f"no brick lies along the structure: brick {first} is held until the end"
-    return ""
+    if swaps & between:
+        return ""
+    first = network.scene.placed[0].name
+    return f"no brick lies along the structure: brick {first} is held until the end"
 
 
 _Grip = TypeVar("_Grip")
+_Made_co = TypeVar("_Made_co", covariant=True)
 
 
-class _Method(Protocol):
-    """A rule that makes a sequence of steps."""
+class Method(Protocol[_Made_co]):
+    """A rule that makes a sequence of steps, or a schedule."""
 
-    def __call__(self, network: Network, robots: Sequence[str] = ()) -> tuple[Step, ...]:
-        """Return the steps of the build.
-
-        Parameters
-        ----------
-        network : Network
-        robots : sequence of str, optional
-            Names of the robots in the order of their roles; found from their reach by default.
-
-        Returns
-        -------
-        tuple of Step
-            Checked; every grip is given.
-        """
+    def __call__(self, network: Network | Scene, robots: Sequence[str] = ()) -> _Made_co:
+        """Return what builds a scene, by robots in the order of their roles, or found by reach."""
 
 
 def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
@@ -262,15 +216,9 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
 
     A robot on one side takes the node nearer to its side of a brick that lies across; any other
     case takes the brick's own placing node where it is within reach.
-
-    ``robot``: one of the scene's; ``brick``: the one to be placed. Result: one of the brick's two
-    nodes. Raises `StepError` if the robot reaches no free node of the brick.
     """
-    free = [
-        node
-        for node in brick.nodes
-        if node not in network.scene.blocked_nodes and robot.reach.covers(brick.node_position(node))
-    ]
+    scene = network.scene
+    free = scene.within_reach(robot)[scene.since[brick.name] - 1]
     if not free:
         raise StepError(
             f"brick {brick.name}: {robot.name} reaches none of its free nodes {list(brick.nodes)}; "
@@ -357,7 +305,7 @@ def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     return _two_robots(network, "cantilever", swaps, robots)
 
 
-METHODS: dict[str, _Method] = {"sequential": sequential, "cantilever": cantilever}
+METHODS: dict[str, Method[tuple[Step, ...]]] = {"sequential": sequential, "cantilever": cantilever}
 
 
 def alternate(
@@ -366,27 +314,30 @@ def alternate(
     pairs: Sequence[_Pair],
     grip: Callable[[int, int], _Grip],
 ) -> Iterator[tuple[StepKind, int, tuple[_Grip | None, ...]]]:
-    """Yield the steps in which two robots place and hold.
+    """Yield the steps in which two robots place and hold, as `take_turns` says who does.
 
     After each brick one of the two releases, if it holds anything; after the last one both do.
-
-    ``swap_after``: names of the bricks after which who placed stays and holds. ``pairs`` (int,
-    int): who places and who holds, for every brick; see `seqopt.sequence.two_robots.take_turns`.
-    ``grip``: what a robot holds of the brick that it places, from the robot's index and the brick
-    count. Results: ``grips``: by robot of the scene.
+    ``grip`` says what a robot, by its index, holds of the brick that it places, by the brick count.
     """
-    scene = network.scene
-    grips: list[_Grip | None] = [None] * len(scene.robots)
-    for count, (brick, pair) in enumerate(zip(scene.placed, pairs, strict=True), start=1):
-        placer, holder = pair
+    placed = network.scene.placed
+    grips: list[_Grip | None] = [None] * len(network.scene.robots)
+    for count, (brick, (placer, holder)) in enumerate(zip(placed, pairs, strict=True), start=1):
         grips[placer] = grip(placer, count)
-        placed = tuple(grips)
-        yield StepKind.PLACE, count, placed
+        before = tuple(grips)
+        yield StepKind.PLACE, count, before
         stays = placer if count == 1 or brick.name in swap_after else holder
-        last = count == len(scene.placed)
+        last = count == len(placed)
         grips = [None if last or i != stays else held for i, held in enumerate(grips)]
-        if tuple(grips) != placed:
+        if tuple(grips) != before:
             yield StepKind.RELEASE, count, tuple(grips)
+
+
+def find_turns(
+    network: Network, method: str, swap_after: Set[int], robots: Sequence[str]
+) -> list[_Pair]:
+    """Return who places and who holds in a method of two robots that may be named."""
+    chosen = find_robots(network.scene, robots, method, 2)
+    return take_turns(network, swap_after, chosen, [(chosen[0], chosen[1])] if robots else [])
 
 
 def _two_robots(
@@ -394,9 +345,7 @@ def _two_robots(
 ) -> tuple[Step, ...]:
     """Return the sequence in which holder and placer swap after placing some of the bricks."""
     scene = network.scene
-    chosen = find_robots(scene, robots, method, 2)
-    starts = [(chosen[0], chosen[1])] if robots else []
-    pairs = take_turns(network, swap_after, chosen, starts)
+    pairs = find_turns(network, method, swap_after, robots)
 
     def node(robot: int, count: int) -> int:
         return placing_node(network, scene.robots[robot], scene.placed[count - 1])

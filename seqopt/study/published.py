@@ -113,11 +113,6 @@ def printed(name: str) -> pd.DataFrame:
     -------
     pandas.DataFrame
         As printed; the names of the columns say the units.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is none of that name.
     """
     source = resources.files("seqopt").joinpath(f"data/paper/{name}.csv")
     with source.open(encoding="utf-8") as stream:
@@ -138,11 +133,6 @@ def printed_steps(method: str) -> pd.DataFrame:
     -------
     pandas.DataFrame
         As printed; the names of the columns say the units.
-
-    Raises
-    ------
-    KeyError
-        If the method is none of these.
     """
     if method not in STEP_TABLES:
         raise KeyError(f"printed table of {method!r} does not exist; give {', '.join(STEP_TABLES)}")
@@ -199,29 +189,18 @@ def published_plan(scene: Scene) -> tuple[Step, ...]:
     -------
     tuple of Step
         90 steps.
-
-    Raises
-    ------
-    StepError
-        If a step is impossible in the scene.
     """
     source = resources.files("seqopt").joinpath("data/paper/three_robot_plan.csv")
     return parse_plan(scene, source.read_text(encoding="utf-8"), "published three-robot plan")
 
 
 def published_choice(problem: Layers) -> tuple[int, ...]:
-    """Return the published node of every move of the loop, as index among its candidates.
-
-    Raises `ValueError` if one is no candidate of its move.
-    """
-    scene = problem.schedule.scene
-    plan = published_plan(scene)
-    names = [robot.name for robot in scene.robots]
-    nodes = [plan[m.step - 1].grips[names.index(m.robot)] for m in problem.schedule.moves]
-    return tuple(
-        move.candidates.index(int(node or 0))
-        for move, node in zip(problem.schedule.moves, nodes, strict=True)
-    )
+    """Return the published node of every move of the loop, as index among its candidates."""
+    schedule = problem.schedule
+    plan = published_plan(schedule.scene)
+    robots = [robot.name for robot in schedule.scene.robots]
+    nodes = [plan[m.step - 1].grips[robots.index(m.robot)] or 0 for m in schedule.moves]
+    return tuple(m.candidates.index(n) for m, n in zip(schedule.moves, nodes, strict=True))
 
 
 def paper_models(schedule: Schedule) -> tuple[int, int]:
@@ -231,8 +210,7 @@ def paper_models(schedule: Schedule) -> tuple[int, int]:
     times 2(n-1) pairs for the shared one.
     """
     counts = range(3, len(schedule.scene.bricks) + 1)
-    cascading = sum(4 * 2 * n for n in counts)
-    return cascading, sum(3 * 2 * n + 2 * n * 2 * (n - 1) for n in counts)
+    return sum(8 * n for n in counts), sum(6 * n + 2 * n * 2 * (n - 1) for n in counts)
 
 
 def as_printed(scene: Scene, table: pd.DataFrame) -> pd.DataFrame:

@@ -15,10 +15,10 @@ from seqopt.problem.criteria import (
     RankSum,
     WeightedSum,
     _mean_ranks,
+    _present,
     _ranks_of,
     _scaled_ranks,
     equal,
-    present,
 )
 from seqopt.problem.criteria import WorstRatio as Worst
 from seqopt.problem.requirements import NEVER, ROUNDED, Units
@@ -176,8 +176,8 @@ def test_scales_are_given_or_the_scenes():
 
 
 def test_only_a_robot_that_never_grips_counts_as_nothing():
-    assert present(np.full(2, NAN)).tolist() == [0, 0]
-    assert present(np.array([NAN, 2.0])) == pytest.approx([NAN, 2], nan_ok=True)
+    assert _present(np.full(2, NAN)).tolist() == [0, 0]
+    assert _present(np.array([NAN, 2.0])) == pytest.approx([NAN, 2], nan_ok=True)
 
 
 def test_equal_terms_weigh_one():

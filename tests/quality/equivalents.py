@@ -47,7 +47,7 @@ OPERATOR = "seqopt.engines.rigid._operator"
 GROWTH = "seqopt.engines.rigid._growth"
 GRIPS = "seqopt.engines.rigid._grip_equations"
 COSTS, CERTIFICATE = "seqopt.graph.layers.costs", "seqopt.plan.judge.certificate"
-CRITERIA, RANKS = "seqopt.problem.criteria", "seqopt.problem.criteria"
+RANKS = "seqopt.problem.criteria"
 LENGTHS = "both have a length: costs that have not are refused when they are made"
 EQUIVALENT = (
     *(
@@ -99,7 +99,6 @@ EQUIVALENT = (
         Equivalent(TRIAL, "CANCEL", "10.0", size, "where one way of two that agree ends")
         for size in ("9.0", "11.0")
     ),
-    Equivalent(CRITERIA, "zeros_like", "[0][0]", "[-1][0]", "responses of a step have one shape"),
     Equivalent(RANKS, "ranks if values.ndim", "==", "<=", "a step has one open move or two"),
     Equivalent(RANKS, "ordered", "!=", ">", "in order, what is another is larger"),
     Equivalent(

@@ -80,7 +80,7 @@ def all_of_space(space):
     """Every state that many-at-a-time moves reach, and the pairs of states they join."""
     states, joined = set(), set()
     level = space.start()
-    for bricks in range(space.bricks + 1):
+    for bricks in range(space.levels + 1):
         entry = level
         while len(entry):
             fresh = set(named(space, bricks, entry)) - states
@@ -97,7 +97,7 @@ def all_of_space(space):
                 )
                 joined |= set(ends)
             entry = np.concatenate([entry[:0], *(moves.states for moves in parts)])
-        if bricks < space.bricks:
+        if bricks < space.levels:
             moves = space.places(bricks, level)
             ends = zip(
                 named(space, bricks, level[moves.source]),

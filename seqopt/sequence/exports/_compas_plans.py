@@ -6,7 +6,7 @@ Both are JSON as `compas.json_load` reads it, written without COMPAS.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -22,29 +22,21 @@ from seqopt.scene.imports._building import block_numbers
 from seqopt.scene.imports._compas_models import assembly_graph, by_guid, kind, payload
 from seqopt.scene.imports._content import entry, parse_json
 from seqopt.scene.imports.formats import read_content, sniffed
-from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
-from seqopt.sequence.exports._tables import StepStates, step_states
+from seqopt.sequence.exports._tables import step_states
 from seqopt.sequence.steps import Step
 
 
 @dataclass(frozen=True)
 class Source:
-    """A file from which a scene was imported.
+    """A file from which a scene was imported."""
 
-    ``names``: what it calls bricks, by their names: identifiers of elements of a COMPAS model, else
-    keys; ``graph``: its document if it is a graph of compas_assembly, else None.
-    """
-
-    names: Mapping[int, str]
-    graph: Any = None
+    names: Mapping[int, str]  # of bricks: identifiers of elements of a COMPAS model, else keys
+    graph: Any = None  # its document if it is a graph of compas_assembly
 
 
 def read_source(scene: Scene, path: Path) -> Source:
-    """Return the file from which a scene was imported, in any format that ``import`` knows.
-
-    Raises `FileError` if it cannot be read; `StepError` if it lacks a brick of the scene.
-    """
+    """Return the file from which a scene was imported, in any format that ``import`` knows."""
     content, graph = read_content(path), None
     keys = names = [block.key for block in content.blocks]
     if path.suffix.lower() == ".json":
@@ -54,10 +46,10 @@ def read_source(scene: Scene, path: Path) -> Source:
         if form in ("compas_dem", "compas_timber"):
             held = payload(document)
             held = payload(held["model"]) if "model" in held else held
-            rows = [*by_guid(f"{path}: element", held["elements"])]
-            if form == "compas_timber":  # its blocks are counted among its beams
-                rows = [(guid, item) for guid, item in rows if kind(item) == "beam"]
-            names = [rows[int(key)][0] for key in keys]
+            rows = by_guid(f"{path}: element", held["elements"])
+            beams = form == "compas_timber"  # its blocks are counted among its beams
+            guids = [guid for guid, item in rows if not beams or kind(item) == "beam"]
+            names = [guids[int(key)] for key in keys]
     found = dict(zip(block_numbers(keys), names, strict=True))
     lost = [brick.name for brick in scene.bricks if brick.name not in found]
     if lost:
@@ -69,54 +61,43 @@ _Document = dict[str, Any]
 
 
 def timber_plan(scene: Scene, steps: Sequence[Step], source: Source | None = None) -> str:
-    """Return a plan as a ``BuildingPlan`` of compas_timber.
-
-    ``source``: from which the scene was imported: elements are then named by its identifiers or
-    keys. Result: JSON. A step for every step of the plan: the elements that it places, and those
-    that robots hold meanwhile.
-    """
+    """Return a plan as a ``BuildingPlan`` of compas_timber, JSON, in names of the source if any."""
     names = source.names if source else {b.name: str(b.name) for b in scene.bricks}
     rows = []
     for row in step_states(scene, steps):
-        new = [brick for brick in scene.placed if brick.name in row.new]
-        rows.append(
-            {
-                "dtype": "compas_timber.planning/Step",
-                "data": {
-                    "location": _frame(new[0] if new else None),
-                    "geometry": "box",
-                    "priority": row.step.number - 1,
-                    "element_ids": [names[brick.name] for brick in new],
-                    "instructions": [],
-                    "is_built": False,
-                    "is_planned": True,
-                    "elements_held": sorted({names[brick] for _, brick in row.holds.values()}),
-                    "actor": "ROBOT",
-                },
-            }
-        )
-    whole = {"dtype": "compas_timber.planning/BuildingPlan", "data": {"steps": rows}}
-    return json.dumps(whole) + "\n"
+        frame = {"point": [0.0] * 3, "xaxis": [1.0, 0.0, 0.0], "yaxis": [0.0, 1.0, 0.0]}
+        if row.new:
+            brick = scene.placed[row.step.bricks - len(row.new)]
+            axes = zip(frame, (brick.position, brick.length_axis, brick.width_axis), strict=True)
+            frame = {name: list(axis) for name, axis in axes}
+        data = {
+            "location": frame,
+            "geometry": "box",
+            "priority": row.step.number - 1,
+            "element_ids": [names[name] for name in row.new],
+            "instructions": [],
+            "is_built": False,
+            "is_planned": True,
+            "elements_held": sorted({names[brick] for _, brick in row.holds.values()}),
+            "actor": "ROBOT",
+        }
+        rows.append(_typed("compas_timber.planning/Step", data))
+    return json.dumps(_typed("compas_timber.planning/BuildingPlan", {"steps": rows})) + "\n"
 
 
-def _frame(brick: Brick | None) -> _Document:
-    """Return the pose of a brick, or the world's."""
-    if brick is None:
-        return {"point": [0.0] * 3, "xaxis": [1.0, 0.0, 0.0], "yaxis": [0.0, 1.0, 0.0]}
-    axes = {"xaxis": list(brick.length_axis), "yaxis": list(brick.width_axis)}
-    return {"point": list(brick.position), **axes}
+def _typed(name: str, data: object) -> _Document:
+    """Return data as COMPAS stores a value of a type."""
+    return {"dtype": name, "data": data}
 
 
 def compas_assembly(scene: Scene, steps: Sequence[Step], source: Source | None = None) -> str:
-    """Return an assembly of compas_assembly with the plan as attributes.
+    """Return an assembly of compas_assembly with the plan as attributes, JSON.
 
-    ``source``: from which the scene was imported. An assembly stays as it is, with attributes
-    added; otherwise blocks and faces are those of the scene, and ``name`` what the source calls
-    them. Result: JSON. Every node of a block that is built has ``order``, its place in the build,
-    ``place_step`` and ``held``, a list of step, robot and node; the graph has ``plan``, a list of
-    steps.
+    A source that is an assembly stays as it is, with attributes added; otherwise blocks and faces
+    are those of the scene, and ``name`` what the source calls them. Every node of a block that is
+    built has ``order``, its place in the build, ``place_step`` and ``held``, a list of step, robot
+    and node; the graph has ``plan``, a list of steps.
     """
-    rows = [*step_states(scene, steps)]
     kept = None if source is None else source.graph
     whole = _assembly(scene) if kept is None else kept
     graph = assembly_graph(whole, "source")[0]
@@ -130,79 +111,60 @@ def compas_assembly(scene: Scene, steps: Sequence[Step], source: Source | None =
         nodes[brick.name].update(order=i, place_step=None, held=[])
         if source and kept is None:
             nodes[brick.name]["name"] = names[brick.name]
-    for row in rows:
+    plan = graph.setdefault("attributes", {})["plan"] = []
+    for row in step_states(scene, steps):
+        number, kind_of = row.step.number, row.step.kind.value
         for name in row.new:
-            nodes[name]["place_step"] = row.step.number
+            nodes[name]["place_step"] = number
         for robot, (node, name) in row.holds.items():
-            nodes[name]["held"].append([row.step.number, robot, node])
-    graph.setdefault("attributes", {})["plan"] = [_plain(row) for row in rows]
+            nodes[name]["held"].append([number, robot, node])
+        holds = {robot: list(held) for robot, held in row.holds.items()}
+        plan.append({"step": number, "type": kind_of, "placed": list(row.new), "holds": holds})
     return json.dumps(whole) + "\n"
-
-
-def _plain(row: StepStates) -> _Document:
-    holds = {robot: [node, brick] for robot, (node, brick) in row.holds.items()}
-    step = row.step
-    return {"step": step.number, "type": step.kind.value, "placed": list(row.new), "holds": holds}
 
 
 def _assembly(scene: Scene) -> _Document:
     """Return the blocks of a scene and the faces between them as an assembly.
 
-    Faces on the ground make a support of their own, a surface.
+    Faces on the ground make a support of their own, a surface: a block that is not closed.
     """
-    edges: dict[str, dict[str, Any]] = {str(brick.name): {} for brick in scene.bricks}
-    for joint in scene.joints:
-        a, b = map(str, joint.bricks)
-        if joint.corners is not None:
-            edge = edges[a].setdefault(b, {"interfaces": []})
-            edge["interfaces"].append(_interface(joint.corners))
     nodes: dict[str, _Document] = {
         str(brick.name): {"block": _block(*vertices_of(brick))} for brick in scene.bricks
     }
-    ground = max(brick.name for brick in scene.bricks) + 1
-    faces = [(end.brick, end.corners) for end in scene.grounds if end.corners is not None]
-    if faces:
-        nodes[str(ground)] = {"block": _sheet([face for _, face in faces]), "is_support": True}
-        edges[str(ground)] = {}
-        for name, corners in faces:
-            edge = edges[str(ground)].setdefault(str(name), {"interfaces": []})
-            edge["interfaces"].append(_interface(corners))
+    faces = [(joint.bricks, joint.corners) for joint in scene.joints]
+    most = max(brick.name for brick in scene.bricks)
+    stands = [end for end in scene.grounds if end.corners is not None]
+    if stands:
+        most += 1
+        polygons = [end.corners for end in stands if end.corners is not None]
+        ends = np.cumsum([0, *map(len, polygons)]).tolist()
+        sheet = _block(np.concatenate(polygons), [range(a, b) for a, b in pairwise(ends)])
+        nodes[str(most)] = {"block": sheet, "is_support": True}
+        faces += [((most, end.brick), end.corners) for end in stands]
+    edges: dict[str, dict[str, Any]] = {name: {} for name in nodes}
+    for (a, b), corners in faces:
+        if corners is not None:
+            edge = edges[str(a)].setdefault(str(b), {"interfaces": []})
+            points = {"points": [list(corner) for corner in corners]}
+            edge["interfaces"].append(_typed("compas_assembly.datastructures/Interface", points))
     graph = {
         "attributes": {"name": scene.name},
         "default_node_attributes": {"block": None, "is_support": False},
         "default_edge_attributes": {"interfaces": None},
         "node": nodes,
         "edge": edges,
-        "max_node": ground if faces else ground - 1,
+        "max_node": most,
     }
-    return {
-        "dtype": "compas_assembly.datastructures/Assembly",
-        "data": {
-            "attributes": {"name": scene.name},
-            "graph": {"dtype": "compas.datastructures/Graph", "data": graph},
-        },
+    data = {
+        "attributes": {"name": scene.name},
+        "graph": _typed("compas.datastructures/Graph", graph),
     }
+    return _typed("compas_assembly.datastructures/Assembly", data)
 
 
-def _interface(corners: Sequence[Sequence[float]]) -> _Document:
-    points = [list(corner) for corner in corners]
-    return {"dtype": "compas_assembly.datastructures/Interface", "data": {"points": points}}
-
-
-def _block(points: Floats, faces: Sequence[Sequence[int]]) -> _Document:
-    return {"dtype": "compas_assembly.datastructures/Block", "data": _mesh(points, faces)}
-
-
-def _sheet(polygons: Sequence[Sequence[Sequence[float]]]) -> _Document:
-    """Return polygons as a block that is not closed: the ground where bricks stand."""
-    ends = np.cumsum([0, *map(len, polygons)]).tolist()
-    faces = [list(range(a, b)) for a, b in pairwise(ends)]
-    return _block(np.concatenate([np.array(p) for p in polygons]), faces)
-
-
-def _mesh(points: Floats, faces: Sequence[Sequence[int]]) -> _Document:
+def _block(points: Floats, faces: Sequence[Iterable[int]]) -> _Document:
     rows = points.tolist()
-    return {
+    mesh = {
         "attributes": {},
         "default_vertex_attributes": {"x": 0.0, "y": 0.0, "z": 0.0},
         "default_edge_attributes": {},
@@ -214,3 +176,4 @@ def _mesh(points: Floats, faces: Sequence[Sequence[int]]) -> _Document:
         "max_vertex": len(rows) - 1,
         "max_face": len(faces) - 1,
     }
+    return _typed("compas_assembly.datastructures/Block", mesh)

@@ -31,23 +31,16 @@ class BlockState(Enum):
 
 @dataclass(frozen=True)
 class StepStates:
-    """A step by its blocks.
-
-    ``new``: names of the bricks that this step places; ``holds`` (int, int): node and brick that
-    robots hold, by the robots' names; ``states``: by the names of all bricks of the scene, in build
-    order.
-    """
+    """A step by its blocks."""
 
     step: Step
-    new: tuple[int, ...]
-    holds: dict[str, tuple[int, int]]
-    states: dict[int, BlockState]
+    new: tuple[int, ...]  # names of the bricks that this step places
+    holds: dict[str, tuple[int, int]]  # node and brick, by the robots' names
+    states: dict[int, BlockState]  # of all bricks by name, in build order
 
 
 def step_states(scene: Scene, steps: Sequence[Step]) -> Iterator[StepStates]:
-    """Yield what becomes of every block in every step.
-
-    ``steps``: checked, of a plan for the scene.
+    """Yield what becomes of every block in every step of a checked plan for the scene.
 
     Examples
     --------
@@ -66,38 +59,31 @@ def step_states(scene: Scene, steps: Sequence[Step]) -> Iterator[StepStates]:
             for robot, node in zip(scene.robots, step.grips, strict=True)
             if node is not None
         }
-        held = {brick for _, brick in holds.values()}
-        states = {
-            name: BlockState.ABSENT
-            if i >= step.bricks
-            else BlockState.HELD
-            if name in held
-            else BlockState.PLACED
-            for i, name in enumerate(names)
-        }
+        states = dict.fromkeys(names, BlockState.ABSENT)
+        states |= dict.fromkeys(names[: step.bricks], BlockState.PLACED)
+        states |= {brick: BlockState.HELD for _, brick in holds.values()}
         yield StepStates(step, tuple(names[before : step.bricks]), holds, states)
         before = step.bricks
 
 
-FORMAT, VERSION = "seqopt-plan", 1
+_FORMAT, _VERSION = "seqopt-plan", 1
 
 
 def plan_csv(scene: Scene, steps: Sequence[Step]) -> str:
-    """Return a plan as CSV.
+    """Return a plan as CSV, a row per step.
 
-    Result: a row per step: ``step``, ``type``, the ``placed`` bricks, what every robot holds as
-    ``NAME_node`` and ``NAME_brick``, and a column ``block_N`` for every brick in build order.
+    Its columns are ``step``, ``type``, ``bricks``, the ``placed`` bricks, what every robot holds as
+    ``NAME_node`` and ``NAME_brick``, and ``block_N`` for every brick in build order.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     robots = [robot.name for robot in scene.robots]
-    grips = [f"{name}_{what}" for name in robots for what in ("node", "brick")]
+    grips = [harmless(f"{name}_{what}") for name in robots for what in ("node", "brick")]
     blocks = [f"block_{brick.name}" for brick in scene.placed]
-    writer.writerow(["step", "type", "bricks", "placed", *map(harmless, grips), *blocks])
+    writer.writerow(["step", "type", "bricks", "placed", *grips, *blocks])
     for row in step_states(scene, steps):
         held = [cell for name in robots for cell in row.holds.get(name, ("", ""))]
-        placed = " ".join(map(str, row.new))
-        step = row.step
+        step, placed = row.step, " ".join(map(str, row.new))
         states = [state.value for state in row.states.values()]
         writer.writerow([step.number, step.kind.value, step.bricks, placed, *held, *states])
     return out.getvalue()
@@ -106,7 +92,7 @@ def plan_csv(scene: Scene, steps: Sequence[Step]) -> str:
 def plan_json(scene: Scene, steps: Sequence[Step]) -> str:
     """Return a plan as JSON.
 
-    Result: ``blocks``, the names of all bricks in build order; and ``steps``, each with its
+    It has ``blocks``, the names of all bricks in build order; and ``steps``, each with its
     ``type``, the bricks that are ``placed``, what robots hold as ``holds``, and the ``states`` of
     all blocks in their order.
     """
@@ -123,8 +109,8 @@ def plan_json(scene: Scene, steps: Sequence[Step]) -> str:
         for row in step_states(scene, steps)
     ]
     whole = {
-        "format": FORMAT,
-        "version": VERSION,
+        "format": _FORMAT,
+        "version": _VERSION,
         "scene": scene.name,
         "blocks": [brick.name for brick in scene.placed],
         "robots": [robot.name for robot in scene.robots],
@@ -134,15 +120,11 @@ def plan_json(scene: Scene, steps: Sequence[Step]) -> str:
 
 
 def parse_plan_json(scene: Scene, text: str) -> tuple[Step, ...]:
-    """Return the checked steps of a plan that `plan_json` wrote.
-
-    ``scene``: in which every step must be possible. Raises `StepError` if it is no such plan, or of
-    other blocks or robots, or a step is impossible.
-    """
+    """Return the checked steps of a plan that `plan_json` wrote."""
     try:
         whole = json.loads(text)
-        if (whole["format"], whole["version"]) != (FORMAT, VERSION):
-            raise StepError(f"plan: format is {short(whole['format'])}; give a {FORMAT}")
+        if (whole["format"], whole["version"]) != (_FORMAT, _VERSION):
+            raise StepError(f"plan: format is {short(whole['format'])}; give a {_FORMAT}")
         if whole["blocks"] != [brick.name for brick in scene.placed]:
             raise StepError(f"plan: its blocks are not those of scene {scene.name}")
         robots = [robot.name for robot in scene.robots]
@@ -154,18 +136,15 @@ def parse_plan_json(scene: Scene, text: str) -> tuple[Step, ...]:
             count += len(row["placed"])
             grips = tuple(row["holds"].get(name, {}).get("node") for name in robots)
             steps.append(Step(i, StepKind(row["type"]), count, grips))
+    except StepError:
+        raise
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        if isinstance(error, StepError):
-            raise
-        raise StepError(f"plan: no {FORMAT} document: {short(error, 80)}") from error
+        raise StepError(f"plan: no {_FORMAT} document: {short(error, 80)}") from error
     return check_sequence(scene, steps)
 
 
 def sequencer_json(scene: Scene, steps: Sequence[Step]) -> str:
-    """Return a plan as an ``assembly_sequence``.
-
-    Result: JSON; which robot holds, and where, it does not say.
-    """
+    """Return a plan as an ``assembly_sequence``; which robot holds, and where, it does not say."""
     rows = [
         {
             "installPartIDs": list(row.new),

@@ -29,13 +29,10 @@ EXPORTS = (*_PLAIN, *_WITH_SOURCE)
 def export_plan(
     scene: Scene, steps: Sequence[Step], form: str, source: str | Path | None = None
 ) -> str:
-    """Return a plan in the format of another program.
+    """Return a plan for a scene in the format of another program, one of `EXPORTS`.
 
-    ``steps``: of a plan for the scene; ``form``: one of `EXPORTS`; ``source``: the file from which
-    the scene was imported, of any format, for formats of COMPAS: the plan then names its elements,
-    or is written into it if it is an assembly. Raises `StepError` if there is no such format, or
-    the source is not of this scene; `FileError` if the source cannot be read; `SceneError` if the
-    source is no file of a known format.
+    ``source`` is the file from which the scene was imported, of any format, for formats of COMPAS:
+    the plan then names its elements, or is written into it if it is an assembly.
 
     Examples
     --------
@@ -47,20 +44,16 @@ def export_plan(
     """
     if form not in EXPORTS:
         raise StepError(f"format is {short(form)}; give one of {', '.join(EXPORTS)}")
-    if form in _PLAIN and source is not None:
+    if form in _WITH_SOURCE:
+        read = None if source is None else read_source(scene, Path(source))
+        return _WITH_SOURCE[form](scene, steps, read)
+    if source is not None:
         raise StepError(f"format {form} takes no source; leave it out")
-    if form in _PLAIN:
-        return _PLAIN[form](scene, steps)
-    read = None if source is None else read_source(scene, Path(source))
-    return _WITH_SOURCE[form](scene, steps, read)
+    return _PLAIN[form](scene, steps)
 
 
 def read_folder(folder: Path) -> tuple[Scene, tuple[Step, ...]]:
-    """Return the scene and the steps of a plan's folder.
-
-    ``folder``: as ``seqopt optimize`` writes it, with ``scene.json`` and ``plan.csv``. Raises
-    `FileError` if a file is missing; `SceneError`, `StepError` if one is wrong.
-    """
+    """Return the scene and the steps of a plan's folder, as ``seqopt optimize`` writes it."""
     for name in ("scene.json", "plan.csv"):
         if not (folder / name).is_file():
             raise FileError(f"{folder}: it has no {name}; give a folder of seqopt optimize --out")
