@@ -81,7 +81,7 @@ class Aim(Enum):
     SUM = "sum"
     PEAK = "peak"
 
-    def worth(self, costs: Costs, choice: Sequence[int]) -> float:
+    def value_of(self, costs: Costs, choice: Sequence[int]) -> float:
         """Return the value of a choice: its total, or its largest cost."""
         return costs.cost(choice) if self is Aim.SUM else costs.worst(choice)
 

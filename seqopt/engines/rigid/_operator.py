@@ -95,7 +95,7 @@ class ComplianceOperator(FrozenValue):
     def worst_doubt(self) -> float:
         """Most that a grip's force can be in doubt where pivots are one, over the loads at grips.
 
-        As `_doubts` of `seqopt.engines.rigid._grip_equations`: the forces undo the displacements, so
+        As `_doubts` of `seqopt.engines.rigid._grip_equations`: forces undo the displacements, so
         these are no more in doubt than what the forces add up to.
         """
         most = np.abs(self.flexibility.diagonal()).max(initial=0.0)
