@@ -135,7 +135,8 @@ def maxima(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
         axes.axvspan(0.95, 1.05, color="0.93")
         axes.axvline(1, color="k", lw=0.6)
         for some, color, marker in ((~far, OURS, "o"), (far, OFF, "D")):
-            axes.scatter(ratio[some], np.flatnonzero(some), 26, color, marker=marker, zorder=3)
+            at = np.flatnonzero(some)
+            axes.scatter(ratio[some], at, 26, [color] * len(at), marker=marker, zorder=3)
         texts = [
             f"{row['quantity'].removeprefix('largest ')}, {row['at']}: "
             f"printed {row['printed']:g}, here {row['ours']:.1f}"
