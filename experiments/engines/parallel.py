@@ -111,15 +111,15 @@ def measured(name: str, rounds: int, *, single: bool) -> pd.DataFrame:
     runs: dict[str, list[Run]] = {}
     sent: dict[str, float] = {}
 
-    def take_turns(ways: Mapping[str, Resources]) -> None:
+    def _take_turns(ways: Mapping[str, Resources]) -> None:
         for _ in range(rounds):
             for way, resources in ways.items():
                 runs.setdefault(way, []).append(run(network, schedule, resources))
         sent.update({way: overhead(resources) for way, resources in ways.items()})
 
-    take_turns(HERE)
+    _take_turns(HERE)
     with cluster() as ways:
-        take_turns(ways)
+        _take_turns(ways)
     alone = runs["one process"]
     rows = []
     for way, mine in runs.items():

@@ -32,7 +32,7 @@ DIGITS = 9  # after the first
 EDGE = 1e-9  # of a rounding step: how far above a multiple a value still counts as it
 
 
-class StateFront:
+class _StateFront:
     """The schedule of a problem whose goals are all to be small at once.
 
     ``problem``: its goals are responses, margins of stability, and of a free schedule steps and
@@ -52,9 +52,9 @@ class StateFront:
     def __repr__(self) -> str:
         return f"<StateFront of {self._problem}>"
 
-    def anew(self) -> StateFront:
+    def anew(self) -> _StateFront:
         """Return the same problem with nothing known of it, for its judge."""
-        return StateFront(replace(self._problem), self._rounding)
+        return _StateFront(replace(self._problem), self._rounding)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -323,7 +323,7 @@ def find_front(
     start = time.perf_counter()
     formulation = as_formulation(formulation, On.FRONTS)
     if isinstance(problem, Problem):
-        problem = StateFront(states_of(problem), rounding)
+        problem = _StateFront(states_of(problem), rounding)
     twin, name = problem.anew(), formulation.name  # which no formulation can reach
     solve = partial(formulation.solve, problem, seconds=seconds, progress=progress)
     found = _found(name, (problem, twin), solve)

@@ -49,7 +49,7 @@ def find_robots(scene: Scene, names: Sequence[str], method: str, roles: int) -> 
     return [known.index(name) for name in names]
 
 
-def take_turns(
+def _take_turns(
     network: Network, swap_after: Set[int], robots: Sequence[int], starts: Sequence[_Pair] = ()
 ) -> list[_Pair]:
     """Return who places every brick and who holds meanwhile, two robots at a time.
@@ -314,7 +314,7 @@ def alternate(
     pairs: Sequence[_Pair],
     grip: Callable[[int, int], _Grip],
 ) -> Iterator[tuple[StepKind, int, tuple[_Grip | None, ...]]]:
-    """Yield the steps in which two robots place and hold, as `take_turns` says who does.
+    """Yield the steps in which two robots place and hold, as `_take_turns` says who does.
 
     After each brick one of the two releases, if it holds anything; after the last one both do.
     ``grip`` says what a robot, by its index, holds of the brick that it places, by the brick count.
@@ -337,7 +337,7 @@ def find_turns(
 ) -> list[_Pair]:
     """Return who places and who holds in a method of two robots that may be named."""
     chosen = find_robots(network.scene, robots, method, 2)
-    return take_turns(network, swap_after, chosen, [(chosen[0], chosen[1])] if robots else [])
+    return _take_turns(network, swap_after, chosen, [(chosen[0], chosen[1])] if robots else [])
 
 
 def _two_robots(

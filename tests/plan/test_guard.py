@@ -15,7 +15,7 @@ from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.graph.states.states import build_states
 from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.front import FrontSelection, StateFront, find_front
+from seqopt.plan.front import FrontSelection, _StateFront, find_front
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import parse_goals
@@ -38,13 +38,13 @@ def order(**words):
 
 
 def front(**words):
-    return StateFront(free(**words))
+    return _StateFront(free(**words))
 
 
 def loop(limits=()):
     engine = free().engine
     schedule = seqopt.three_robot_loop(engine.network)
-    return StateFront(build_states(engine, schedule, ONES, "F_largest,M_sup", limits))
+    return _StateFront(build_states(engine, schedule, ONES, "F_largest,M_sup", limits))
 
 
 KINDS = {

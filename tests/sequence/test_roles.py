@@ -18,7 +18,7 @@ from seqopt.sequence.three_robots import (
     robot_loop,
     three_robot_loop,
 )
-from seqopt.sequence.two_robots import METHODS, cast, sequential, take_turns
+from seqopt.sequence.two_robots import METHODS, _take_turns, cast, sequential
 from tests.builders import anywhere, from_both_ends, small_arch
 
 
@@ -179,4 +179,4 @@ def test_turns_change_as_seldom_as_can_be():
     scene = small_arch(6)
     net = with_robots(scene, near(scene, "low", 1, 2, 3), *anywhere(2))
     every = set(scene.build_order)
-    assert take_turns(net, every, [0, 1, 2]) == [(1, 2), (2, 1)] * 3
+    assert _take_turns(net, every, [0, 1, 2]) == [(1, 2), (2, 1)] * 3
