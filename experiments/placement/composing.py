@@ -79,7 +79,7 @@ REFUSED = {
     (OWN, FREE, ORDERS): [
         *("overlap_dp", "rank_search")  # they need moves with candidates
     ],
-    (ORDERS,): [*("friction", "a budget", "Pareto")],
+    (ORDERS,): ["friction", "Pareto"],
 }
 
 

@@ -29,7 +29,7 @@ from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
 from seqopt.graph.states._visits import FreeStates, ScenarioSums, explore
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.calling.formulation import Watch
+from seqopt.plan.calling.formulation import Watch, find_formulation
 from seqopt.plan.search._margin_search import best_margin
 from seqopt.scene.scene import Order
 from seqopt.work._workers import free_memory
@@ -57,16 +57,17 @@ def best_order(
     peak, those below that of the scene's own order.
     """
     space, order = OrderStates(problem, MOST_PARTS), problem.scene.build_order
-    found, own = Explorer(space, width, tell), np.inf
+    found = Explorer(space, width, tell)
     try:
-        totals = problem.states.totals
-        if width is None and not totals and problem.allows(order):
-            own = order_value(problem, Trial(order, np.inf))
+        states = problem.states
+        own = np.inf if width or states.totals or states.budgets else _own_value(problem)
         found.rise(own if space.peaks[0] else np.inf)
         if not found.whole:
             raise InfeasibleError("no order of the bricks has a plan")
-        if totals:
+        if states.totals:
             return _order_of_total(found, problem, choose, watch)
+        if states.budgets:
+            return _order_within(found, problem, len(space.parts) - 1)
         found.refine()
         visited = found.graph()
         path, bounds, early = choose(_on_paths(visited.graph), watch)
@@ -86,8 +87,23 @@ def best_order(
     return OrderSelection(order, value, bound, len(space.parts) - 1, stopped)
 
 
+def _own_value(problem: AllOrders) -> float:
+    """Return the value of the scene's own order; infinite if it is none of those asked for."""
+    own = problem.scene.build_order
+    return order_value(problem, Trial(own, np.inf)) if problem.allows(own) else np.inf
+
+
 def _order_of(visited: Visited, path: Sequence[int]) -> Order:
     return tuple(dict.fromkeys(part[1] for _, part, _ in visited.of(path)))
+
+
+def _order_within(found: Explorer, problem: AllOrders, evaluated: int) -> OrderSelection:
+    """Return the order of a path within budgets that is good in the first goal."""
+    visited, best = exact_best(found, problem.states.budgets)
+    order = _order_of(visited, best.path)
+    plan = find_formulation("schedule_search").solve(problem.at(order))
+    value, bound = plan.objective[0], best.bounds[0] if isinstance(best, Within) else -np.inf
+    return OrderSelection(order, value, min(bound, value), evaluated)
 
 
 def _order_of_total(

@@ -49,11 +49,6 @@ class AllOrders(Shown):
                 f"aim {goal}: an order is not chosen by a margin; name minmax, a response, sum, "
                 "steps, regrips or travel first"
             )
-        if self.states.budgets:
-            raise ProblemError(
-                f"budget {self.states.goals[-1]}: an order is chosen by its first aim alone; leave "
-                "it out, or give an order"
-            )
         if recipe_of(self.states.engine) is None:
             raise ProblemError(
                 f"engine {type(self.states.engine).__name__}: orders need engines of their own; "
@@ -103,7 +98,8 @@ class AllOrders(Shown):
     def judging(self, order: Order) -> States:
         """Return the free schedule of one order with the goal that orders are judged by alone."""
         alone = self.states.resources.alone()  # orders are shared out, not their grip sets
-        return replace(self.at(order), goals=self.states.goals[:1], resources=alone)
+        goals = self.states.goals[:1]
+        return replace(self.at(order), goals=goals, budgets=(), resources=alone)
 
     def at(self, order: Order) -> States:
         """Return the free schedule of one order."""
@@ -214,7 +210,7 @@ class OrderStates:
         """Whether the worst step counts, or what all steps take."""
         if self.problem.states.totals:
             return (False,) * len(self.problem.states.scenarios)
-        return (self.problem.states.goals[0].measure is Measure.PEAK,)
+        return tuple(goal.measure is Measure.PEAK for goal in self._asked.goals)
 
     def start(self) -> tuple[Key, Ints]:
         """Return the empty site."""
@@ -248,11 +244,13 @@ class OrderStates:
 
     def amounts(self, values: Floats, taken: Floats) -> Floats:
         """Return what the first goal takes of moves, (m, 1)."""
-        return values if self.problem.states.totals else move_amounts(self._first, values, taken)
+        return values if self.problem.states.totals else move_amounts(self._asked, values, taken)
 
     @cached_property
-    def _first(self) -> States:
-        return replace(self.problem.states, goals=self.problem.states.goals[:1])
+    def _asked(self) -> States:
+        """What counts: the first goal, or all where there are budgets."""
+        states = self.problem.states
+        return states if states.budgets else replace(states, goals=states.goals[:1])
 
     def ended(self, part: Key, states: Ints) -> Bools:
         """Return which states end the build."""
@@ -267,7 +265,9 @@ class OrderStates:
             first = [name for name in own if name in part[0] and name != part[1]]
             rest = [name for name in own if name not in part[0]]
             newest = (part[1],) if part[0] else ()
-            problem = self.problem.judging((*first, *newest, *rest))
+            order = (*first, *newest, *rest)
+            asked = self.problem.at if self.problem.states.budgets else self.problem.judging
+            problem = asked(order)
             kind = ScenarioSums if problem.totals else FreeStates
             self.parts[part] = kind(problem, standing=bool(problem.demands))
         return self.parts[part]

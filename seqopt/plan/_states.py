@@ -148,7 +148,7 @@ def _selected_order(
         said = called(found.name, lambda: (_judged_orders(asked), problem), OrderSelection, solve)
     except InfeasibleError as error:
         some = finds_better_order(problem, np.inf, end=end)
-        if some:
+        if some and not problem.states.budgets:  # whether they are within these is not asked
             raise SolverError(
                 f"formulation {found.name} says that no order has a plan, and some have"
             ) from None
@@ -173,7 +173,7 @@ def _proven(name: str, problem: AllOrders, selection: OrderSelection, end: float
         weighed = replace(problem, states=states)
         return finds_better_order(weighed, bound, end=end) is False
     better = finds_better_order(problem, bound, end=end)
-    if better:
+    if better and not problem.states.budgets:  # of plans without these
         raise SolverError(
             f"{name}: {selection.bound:.9g} is promised as a bound on all orders; one has a plan "
             "with less"
