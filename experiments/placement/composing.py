@@ -1,7 +1,7 @@
 """Claim: every schedule goes with every aim, limit, formulation and means, or one line says why.
 
-What is refused has its reason in the problem: ranks and costs of moves need candidates, and an
-order is chosen by its first aim alone.
+What is refused has its reason in the problem: ranks and costs of moves need candidates, and a
+Pareto set compares plans of one order.
 
 Method: the command line is run for every pair of a schedule and something that goes with it, on an
 arch of seven bricks. Either a plan ends in a value, which is stored, or
@@ -79,7 +79,7 @@ REFUSED = {
     (OWN, FREE, ORDERS): [
         *("overlap_dp", "rank_search")  # they need moves with candidates
     ],
-    (ORDERS,): ["friction", "Pareto"],
+    (ORDERS,): ["Pareto"],
 }
 
 

@@ -25,12 +25,13 @@ from seqopt.graph.orders import (
     Trial,
     order_value,
 )
-from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
+from seqopt.graph.paths import Best, distances, fewest_moves, lexicographic, reached, tied
 from seqopt.graph.states._visits import FreeStates, ScenarioSums, explore
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import Watch, find_formulation
-from seqopt.plan.search._margin_search import best_margin
+from seqopt.plan.search._margin_search import best_margin, bisected, with_margin
+from seqopt.problem.problem import Goal, Measure
 from seqopt.scene.scene import Order
 from seqopt.work._workers import free_memory
 from seqopt.work.progress import Stage, Tell
@@ -56,21 +57,10 @@ def best_order(
     ``width``: how many new states of a set of bricks are kept; by default, if the first goal is a
     peak, those below that of the scene's own order.
     """
-    space, order = OrderStates(problem, MOST_PARTS), problem.scene.build_order
-    found = Explorer(space, width, tell)
     try:
-        states = problem.states
-        own = np.inf if width or states.totals or states.budgets else _own_value(problem)
-        found.rise(own if space.peaks[0] else np.inf)
-        if not found.whole:
-            raise InfeasibleError("no order of the bricks has a plan")
-        if states.totals:
-            return _order_of_total(found, problem, choose, watch)
-        if states.budgets:
-            return _order_within(found, problem, len(space.parts) - 1)
-        found.refine()
-        visited = found.graph()
-        path, bounds, early = choose(_on_paths(visited.graph), watch)
+        if problem.states.goals[0].of_margins:
+            return _order_of_margin(problem, tell)
+        return _order_of_path(problem, choose, watch, tell, width)
     except TooManySetsError:
         raise ProblemError(
             f"scene {problem.scene.name}: its orders have more than {MOST_PARTS} sets of bricks; "
@@ -78,6 +68,26 @@ def best_order(
         ) from None
     except StopError as stop:
         raise _too_little(stop) from None
+
+
+def _order_of_path(
+    problem: AllOrders, choose: _Choose, watch: Watch, tell: Watching, width: int | None
+) -> OrderSelection:
+    """Return the order of a path that is chosen by a first goal that is no margin."""
+    states, order = problem.states, problem.scene.build_order
+    space = OrderStates(problem, MOST_PARTS)
+    found = Explorer(space, width, tell)
+    own = np.inf if width or states.totals or states.budgets else _own_value(problem)
+    found.rise(own if space.peaks[0] else np.inf)
+    if not found.whole:
+        raise InfeasibleError("no order of the bricks has a plan")
+    if states.totals:
+        return _order_of_total(found, problem, choose, watch)
+    if states.budgets:
+        return _order_within(found, problem, len(space.parts) - 1)
+    found.refine()
+    visited = found.graph()
+    path, bounds, early = choose(_on_paths(visited.graph), watch)
     value, stopped = own, "time" * early
     if path and path_values(visited.graph, path)[0] < own:
         value, order = path_values(visited.graph, path)[0], _order_of(visited, path)
@@ -95,6 +105,23 @@ def _own_value(problem: AllOrders) -> float:
 
 def _order_of(visited: Visited, path: Sequence[int]) -> Order:
     return tuple(dict.fromkeys(part[1] for _, part, _ in visited.of(path)))
+
+
+def _order_of_margin(problem: AllOrders, tell: Watching) -> OrderSelection:
+    """Return the order with the best margin of stability, by halving an interval."""
+    name, states = problem.states.goals[0].response, problem.states
+
+    def demanding(value: float) -> Explorer:
+        asked = replace(with_margin(states, name, value), goals=(Goal(Measure.STEPS),), budgets=())
+        found = Explorer(OrderStates(replace(problem, states=asked), MOST_PARTS), tell=tell)
+        found.rise()
+        return found
+
+    low, high = bisected(name, lambda value: demanding(value).whole)
+    visited = demanding(high).graph()
+    order = _order_of(visited, fewest_moves(visited.graph))
+    value = find_formulation("schedule_search").solve(problem.at(order)).objective[0]
+    return OrderSelection(order, value, min(low, value), 0)
 
 
 def _order_within(found: Explorer, problem: AllOrders, evaluated: int) -> OrderSelection:

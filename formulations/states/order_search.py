@@ -123,7 +123,8 @@ def solve(
     if most < 0 or tries < 0:
         raise ProblemError(f"options most={most}, tries={tries}: give whole numbers from 0 on")
     search = _Search(problem, Watch(seconds), resources)
-    if problem.states.totals or problem.states.budgets:
+    states = problem.states
+    if states.totals or states.budgets or states.goals[0].of_margins:
         return best_order(problem, shortest, search.watch, search.tell_bricks)
     try:
         why = _run(search, most, tries, np.random.default_rng(seed))

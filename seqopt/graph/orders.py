@@ -34,8 +34,8 @@ class AllOrders(Shown):
     The value of an order is the first goal of its best plan; the criterion keeps the numbers that
     it has in the scene's own order.
 
-    ``states``: in the scene's own order; their first goal is no margin. Raises `ProblemError` if it
-    is one, the engine was not made by name, or there are no such orders.
+    ``states``: in the scene's own order. Raises `ProblemError` if the engine was not made by name,
+    or there are no such orders.
     """
 
     states: States
@@ -43,12 +43,6 @@ class AllOrders(Shown):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "among", Orders.of(self.among))
-        goal = self.states.goals[0]
-        if goal.of_margins:
-            raise ProblemError(
-                f"aim {goal}: an order is not chosen by a margin; name minmax, a response, sum, "
-                "steps, regrips or travel first"
-            )
         if recipe_of(self.states.engine) is None:
             raise ProblemError(
                 f"engine {type(self.states.engine).__name__}: orders need engines of their own; "

@@ -248,7 +248,6 @@ def test_the_best_order_is_written_with_its_scene(capsys, tmp_path, arch):
         (["--schedule", "loop"], "orders, and steps or regrips in a Pareto set, go with the free"),
         (["--schedule", "free", "--formulation", "minimax"], "or order_search"),
         (["--schedule", "free", "--max-memory", "2GB"], "--max-memory: the search of orders has"),
-        (["--schedule", "free", "--aim", "tilt"], "an order is not chosen by a margin"),
         (["--schedule", "free", "--option", "depth=3"], "depth"),
     ],
 )

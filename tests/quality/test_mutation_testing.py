@@ -124,10 +124,10 @@ from tests.quality.mutants import path_of
 preload()
 module, tests = "seqopt.problem.criteria", ["tests/problem/test_criteria.py"]
 text = path_of(module).read_text(encoding="utf-8")
-line = "    flat = values.ravel()\\n"
+line = "    place = np.arange(values.shape[1])\\n"
 assert line in text
 print(trial(module, text, tests, 60))
-for new in ("raise RuntimeError", "values = -values; flat = values.ravel()",
+for new in ("raise RuntimeError", "place = -np.arange(values.shape[1])",
             "while True: pass", "__import__('os').abort()"):
     print(trial(module, text.replace(line, f"    {new}\\n"), tests, 5))
 print(trial(module, text + "\\nraise RuntimeError\\n", tests, 60))

@@ -25,6 +25,7 @@ from seqopt.network.build import build_network
 from seqopt.plan.judge._proof import BELOW, Asked, Passable, Tables, ask
 from seqopt.plan.judge._rule_moves import Follows, RuleTables
 from seqopt.problem.problem import Measure
+from seqopt.problem.standing import slack
 from seqopt.scene.scene import Order
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence._rule_space import node_numbers
@@ -44,10 +45,15 @@ def finds_better_order(
     looked at; ``end``: until when, as of `time.perf_counter`. Result: None where it is not known,
     because there are more sets or time is over.
     """
-    peak = problem.states.goals[0].measure is Measure.PEAK
-    if peak and _of_the_whole(problem) >= value:
+    goal = problem.states.goals[0]
+    peak = goal.measure is Measure.PEAK
+    if goal.of_margins:
+        value = max(0.0, value - slack(goal.response, value)) if np.isfinite(value) else value
+        if value == 0:
+            return False
+    elif peak and _of_the_whole(problem) >= value:
         return False
-    if np.isfinite(value):
+    elif np.isfinite(value):
         value -= 4 * BELOW * abs(value)  # further below than what is tied with it
     least = _least_of_all(problem, value if peak else np.inf, most, end)
     return None if least is None else least < value
@@ -123,6 +129,8 @@ def _closed(problem: AllOrders, key: Key, parts: list[_Entries], below: float) -
     """Return the states with a set of bricks that are reached, below a value of a worst step."""
     passable = Passable(problem.judging(_order(problem, key)))
     tables, asked = passable.tables, Asked((below,), () if problem.states.demands else None)
+    if passable.margins:
+        asked = Asked((), (below,) if np.isfinite(below) else ())
     start = tables.start()
     if not key[0]:
         parts = [_Entries(start, np.zeros(1), np.zeros(1))]
