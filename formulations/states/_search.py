@@ -64,9 +64,14 @@ def best_order(
     except TooManySetsError:
         raise ProblemError(
             f"scene {problem.scene.name}: its orders have more than {MOST_PARTS} sets of bricks; "
-            "take order_search, or give an order"
+            "give an order, or take order_search and no margin, budget or total of scenarios"
         ) from None
     except StopError as stop:
+        if str(stop) == "memory":
+            raise ProblemError(
+                f"scene {problem.scene.name}: the states of all orders do not fit the memory; "
+                "give an order"
+            ) from None
         raise _too_little(stop) from None
 
 
@@ -226,7 +231,7 @@ def path_values(graph: Graph, path: Sequence[int]) -> tuple[float, ...]:
 
 
 def watched(problem: States, watch: Watch, most: float, progress: Tell) -> Watching:
-    """Return what is told every level: it says how far it is, and ends the search in time."""
+    """Return what is told part by part: it says how far it is, and ends the search in time."""
 
     def tell(found: Explorer) -> None:
         share = found.level / problem.space.levels
@@ -272,7 +277,9 @@ def after_margins(problem: States, search: Search, tell: Watching) -> StatePath:
     after = after_margins(rest, search, tell)
     if len(problem.goals) == 1:  # what was chosen after it was nobody's wish
         after = replace(after, objective=(), bound=())
-    return replace(after, objective=(value, *after.objective), bound=(bound, *after.bound))
+    prices = ((0.0,) * len(problem.budgets), *after.prices) if problem.budgets else ()
+    objective, bounds = (value, *after.objective), (bound, *after.bound)
+    return replace(after, objective=objective, bound=bounds, prices=prices)
 
 
 def narrow(

@@ -57,14 +57,13 @@ class _OnGraph(Terse):
         Raises a `ProblemError` if there are budgets.
         """
         watch, told = Watch(seconds), resources.progress or progress
+        states = problem.states if isinstance(problem, AllOrders) else problem
+        if states.budgets:
+            able = "schedule_search or path_beam" if problem is states else "order_search"
+            raise ProblemError(f"formulation {self.name}: it takes no budgets; take {able}")
+        tell = watched(states, watch, max_memory, told)
         if isinstance(problem, AllOrders):
-            asked = watched(problem.states, watch, max_memory, told)
-            return best_order(problem, self.choose, watch, asked)
-        if problem.budgets:
-            raise ProblemError(
-                f"formulation {self.name}: it takes no budgets; take schedule_search or path_beam"
-            )
-        tell = watched(problem, watch, max_memory, told)
+            return best_order(problem, self.choose, watch, tell)
         if problem.totals:
             return best_total(problem, self.choose, watch, tell)
         return after_margins(problem, lambda rest: chosen(rest, self.choose, watch, tell), tell)

@@ -29,7 +29,7 @@ from itertools import islice
 
 import numpy as np
 
-from formulations.states._search import StopError, best_order, exact_best, shortest
+from formulations.states._search import StopError, best_order, exact_best, shortest, watched
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.orders import (
@@ -125,7 +125,8 @@ def solve(
     search = _Search(problem, Watch(seconds), resources)
     states = problem.states
     if states.totals or states.budgets or states.goals[0].of_margins:
-        return best_order(problem, shortest, search.watch, search.tell_bricks)
+        tell = watched(states, search.watch, np.inf, resources.progress or (lambda _: None))
+        return best_order(problem, shortest, search.watch, tell)
     try:
         why = _run(search, most, tries, np.random.default_rng(seed))
     except StopError:

@@ -239,7 +239,7 @@ class Explorer:
         From how many new states of a level, those of least value, the search goes on, within parts
         only by moves that take nothing; from all by default.
     tell : callable, optional
-        Called after every level on which states were visited; may raise to end the search.
+        Called after every part of which states were visited; may raise to end the search.
     enough : float, optional
         Where there is a width, states of no larger value are as good as each other: some of them.
 
@@ -285,13 +285,12 @@ class Explorer:
         self.threshold = max(self.threshold, threshold)
         self.passes += 1
         for level, parts in enumerate(self._parts):
-            self.level, visited = level, 0
+            self.level = level
             for key, part in list(parts.items()):
                 fresh = self._visit(level, key, part)
                 self._go_on(level, key, part, fresh)
-                visited += len(fresh)
-            if visited:
-                self._tell(self)
+                if len(fresh):
+                    self._tell(self)
         return self.whole
 
     @property

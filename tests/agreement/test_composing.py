@@ -181,7 +181,7 @@ def best_of(plans, aims, caps):
 
 
 @given(data=st.data())
-@settings(max_examples=15)
+@settings(max_examples=20)
 @pytest.mark.parametrize("name", ["free", "three-robot", "modified-sequential", "own"])
 def test_everything_goes_with_everything(name, data):
     def pick(*some):

@@ -93,7 +93,7 @@ SYMMETRIC = with_robots(from_both_sides(2, "VL"), 2)  # its peaks are equal but 
 
 @given(build=free_builds(most_bricks=4, most_robots=3))
 @example(build=(SYMMETRIC, FreeRules(least_grips=0, newest="free")))
-@settings(max_examples=5)
+@settings(max_examples=8)
 def test_all_agree_with_brute_force_under_any_rules(build):
     engine, rules = ComplianceEngine(build_network(build[0])), build[1]
     for aim in ("minmax,steps", "regrips,sum"):

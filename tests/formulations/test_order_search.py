@@ -111,7 +111,7 @@ def test_formulations_of_states_find_the_best_order_too(name, aim):
 
 def test_orders_of_too_many_sets_are_left_to_the_search(monkeypatch):
     monkeypatch.setattr("formulations.states._search.MOST_PARTS", 2)
-    with pytest.raises(ProblemError, match="more than 2 sets of bricks; take order_search"):
+    with pytest.raises(ProblemError, match="more than 2 sets of bricks; give an order"):
         seqopt.solve(posed(small_arch(4)), "path_dp")
 
 
@@ -182,6 +182,18 @@ def test_the_order_of_the_best_margin_equals_brute_force():
     assert plan.order.proven
     assert finds_better_order(problem, least) is False
     assert finds_better_order(problem, 2 * least)
+
+
+def test_states_of_all_orders_that_do_not_fit_the_memory_get_one_line(monkeypatch):
+    monkeypatch.setattr("formulations.states._search.free_memory", lambda: 0)
+    problem = posed(small_arch(3), aim="minmax")
+    capped = replace(problem, states=within(problem.states, {"travel": 9.0}))
+    with pytest.raises(ProblemError, match="all orders do not fit the memory; give an order"):
+        seqopt.solve(capped, FORMULATION)
+    monkeypatch.undo()
+    assert seqopt.solve(capped, FORMULATION).status == "optimal"
+    with pytest.raises(ProblemError, match="flow_lp: it takes no budgets; take order_search"):
+        seqopt.solve(capped, "flow_lp")
 
 
 @pytest.mark.parametrize("aim", ["minmax", pytest.param("sum", marks=pytest.mark.slow)])

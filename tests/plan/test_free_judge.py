@@ -10,7 +10,7 @@ import pytest
 import seqopt
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SeqoptError, SolverError, StepError
-from seqopt.graph.states.states import build_states
+from seqopt.graph.states.states import build_states, within
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, find_formulation
 from seqopt.plan.front import FrontSelection, _StateFront, find_front
@@ -18,6 +18,7 @@ from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
+from seqopt.problem.standing import slack
 from seqopt.sequence.rules import FreeRules
 from tests.builders import small_arch
 
@@ -219,3 +220,19 @@ def test_weights_of_scenarios_that_prove_little_leave_a_gap():
         judge_schedule(states, replace(found, prices=()), plan.steps)
     with pytest.raises(SolverError, match=r"worst-total is .* as claimed"):
         judge_schedule(states, replace(found, objective=(0.9 * found.objective[0],)), plan.steps)
+
+
+def test_a_margin_within_a_budget_is_proven_to_its_width():
+    """The margin comes first, and the budget holds beside it."""
+    problem = within(posed("friction,minmax"), {"travel": 1.0})
+    plan = solve(problem, "schedule_search")
+    alone = solve(posed("friction"), "schedule_search")
+    friction, travel = plan.objective["friction"], plan.objective["travel"]
+    width = slack("friction", friction)
+    assert travel <= 1.0
+    assert alone.certificate.bounds[0] - width <= plan.certificate.bounds[0] <= friction
+    with pytest.raises(SolverError, match="no price for every budget and goal"):
+        judge_schedule(plan.states, replace(plan.selection, prices=()), plan.steps)
+    objective = (0.5 * friction, *plan.selection.objective[1:])
+    with pytest.raises(SolverError):
+        judge_schedule(plan.states, replace(plan.selection, objective=objective), plan.steps)

@@ -312,8 +312,9 @@ class Proof:
         self, values: Sequence[float], claimed: Sequence[float], prices: Sequence[Sequence[float]]
     ) -> tuple[float, ...]:
         """Return the same for plans within budgets, by prices that a formulation gives."""
-        caps = self._passable.problem.budgets
-        levels = _Levels(self._passable, self._told, Asked(values))
+        caps, margins = self._passable.problem.budgets, values[: self._passable.margins]
+        asked = Asked(values, margins if self._passable.stands.asked(margins) else None)
+        levels = _Levels(self._passable, self._told, asked)
         self.states = sum(map(len, levels.states))
         return budget_bounds(levels.graph(), values, claimed, (caps, prices))
 

@@ -82,6 +82,15 @@ def _as_claimed(problem: States, selection: StatePath, steps: Sequence[Step]) ->
 
 def _bounds(problem: States, proof: Proof, values: tuple[float, ...]) -> tuple[float, ...]:
     """Return what no plan stays below, goal by goal; margins come first and have their width."""
+    out = _margin_bounds(problem, proof, values)
+    if len(out) < len(values):
+        pairs = zip(proof.bounds(values), values, strict=True)
+        out += [v if b >= v - BELOW * abs(v) else b for b, v in pairs][len(out) :]
+    return tuple(out)
+
+
+def _margin_bounds(problem: States, proof: Proof, values: tuple[float, ...]) -> list[float]:
+    """Return what no plan stays below of margins, within what they are proven to."""
     out: list[float] = []
     for goal, value in zip(problem.goals, values, strict=True):
         if goal.of_margins:
@@ -89,10 +98,7 @@ def _bounds(problem: States, proof: Proof, values: tuple[float, ...]) -> tuple[f
             if value > 0 and not proof.is_impossible((*values[: len(out)], bound)):
                 raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
             out.append(bound)
-    if len(out) < len(values):
-        pairs = zip(proof.bounds(values), values, strict=True)
-        out += [v if b >= v - BELOW * abs(v) else b for b, v in pairs][len(out) :]
-    return tuple(out)
+    return out
 
 
 def _within_budgets(
@@ -108,9 +114,10 @@ def _within_budgets(
     fits = [aims <= len(prices), *(len(each) >= len(problem.budgets) for each in prices)]
     if not all(fits):
         raise SolverError("there is no price for every budget and goal")
-    bounds = proof.budget_bounds(values, claimed, prices)
+    margins = _margin_bounds(problem, proof, values)
+    bounds = (*margins, *proof.budget_bounds(values, claimed, prices)[len(margins) :])
     for goal, bound, said in zip(problem.aims, bounds, claimed, strict=False):
-        if not bound >= said - TOLERANCE * abs(said):
+        if not goal.of_margins and not bound >= said - TOLERANCE * abs(said):
             raise SolverError(f"{goal}: no plan within budgets is promised below {said:.9g}")
     bounds = tuple(min(b, v) for b, v in zip(bounds, values, strict=False))
     gaps = [(v - b) / (abs(v) or 1.0) for v, b in zip(values, bounds, strict=False)]
