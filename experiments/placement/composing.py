@@ -1,7 +1,6 @@
 """Claim: every schedule goes with every aim, limit, formulation and means, or one line says why.
 
-What is refused has its reason in the problem: ranks and costs of moves need candidates, and a
-Pareto set compares plans of one order.
+What is refused has its reason in the problem: ranks and costs of moves need candidates.
 
 Method: the command line is run for every pair of a schedule and something that goes with it, on an
 arch of seven bricks. Either a plan ends in a value, which is stored, or
@@ -78,8 +77,7 @@ OWN, FREE, ORDERS = [*SCHEDULES][2:]
 REFUSED = {
     (OWN, FREE, ORDERS): [
         *("overlap_dp", "rank_search")  # they need moves with candidates
-    ],
-    (ORDERS,): ["Pareto"],
+    ]
 }
 
 

@@ -18,10 +18,10 @@ from seqopt.graph._budgets import Within, within_budgets
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.graph import Graph
 from seqopt.graph.orders import (
+    MOST_PARTS,
     AllOrders,
     OrderSelection,
     OrderStates,
-    TooManySetsError,
     Trial,
     order_value,
 )
@@ -37,7 +37,6 @@ from seqopt.work._workers import free_memory
 from seqopt.work.progress import Stage, Tell
 
 WIDTH = 50  # new states of a brick count from which the narrow search goes on
-MOST_PARTS = 5000  # sets of bricks with a newest one, of all orders
 COPIES = 2.0  # of what is kept, that are needed at once while it grows
 
 _Choose = Callable[[Graph, Watch], tuple[tuple[int, ...], tuple[float, ...], bool]]
@@ -61,11 +60,6 @@ def best_order(
         if problem.states.goals[0].of_margins:
             return _order_of_margin(problem, tell)
         return _order_of_path(problem, choose, watch, tell, width)
-    except TooManySetsError:
-        raise ProblemError(
-            f"scene {problem.scene.name}: its orders have more than {MOST_PARTS} sets of bricks; "
-            "give an order, or take order_search and no margin, budget or total of scenarios"
-        ) from None
     except StopError as stop:
         if str(stop) == "memory":
             raise ProblemError(

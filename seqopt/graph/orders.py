@@ -127,6 +127,7 @@ class OrderSelection(FrozenValue):
     weights: tuple[float, ...] = ()
 
 
+MOST_PARTS = 5000  # sets of bricks with a newest one, where all are looked at
 MOST_SETS = 200_000  # grip sets of the whole structure that are looked at
 
 
@@ -178,7 +179,7 @@ def _values(free: States, held: Ints) -> Floats:
 Key = tuple[frozenset[int], int]  # bricks that stand, and the newest
 
 
-class TooManySetsError(Exception):
+class TooManySetsError(ProblemError):
     """There are more sets of bricks than may be looked at."""
 
 
@@ -186,12 +187,14 @@ class TooManySetsError(Exception):
 class OrderStates:
     """The states of a free schedule in all orders, a part for every set of bricks and newest brick.
 
-    ``most``: how many parts there may be; ``parts``: those that were looked at, each in an order
-    that begins with its set.
+    ``most``: how many parts there may be; ``every_goal``: whether all goals count, as where there
+    are budgets, not the first alone; ``parts``: those that were looked at, each in an order that
+    begins with its set.
     """
 
     problem: AllOrders
     most: int
+    every_goal: bool = False
     parts: dict[Key, FreeStates] = field(default_factory=dict)
 
     @property
@@ -242,9 +245,23 @@ class OrderStates:
 
     @cached_property
     def _asked(self) -> States:
-        """What counts: the first goal, or all where there are budgets."""
+        """What counts: the first goal, or all."""
         states = self.problem.states
-        return states if states.budgets else replace(states, goals=states.goals[:1])
+        return states if self._all_count else replace(states, goals=states.goals[:1])
+
+    @property
+    def _all_count(self) -> bool:
+        return self.every_goal or bool(self.problem.states.budgets)
+
+    def path(self, found: Sequence[tuple[int, Key, Ints]]) -> tuple[Order, tuple[Ints, ...]]:
+        """Return the order of a path, and its states (c,) with the places of nodes in it.
+
+        ``found``: level, part and state (c,) of all its states.
+        """
+        order = tuple(dict.fromkeys(part[1] for _, part, _ in found))
+        new = self.problem.at(order)
+        rows = ((self._of(part).problem, state[None]) for _, part, state in found)
+        return order, tuple(_renumbered(old, new, state)[0] for old, state in rows)
 
     def ended(self, part: Key, states: Ints) -> Bools:
         """Return which states end the build."""
@@ -254,14 +271,16 @@ class OrderStates:
         """Return the free schedule in an order that begins with a set, its newest brick last."""
         if part not in self.parts:
             if len(self.parts) > self.most:
-                raise TooManySetsError
+                raise TooManySetsError(
+                    f"scene {self.problem.scene.name}: its orders have more than {self.most} sets "
+                    "of bricks; give an order, or ask for the worst step alone"
+                )
             own = self.problem.scene.build_order
             first = [name for name in own if name in part[0] and name != part[1]]
             rest = [name for name in own if name not in part[0]]
             newest = (part[1],) if part[0] else ()
             order = (*first, *newest, *rest)
-            asked = self.problem.at if self.problem.states.budgets else self.problem.judging
-            problem = asked(order)
+            problem = (self.problem.at if self._all_count else self.problem.judging)(order)
             kind = ScenarioSums if problem.totals else FreeStates
             self.parts[part] = kind(problem, standing=bool(problem.demands))
         return self.parts[part]

@@ -4,197 +4,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Floats, FrozenValue, Ints, Terse
+from seqopt.arrays import Floats, FrozenValue, Terse
+from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, did_you_mean
-from seqopt.graph._explore import Visited
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
-from seqopt.graph.states._visits import explore, steps_of, steps_with, with_held
-from seqopt.graph.states.states import States
+from seqopt.graph.orders import AllOrders
+from seqopt.plan._front_states import OrderFront, StateFront
 from seqopt.plan.calling._guard import called, readable, text
 from seqopt.plan.calling.formulation import Formulation, On, as_formulation
-from seqopt.plan.judge._infeasible import confirmed
-from seqopt.plan.judge.schedules import plan_values
-from seqopt.plan.solving import states_of
-from seqopt.problem.problem import Measure, Problem
-from seqopt.sequence.rules import Ending
+from seqopt.plan.solving import graph_of, states_of
+from seqopt.problem.problem import Problem
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.work.progress import Tell, with_progress
-
-DIGITS = 9  # after the first
-EDGE = 1e-9  # of a rounding step: how far above a multiple a value still counts as it
-
-
-class _StateFront:
-    """The schedule of a problem whose goals are all to be small at once.
-
-    ``problem``: its goals are responses, margins of stability, and of a free schedule steps and
-    regrips; ``rounding``: what numbers are rounded up to multiples of, by name, SI units; none by
-    default. Raises `ProblemError` if the goals are others, or a rounding is no positive number.
-    """
-
-    def __init__(self, problem: States, rounding: Mapping[str, float] | None = None) -> None:
-        self._problem = problem
-        for goal in problem.goals:
-            if goal.measure not in (Measure.PEAK, Measure.STEPS, Measure.REGRIPS):
-                raise ProblemError(
-                    f"pareto: {goal} adds up along a plan; give responses, steps and regrips"
-                )
-        self._round, self._rounding = _rounding_steps(self.names, rounding), rounding
-
-    def __repr__(self) -> str:
-        return f"<StateFront of {self._problem}>"
-
-    def anew(self) -> _StateFront:
-        """Return the same problem with nothing known of it, for its judge."""
-        return _StateFront(replace(self._problem), self._rounding)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The goals."""
-        return tuple(map(str, self._problem.goals))
-
-    @cached_property
-    def _visited(self) -> Visited:
-        found = explore(self._problem)
-        if not found.whole:
-            raise confirmed(self._problem, "the search")
-        found.refine()
-        graph, states = found.graph()
-        amounts = graph.amounts.copy()
-        peaks = [k for k, peak in enumerate(graph.peaks) if peak]
-        amounts[:, peaks] = _rounded_up(amounts[:, peaks], self._round[peaks])
-        return Visited(replace(graph, amounts=amounts), states)
-
-    @cached_property
-    def _counted(self) -> list[int]:
-        """Which goals count moves: bounds on them hold along a path, not state by state."""
-        measures = [goal.measure for goal in self._problem.goals]
-        return [k for k, measure in enumerate(measures) if measure is not Measure.PEAK]
-
-    def best_below(self, bounds: Floats) -> tuple[Floats, object] | None:
-        """Return a plan that none beats among those below bounds.
-
-        ``bounds`` (k,). Results: ``point`` (k,); ``plan``: None for both where there is no plan.
-        """
-        below = self._below(bounds)
-        if not below.ends[reached(below)].any():
-            return None
-        graph = self._fewest(below, bounds) if len(self._counted) > 1 else below
-        point = np.zeros(len(bounds))
-        for k in sorted(range(len(bounds)), key=lambda k: k not in self._counted):
-            if graph is None:
-                return None
-            graph, point[k] = keep_best(graph, k)
-            if not point[k] < bounds[k]:
-                return None
-        assert graph is not None
-        states = self._visited.of(fewest_moves(graph))
-        return point, tuple((level, *state.tolist()) for level, _, state in states)
-
-    def _below(self, bounds: Floats) -> Graph:
-        """Return the moves to states whose values are all below bounds."""
-        graph = self._visited.graph
-        return graph.only(np.asarray((graph.amounts < self._peaks(bounds)).all(axis=1)))
-
-    def _fewest(self, graph: Graph, bounds: Floats) -> Graph | None:
-        """Return the paths with as many grips held at the end as those with the fewest moves."""
-        steps, regrips = self._of(Measure.STEPS), self._of(Measure.REGRIPS)
-        found = []
-        for held in range(self._problem.space.robots + 1):
-            part = with_held(self._problem, graph, self._held == held)
-            least = distances(part, part.amounts[:, regrips], back=True)[:1]
-            count = steps_with(self._problem, least, np.array([held]))
-            if least[0] < bounds[regrips] and count[0] < bounds[steps]:
-                found.append((count[0], least[0], part))
-        return min(found, key=lambda each: each[:2])[2] if found else None
-
-    def _of(self, measure: Measure) -> int:
-        return next(k for k in self._counted if self._problem.goals[k].measure is measure)
-
-    def _peaks(self, bounds: Floats) -> Floats:
-        out = bounds.copy()
-        out[self._counted] = np.inf
-        return out
-
-    def is_empty_below(self, bounds: Floats) -> bool:
-        """Return whether there is no plan below bounds, by distances from the empty site.
-
-        ``bounds`` (k,).
-        """
-        graph = self._below(bounds)
-        if not self._counted:
-            return not graph.ends[reached(graph)].any()
-        if [self._problem.goals[k].measure for k in self._counted] == [Measure.STEPS]:
-            steps = distances(graph, np.ones(len(graph.source)))
-            return not steps[graph.ends].min(initial=np.inf) < bounds[self._counted[0]]
-        regrips = graph.amounts[:, self._of(Measure.REGRIPS)]
-        least = distances(graph, 1.0 + graph.states * regrips)
-        least[np.isfinite(least)] //= graph.states
-        last = np.flatnonzero(graph.ends)
-        if self._problem.free_rules.ending is not Ending.HELD:
-            last = np.unique(graph.source[graph.ends[graph.target]])
-        found, held = least[last], self._held[last]
-        room = found < bounds[self._of(Measure.REGRIPS)]
-        if len(self._counted) > 1:
-            room &= steps_with(self._problem, found, held) < bounds[self._of(Measure.STEPS)]
-        return not room.any()
-
-    @cached_property
-    def _held(self) -> Ints:
-        """How many grips every state holds."""
-        grips = [self._problem.space.grips(rows) for _, _, rows in self._visited.states]
-        return np.concatenate(grips)
-
-    def steps(self, plan: object) -> tuple[Step, ...]:
-        """Return the checked steps of a plan.
-
-        ``plan``: its states.
-        """
-        return steps_of(self._problem.space, plan)  # type: ignore[arg-type]
-
-    def values(self, steps: Sequence[Step], claimed: Floats) -> Floats:
-        """Return the goals' values of a sequence, from the responses of its steps.
-
-        ``claimed`` (k,): the values with which margins of stability are compared. Result (k,).
-        """
-        return _rounded_up(
-            np.array(plan_values(self._problem, steps, claimed.tolist())), self._round
-        )
-
-
-def _rounding_steps(names: Sequence[str], rounding: Mapping[str, float] | None) -> Floats:
-    """Return what every number is rounded up to multiples of; zero where it is not.
-
-    Result (k,). Raises `ProblemError` if a name is none of these, or a step is no positive number.
-    """
-    for name, step in (rounding or {}).items():
-        if name not in names or not 0 < step < np.inf:
-            known = ", ".join(names)
-            raise ProblemError(f"round {name}={step:g}: give a positive step for one of {known}")
-    return np.array([(rounding or {}).get(name, 0.0) for name in names])
-
-
-def _rounded_up(values: Floats, steps: Floats) -> Floats:
-    """Return values rounded up to multiples of steps, others rounded to ten digits.
-
-    What differs by less than ten digits is the same: no plan is better by an error of rounding.
-
-    ``values`` (..., k); ``steps`` (k,): zero where no step is given. Result (..., k).
-    """
-    safe = np.where(steps > 0, steps, 1.0)
-    size = np.abs(np.where((values != 0) & np.isfinite(values), values, 1.0))
-    digit = 10.0 ** (np.floor(np.log10(size)) - DIGITS)
-    plain = np.where(np.isfinite(values), np.round(values / digit) * digit, values)
-    return np.where(steps > 0, np.ceil(values / safe - EDGE) * safe, plain)
-
 
 TOLERANCE = 1e-6  # of a value: how far a point may be from what the engine says of its plan
 
@@ -255,12 +82,26 @@ class FrontProblem(Protocol):
         tuple of Step
         """
 
-    def values(self, steps: Sequence[Step], claimed: Floats) -> Floats:
-        """Return the numbers of a sequence, from the responses of its steps.
+    def engine(self, plan: object) -> Engine:
+        """Return what computes the responses of a plan, of the scene in its build order.
 
         Parameters
         ----------
-        steps : sequence of Step
+        plan : object
+            From `best_below`.
+
+        Returns
+        -------
+        Engine
+        """
+
+    def values(self, plan: object, claimed: Floats) -> Floats:
+        """Return the numbers of a plan, from the responses of its steps.
+
+        Parameters
+        ----------
+        plan : object
+            From `best_below`.
         claimed : (k,) float
             The values with which margins of stability are compared.
 
@@ -290,12 +131,14 @@ class Front(Terse):
 
     ``table``: a row per point, by the first number: the numbers that are to be small, SI units,
     then ``steps`` and ``regrips`` of its plan where they are none of these; ``steps``: the plan of
-    every row; ``complete``: whether it was proven that no further point exists; ``seconds``: by
-    stage, s: solve, verify.
+    every row; ``engines``: what computes its responses, of the scene in its build order;
+    ``complete``: whether it was proven that no further point exists; ``seconds``: by stage, s:
+    solve, verify.
     """
 
     table: pd.DataFrame
     steps: tuple[tuple[Step, ...], ...]
+    engines: tuple[Engine, ...]
     complete: bool
     seconds: Mapping[str, float]
 
@@ -323,16 +166,17 @@ def find_front(
     start = time.perf_counter()
     formulation = as_formulation(formulation, On.FRONTS)
     if isinstance(problem, Problem):
-        problem = _StateFront(states_of(problem), rounding)
+        problem = _posed(problem, rounding)
     twin, name = problem.anew(), formulation.name  # which no formulation can reach
     solve = partial(formulation.solve, problem, seconds=seconds, progress=progress)
     found = _found(name, (problem, twin), solve)
     solved, problem = time.perf_counter(), twin
     points = found.points[order := np.lexsort(found.points.T[::-1])]
     with readable(name):
-        plans = tuple(problem.steps(found.plans[i]) for i in order)
-    for point, steps in zip(points, plans, strict=True):
-        values = problem.values(steps, point)
+        chosen = [found.plans[i] for i in order]
+        plans = tuple(map(problem.steps, chosen))
+    for point, plan in zip(points, chosen, strict=True):
+        values = problem.values(plan, point)
         if not (np.abs(values - point) <= TOLERANCE * np.abs(point)).all():
             raise SolverError(
                 f"the values of a plan are {values.tolist()}, not {point.tolist()} as claimed"
@@ -341,7 +185,16 @@ def find_front(
     if not found.stopped:
         _require_complete(problem, points, progress)
     spent = {"solve": solved - start, "verify": time.perf_counter() - solved}
-    return Front(_table(problem, points, plans), plans, not found.stopped, spent)
+    engines = tuple(map(problem.engine, chosen))
+    return Front(_table(problem, points, plans), plans, engines, not found.stopped, spent)
+
+
+def _posed(problem: Problem, rounding: Mapping[str, float] | None) -> FrontProblem:
+    """Return the states whose paths are plans, in one build order or in all."""
+    found = graph_of(problem)
+    if isinstance(found, AllOrders):
+        return OrderFront(found, rounding)
+    return StateFront(states_of(problem), rounding)
 
 
 def _found(

@@ -149,20 +149,18 @@ def layers_of(problem: Problem) -> Layers:
 
 
 def states_of(problem: Problem) -> States:
-    """Return the states and moves of a problem."""
-    found = graph_of(problem, On.STATES)
-    assert isinstance(found, States)
-    return found
+    """Return the states and moves of a problem; where its order is sought, in the scene's own."""
+    found = graph_of(problem, On.STATES if problem.orders is None else On.ORDERS)
+    states = found.states if isinstance(found, AllOrders) else found
+    assert isinstance(states, States)
+    return states
 
 
 def _usual_criterion(problem: Problem) -> Criterion:
     """Return the criterion with the numbers of the scene; raise what the usual graph says."""
     on = natural(problem)
     if on in (On.STATES, On.ORDERS):
-        graph = graph_of(problem, on)
-        states = graph.states if isinstance(graph, AllOrders) else graph
-        assert isinstance(states, States)  # it was made of rules or goals
-        return states.criterion
+        return states_of(problem).criterion
     parse_budgets(problem.budgets)
     if problem.scenarios:
         return _scenarios(problem).nominal.criterion
@@ -237,8 +235,8 @@ def _states(problem: Problem) -> States:
 def _in_own_order(problem: Problem) -> States:
     if problem.orders is not None:
         raise ProblemError(
-            f"{problem.orders.value} orders: a Pareto set, or states alone, are of one order; take "
-            "order_search, or give an order"
+            f"{problem.orders.value} orders: states alone are of one order; take order_search, or "
+            "give an order"
         )
     return _states(problem)
 

@@ -14,8 +14,16 @@ from seqopt._showing import Page
 from seqopt.engines.interface import Engine
 from seqopt.errors import FileError, ProblemError
 from seqopt.plan.build import ShownBuild
+from seqopt.plan.front import Front
 from seqopt.problem.requirements import overloads
-from seqopt.report.comparison import CLOSED, LARGEST, Comparison, fixed_methods, largest
+from seqopt.report.comparison import (
+    CLOSED,
+    LARGEST,
+    Comparison,
+    fixed_methods,
+    largest,
+    shown_table,
+)
 from seqopt.report.page import Build, Scatter, report_page
 from seqopt.responses.quantities import length_text, number_text
 from seqopt.responses.table import OUTSIDE, REMEDY, Departure, LinearRange, analyze, builds_in_words
@@ -183,15 +191,19 @@ def folder_builds(engine: Engine, folder: Path) -> list[Build]:
 
 def front_page(
     engine: Engine,
-    table: pd.DataFrame,
+    front: Front,
     plans: Sequence[pd.DataFrame],
     departures: Sequence[Sequence[Departure]],
 ) -> str:
     """Return the page of a Pareto set: its points, and responses and departures of each plan."""
-    scene = engine.network.scene
+    scene, table = engine.network.scene, shown_table(front.table)
     names = [f"point {number}" for number in range(1, len(plans) + 1)]
-    left = dict(zip(names, departures, strict=True))
-    builds = _builds(scene, dict(zip(names, plans, strict=True)), left)
+    builds = []
+    for name, own, plan, left in zip(names, front.engines, plans, departures, strict=True):
+        placed = own.network.scene
+        (build,) = _builds(placed, {name: plan}, {name: left})
+        another = placed.build_order != scene.build_order
+        builds.append(replace(build, order=placed.build_order) if another else build)
     words = {name: WORDS.get(FORCES.get(name, name), name) for name in map(str, table)}
     points = table.rename(columns=words).set_axis(names)
     lengths = [name for name in points if str(name).endswith("1e-3 mm")]

@@ -30,7 +30,7 @@ from seqopt.problem.requirements import Excess, overloads
 from seqopt.responses.quantities import number_text
 from seqopt.responses.table import OUTSIDE, Departure, force_column
 from seqopt.scene.boxes import boxes, vertices_of
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Order, Scene
 from seqopt.scene.shape import normal_of
 from seqopt.sequence.steps import Step
 
@@ -46,7 +46,7 @@ RESPONSES = {
 }
 PARTS = {"style": "viewer.css", "three": "three.js", "charts": "charts.js", "viewer": "viewer.js"}
 MOST = 6_000_000  # numbers of fields in a page: about 8 MB
-LEFT_OUT = "Displacements and axial forces of some builds are left out: there are too many steps."
+LEFT_OUT = "Displacements and axial forces of some builds are left out"
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,8 @@ class Build:
     """A build that is shown step by step, with the responses of its steps.
 
     ``stands`` says of every step whether it stands, where that was asked; ``bounds`` are limits by
-    column of the table, or ``F_largest``, that are drawn beside the responses.
+    column of the table, or ``F_largest``, that are drawn beside the responses; ``order`` names the
+    bricks as they are placed, where that is not the scene's own order.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Build:
     stands: Sequence[str] = ()
     bounds: Mapping[str, float] = field(default_factory=dict)
     departures: Sequence[Departure] = ()
+    order: Order = ()
 
     def overloads(self, scene: Scene) -> tuple[Excess, ...]:
         """Return the payloads that steps exceed."""
@@ -169,10 +171,12 @@ def _build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[st
     the ``scale`` of each step, or are None.
     """
     lines = [line.split(",") for line in csv_text(build.table).splitlines()]
+    own = engine.network.scene.build_order
     found = _fields(engine, build) if fields else dict.fromkeys(FIELDS)
     return {
         "name": build.name,
         "bounds": dict(build.bounds),
+        "rank": [build.order.index(name) for name in own] if build.order else None,
         "stands": list(build.stands),
         "marks": _marks(engine.network.scene, build),
         "steps": [
@@ -292,13 +296,21 @@ def _data(engine: Engine, builds: Sequence[Build], scatter: Scatter | None) -> d
     return {
         "structure": _structure_data(network),
         "builds": [
-            _build_data(engine, build, fields=bool(end <= MOST))
+            _build_data(engine, build, fields=bool(end <= MOST) and not build.order)
             for build, end in zip(builds, ends, strict=True)
         ],
         "responses": RESPONSES,
         "scatter": None if scatter is None else scatter.data(),
-        "note": LEFT_OUT if ends[-1] > MOST else "",
+        "note": _left_out(builds, int(ends[-1])),
     }
+
+
+def _left_out(builds: Sequence[Build], numbers: int) -> str:
+    """Return why fields of some builds, numbers in all, are left out; nothing if none are."""
+    if numbers > MOST:
+        return f"{LEFT_OUT}: there are too many steps."
+    ordered = any(build.order for build in builds)
+    return f"{LEFT_OUT}: they place bricks in another order than the scene." if ordered else ""
 
 
 def _asset(name: str) -> str:

@@ -34,7 +34,6 @@ from seqopt.report.comparison import fixed_methods, shown_table, worst_of
 from seqopt.responses.table import LinearRange, analyze, builds_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import FREE
-from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.work.progress import with_progress, within
 
@@ -49,6 +48,7 @@ EXAMPLES = (
     "seqopt pareto arch25 --out front",
     "seqopt pareto arch25 --pick D_max --under F_largest=250 --out front",
     "seqopt pareto arch25 --aim D_max,steps --seconds 60 --out front",
+    "seqopt pareto chain:bricks=7 --order search --aim T_max,F_largest --out front",
 )
 AIM = {
     "--aim NAME,NAME": "what is to be small: responses and, of the free schedule, steps and "
@@ -102,7 +102,8 @@ def run(options: argparse.Namespace) -> Answer:
     picked = None
     if options.pick:
         chosen = pick(front.table, options.pick, _under(options.under, methods))
-        files["pick.csv"] = csv_text(analyze(free.engine, front.steps[chosen]))
+        files["pick.csv"] = csv_text(analyze(front.engines[chosen], front.steps[chosen]))
+        scene = front.engines[chosen].network.scene  # in the order of what is picked
         values = shown_table(front.table).iloc[chosen]
         picked = {"point": chosen + 1, **values}
         row = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
@@ -128,14 +129,13 @@ def _front_files(
 ) -> tuple[dict[str, bytes | str], tuple[str, ...]]:
     """Return the files of a Pareto set by name, and which points leave the linear range."""
     engine, tell = free.engine, options.tell
-    known: dict[tuple[Step, ...], pd.DataFrame] = {}
-    plans = []
-    for number, steps in enumerate(with_progress("analyzing plans", front.steps, tell), start=1):
-        table = known.setdefault(steps, analyze(engine, steps))
-        plans.append(table.assign(point=number))
+    ways = [*zip(front.engines, front.steps, strict=True)]
+    tables = [analyze(own, steps) for own, steps in with_progress("analyzing plans", ways, tell)]
     tell("drawing and writing the page")
-    within = LinearRange(engine)
-    departures = [within.departures(known[steps]) for steps in front.steps]
+    ranges = {own: LinearRange(own) for own in {*front.engines}}
+    departures = [
+        ranges[own].departures(table) for own, table in zip(front.engines, tables, strict=True)
+    ]
     said = builds_in_words({f"point {k}": each for k, each in enumerate(departures, start=1)})
     posed = {
         "scene": engine.network.scene.name,
@@ -156,9 +156,12 @@ def _front_files(
     numbered.insert(0, "point", range(1, len(numbered) + 1))
     if said:
         numbered["outside_linear_range"] = ["yes" if each else "" for each in departures]
-    tables = [known[steps] for steps in front.steps]
+    orders = [own.network.scene.build_order for own in front.engines]
+    if {*orders} - {engine.network.scene.build_order}:
+        numbered["order"] = [",".join(map(str, order)) for order in orders]
+    plans = [table.assign(point=number) for number, table in enumerate(tables, start=1)]
     return {
-        PAGE: front_page(engine, shown_table(front.table), tables, departures),
+        PAGE: front_page(engine, front, tables, departures),
         "pareto.csv": csv_text(numbered),
         "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
         **_picture(front, methods),

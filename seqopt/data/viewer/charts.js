@@ -1,7 +1,7 @@
 "use strict";
 // What is drawn along the build, and a point for each build. `page` holds the data and what the viewer does.
 function makeCharts(page) {
-  const { structure, builds, shown, number, responseAt, text, go, choose } = page;
+  const { structure, builds, shown, number, rank, responseAt, text, go, choose } = page;
   const SVG = "http://www.w3.org/2000/svg";
   function draw(tag, attributes, parent, content) {
     const e = document.createElementNS(SVG, tag);
@@ -53,7 +53,7 @@ function makeCharts(page) {
             draw("text", { x: (x(s - 0.5) + x(end + 0.5)) / 2, y: y + 14.5, "text-anchor": "middle" }, svg, name);
           }
         }
-        if (node !== null && build.steps[s].kind === "place" && structure.nodes[node].brick === build.steps[s].bricks - 1) {
+        if (node !== null && build.steps[s].kind === "place" && rank(build, structure.nodes[node].brick) === build.steps[s].bricks - 1) {
           const dot = draw("circle", { cx: x(s), cy: y + 10, r: 3.2, fill: "#fff", stroke: "#222" }, svg);
           draw("title", {}, dot, `${robot.name} places brick ${structure.bricks[structure.nodes[node].brick].name} in step ${build.steps[s].number}`);
         }

@@ -148,8 +148,8 @@
       if (build.marks[s]) this.tag.append(`; ${build.marks[s]}`);
       this.canvas.setAttribute("aria-label", `${structure.name}, ${this.tag.textContent}, ${step.bricks} bricks`);
       this.bricks.forEach(({ brick, mesh, outline, places, rims }, i) => {
-        mesh.visible = outline.visible = i < step.bricks;
-        if (i >= step.bricks) return;
+        mesh.visible = outline.visible = rank(build, i) < step.bricks;
+        if (rank(build, i) >= step.bricks) return;
         const here = brick.corners.map((corner) => [...this.moved(build, s, i, corner, options.magnify, p)]);
         for (const [object, order] of [[mesh, places], [outline, rims]]) {
           const array = object.geometry.attributes.position.array;
@@ -159,7 +159,7 @@
         mesh.geometry.computeVertexNormals();
         mesh.geometry.computeBoundingSphere();
         outline.geometry.computeBoundingSphere();
-        mesh.material.color.set(step.kind === "place" && i === step.bricks - 1 ? NEW : CLAY);
+        mesh.material.color.set(step.kind === "place" && rank(build, i) === step.bricks - 1 ? NEW : CLAY);
         mesh.material.transparent = options.forces;
         mesh.material.opacity = options.forces ? 0.25 : 1;
       });
@@ -222,6 +222,7 @@
   }
 
   // what is read of a step
+  const rank = (build, i) => (build.rank ? build.rank[i] : i);  // how many bricks stand before one
   const column = (build, name) => build.columns.indexOf(name);
   function number(build, s, name) {
     const i = column(build, name);
@@ -237,7 +238,7 @@
   function table(build, at) {
     const s = Math.min(at, build.steps.length - 1), step = build.steps[s], out = document.createElement("div");
     out.append(text("h2", `${build.name}, step ${step.number} of ${build.steps.length}`));
-    const newest = structure.bricks[step.bricks - 1];
+    const newest = structure.bricks.find((_, i) => rank(build, i) === step.bricks - 1);
     const what = step.kind === "place" ? `Brick ${newest.name} is placed` : step.kind === "release" ? "A robot lets go" : "A robot takes a new grip";
     out.append(text("p", `${what}; ${step.bricks} of ${structure.bricks.length} bricks stand.` + (build.stands[s] ? ` It ${build.stands[s]}.` : "")));
     if (build.marks[s]) out.append(text("p", build.marks[s], "over"));
@@ -302,7 +303,7 @@
     byId("play").textContent = "pause";
     timer = setInterval(() => { if (Number(slider.value) >= Number(slider.max)) pause(); else go(Number(slider.value) + 1); }, 450);
   }
-  const charts = makeCharts({ structure, builds, shown, number, responseAt, text, go, choose });
+  const charts = makeCharts({ structure, builds, shown, number, rank, responseAt, text, go, choose });
   const points = data.scatter && charts.scatter(data.scatter);
   function drawCharts() {
     charts.cursors.length = 0;
