@@ -16,6 +16,7 @@ import pytest
 from seqopt._cli.main import main
 from seqopt._files import csv_text
 from seqopt.engines.interface import Want
+from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
 from seqopt.report import page
@@ -135,7 +136,7 @@ def test_names_of_others_do_not_end_the_script(engine25, builds):
 def test_fields_are_left_out_where_there_are_too_many_and_it_says_so(engine25, builds, monkeypatch):
     monkeypatch.setattr(page, "MOST", 15_000)  # numbers: enough for one of the two
     data = data_of(report_page(engine25, list(builds.values()), ""))
-    assert data["note"] == page.LEFT_OUT
+    assert data["note"] == f"{page.LEFT_OUT}: there are too many steps."
     assert [build["twist"] is None for build in data["builds"]] == [False, True]
     monkeypatch.undo()
     assert data_of(report_page(engine25, list(builds.values()), ""))["note"] == ""
@@ -199,6 +200,24 @@ def test_a_browser_shows_the_numbers_of_the_step_that_is_asked_for(
     broken = path.read_text("utf-8").replace('"steps":[', '"step":[')
     path.write_text(broken, "utf-8")
     assert 'data-ready="true"' not in shown(path)[0]  # the control
+
+
+@browser
+def test_a_build_in_another_order_shows_its_own_bricks(engine25, builds, shown, tmp_path):
+    own = build_network(engine25.network.scene, "reversed")
+    steps = sequential(own)
+    table = analyze(make_engine("compliance", own), steps)
+    other = Build("backward", steps, table, order=own.scene.build_order)
+    text = report_page(engine25, [builds["sequential"], other], "")
+    data = data_of(text)
+    assert data["note"].endswith("they place bricks in another order than the scene.")
+    assert [build["twist"] is None for build in data["builds"]] == [False, True]
+    assert [build["rank"] for build in data["builds"]] == [None, [*range(24, -1, -1)]]
+    (path := tmp_path / "report.html").write_text(text, "utf-8")
+    for build, brick in (("sequential", 1), ("backward", 25)):
+        found, errors = shown(path, f"step=1&build={build}")
+        assert errors == []
+        assert f"Brick {brick} is placed; 1 of 25 bricks stand." in found
 
 
 def tables_of(text):
