@@ -9,25 +9,15 @@ to check it and to show what that generality costs.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.interface import (
-    Fields,
-    NamedEngine,
-    Want,
-    failing_in_a_line,
-    grip_columns,
-    join_sets,
-    no_sets,
-    require_finite,
-)
+from seqopt.engines.interface import Fields, SerialEngine
 from seqopt.engines.rigid._mechanism import require_resistance
 from seqopt.errors import SolverError
 from seqopt.network.network import Network, PartKind
@@ -43,9 +33,10 @@ _LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: holds 
 _Examine = Callable[[], None]
 
 
-class FrameEngine(NamedEngine):
+class FrameEngine(SerialEngine):
     """Solves each grip set as a frame of its own.
 
+    Raises `SolverError` if corrections do not settle, which a lower contrast may help.
     ``contrast``: stiffness of the bars over that of the stiffest joint, in stretching and in
     bending. Low values bend the bars, high ones spoil the conditioning.
     """
@@ -54,18 +45,8 @@ class FrameEngine(NamedEngine):
         super().__init__(network)
         self._contrast = contrast
 
-    @failing_in_a_line
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
-        """Return the fields of a partial structure for grip sets (S, r).
-
-        All fields are evaluated whatever is asked: the factorization dominates the cost. Raises
-        `SolverError` if corrections do not settle, which a lower contrast may help.
-        """
-        network = self._network
-        columns = grip_columns(network, bricks, grips)
-        answers = [_solve_one(network, bricks, row, self._contrast) for row in columns]
-        answer = join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
-        return require_finite(answer, bricks, grips)
+    def _answers(self, bricks: int, columns: Ints) -> Iterable[Fields]:
+        return [_solve_one(self.network, bricks, row, self._contrast) for row in columns]
 
 
 def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) -> Fields:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
@@ -304,12 +304,8 @@ def join_sets(parts: Sequence[Fields]) -> Fields:
 
 def merge_sets(which: Bools, inside: Fields, outside: Fields) -> Fields:
     """Return the fields of grip sets, those of ``which`` (S,) from one answer, the rest not."""
-    whole = {}
-    for name in _NAMES:
-        first = getattr(inside, name)
-        whole[name] = np.empty((len(which), *first.shape[1:]))
-        whole[name][which], whole[name][~which] = first, getattr(outside, name)
-    return Fields(**whole)
+    order = np.concatenate([np.flatnonzero(which), np.flatnonzero(~which)])
+    return select_sets(join_sets([inside, outside]), np.argsort(order))
 
 
 class NamedEngine:
@@ -326,3 +322,22 @@ class NamedEngine:
     def __repr__(self) -> str:
         scene = self.network.scene
         return f"<{type(self).__name__} of {scene.name}: {len(scene.bricks)} bricks>"
+
+
+class SerialEngine(NamedEngine):
+    """Base of engines that solve grip sets one after the other, each from scratch.
+
+    All fields are evaluated whatever is asked: the solution dominates the cost.
+    """
+
+    @failing_in_a_line
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+        """Return the fields of a partial structure for grip sets (S, r)."""
+        columns = grip_columns(self.network, bricks, grips)
+        none = no_sets(self.network, bricks, columns.shape[1])
+        answer = join_sets([none, *self._answers(bricks, columns)])
+        return require_finite(answer, bricks, grips)
+
+    def _answers(self, bricks: int, columns: Ints) -> Iterable[Fields]:
+        """Return the fields of every grip set by itself."""
+        raise NotImplementedError

@@ -13,28 +13,19 @@ react. `seqopt.stability` asks less: that forces exist, whatever brings them abo
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy import linalg, sparse
 
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines.discrete._equilibrium_path import Held, Settled, settle
 from seqopt.engines.discrete._system import BedStiffness, System, build_system
-from seqopt.engines.interface import (
-    Fields,
-    NamedEngine,
-    Want,
-    failing_in_a_line,
-    grip_columns,
-    join_sets,
-    no_sets,
-    require_finite,
-)
+from seqopt.engines.interface import Fields, SerialEngine
 from seqopt.engines.rigid._mechanism import mechanism_error, require_resistance
 from seqopt.engines.rigid._mixed import Solution, respond
 from seqopt.errors import SeqoptError, SolverError
@@ -77,8 +68,12 @@ def _pad_stiffness(network: Network, index: int, node: Floats, pinch: Pinch) -> 
     return total
 
 
-class DiscreteEngine(NamedEngine):
+class DiscreteEngine(SerialEngine):
     """Solves each grip set by discrete elements.
+
+    Raises `MechanismError`: also if the structure moves a tenth of a brick's length and is not
+    stopped by then; `SolverError`: also if it neither comes to rest nor goes; `SceneError` if the
+    faces of a joint do not overlap.
 
     ``mortar``: what the joints hold; the epoxy of Bruun et al. by default. ``bed``: the joints
     themselves; by default they are as stiff as the scene says. ``pinch``: how robots hold; by
@@ -96,24 +91,12 @@ class DiscreteEngine(NamedEngine):
         self._mortar, self._bed, self._pinch = mortar, bed, pinch
         self._systems: dict[int, System] = {}
 
-    @failing_in_a_line
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
-        """Return the fields of a partial structure for grip sets (S, r).
-
-        All fields are evaluated whatever is asked: finding the equilibrium dominates the cost.
-        Raises `MechanismError`: also if the structure moves a tenth of a brick's length and is not
-        stopped by then; `SolverError`: also if it neither comes to rest nor goes; `SceneError` if
-        the faces of a joint do not overlap.
-        """
-        network = self._network
-        columns = grip_columns(network, bricks, grips)
+    def _answers(self, bricks: int, columns: Ints) -> Iterable[Fields]:
         for row in columns:
-            require_resistance(network, bricks, row)
+            require_resistance(self.network, bricks, row)
         if bricks not in self._systems:
-            self._systems[bricks] = build_system(network, bricks, self._mortar, self._bed)
-        answers = [self._solve_one(self._systems[bricks], row) for row in columns]
-        answer = join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
-        return require_finite(answer, bricks, grips)
+            self._systems[bricks] = build_system(self.network, bricks, self._mortar, self._bed)
+        return [self._solve_one(self._systems[bricks], row) for row in columns]
 
     def _solve_one(self, system: System, columns: Ints) -> Fields:
         """Return the fields of one grip set."""
