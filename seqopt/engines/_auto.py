@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from seqopt.arrays import Bools
 from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
-from seqopt.engines._planar import NoPlane, PlanarEngine, find_plane, off_plane
+from seqopt.engines._planar import PlanarEngine, find_plane, off_plane
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import (
     Fields,
@@ -68,15 +68,11 @@ class AutoEngine(NamedEngine):
         super().__init__(network)
         self.rigid = ComplianceEngine(self.network)
         self._discrete = DiscreteEngine(self.network, mortar)
-        self._planar: PlanarEngine | None = None
-        self._in_space = _OFF_PLANE
         self._limits: ElasticLimits | None = None
         self.tally, self.unchecked = Counter[LevelChoice](), ""
         plane = find_plane(self.network)
-        if isinstance(plane, NoPlane):
-            self._in_space = LevelChoice(Level.RIGID, plane.reason)
-        else:
-            self._planar = PlanarEngine(self.network, plane)
+        self._planar = None if isinstance(plane, str) else PlanarEngine(self.network, plane)
+        self._in_space = LevelChoice(Level.RIGID, plane) if isinstance(plane, str) else _OFF_PLANE
         try:
             self._limits = find_elastic_limits(self.network, mortar)
         except SceneError as error:
@@ -90,10 +86,9 @@ class AutoEngine(NamedEngine):
         flat: Bools = np.zeros(len(columns), dtype=bool)
         if self._planar is not None:
             flat = np.asarray(~off_plane(self.network, self._planar.plane, columns).any(axis=1))
-        fields = keep_wanted(self.rigid.solve(bricks, sets[~flat], asked), asked)
+        fields = self.rigid.solve(bricks, sets[~flat], asked)
         if self._planar is not None and flat.any():
-            found = keep_wanted(self._planar.solve(bricks, sets[flat], asked), asked)
-            fields = merge_sets(flat, found, fields)
+            fields = merge_sets(flat, self._planar.solve(bricks, sets[flat], asked), fields)
         beyond = np.zeros(len(sets), dtype=bool)
         if self._limits is not None:
             beyond = self._limits.exceeded(fields.joint_wrench)

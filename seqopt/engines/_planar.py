@@ -41,24 +41,17 @@ class _Plane(FrozenValue):
         return np.asarray(np.abs((points - self.point) @ self.normal))
 
 
-@dataclass(frozen=True)
-class NoPlane:
-    """That a structure lies in no plane."""
-
-    reason: str  # what lies outside, a clause that goes into a sentence
-
-
-def find_plane(network: Network) -> _Plane | NoPlane:
+def find_plane(network: Network) -> _Plane | str:
     """Return the plane of a structure: bricks, springs and gravity lie in it, springs along it.
 
-    Bricks may be of any width: their nodes need not lie in the plane, their centroids must.
+    Bricks may be of any width: their nodes need not lie in the plane, their centroids must. Where
+    there is none, the result is what lies outside, a clause that goes into a sentence.
     """
     springs = network.springs
     points = np.vstack([network.centroid, springs.position, springs.anchor])
     normal = _normal(network, points - points.mean(axis=0))
     plane = _Plane(points.mean(axis=0), normal, plane_axes(normal)[1:])
-    outside = _points_outside(network, plane) or _turned_springs(network, normal)
-    return NoPlane(outside) if outside else plane
+    return _points_outside(network, plane) or _turned_springs(network, normal) or plane
 
 
 def off_plane(network: Network, plane: _Plane, columns: Ints) -> Floats:
@@ -134,8 +127,8 @@ class PlanarEngine(NamedEngine):
     def __init__(self, network: Network | Scene, plane: _Plane | None = None) -> None:
         super().__init__(network)
         found = find_plane(self.network) if plane is None else plane
-        if isinstance(found, NoPlane):
-            raise SceneError(f"{found.reason}; {_ELSE}")
+        if isinstance(found, str):
+            raise SceneError(f"{found}; {_ELSE}")
         self.plane = found
         self._engine = ComplianceEngine(self.network, found.basis)
 
