@@ -85,7 +85,7 @@ def recipe_of(engine: object) -> Recipe | None:
     return found if isinstance(found, Recipe) else None
 
 
-ENGINES: dict[str, Callable[[Network], Engine]] = {
+ENGINES: dict[str, Callable[..., Engine]] = {
     "auto": AutoEngine,
     "planar": PlanarEngine,
     "compliance": ComplianceEngine,
@@ -93,10 +93,7 @@ ENGINES: dict[str, Callable[[Network], Engine]] = {
     "discrete": DiscreteEngine,
 }
 USUAL = "compliance"  # the engine where none is asked for
-_LIMITED: dict[str, Callable[[Network, Mortar], Engine]] = {  # whose joints hold what mortar does
-    "auto": AutoEngine,
-    "discrete": DiscreteEngine,
-}
+_LIMITED = ("auto", "discrete")  # engines whose joints hold what mortar does
 
 
 def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None = None) -> Engine:
@@ -131,16 +128,14 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
     if name not in ENGINES:
         raise SceneError(f"engine {name} does not exist; known are {', '.join(ENGINES)}")
     network, options = network_of(network), dict[str, object]()
-    if mortar is None:
-        engine = ENGINES[name](network)
-    elif name in _LIMITED:
-        options["mortar"] = mortar = find_mortar(mortar)
-        engine = _LIMITED[name](network, mortar)
-    else:
+    if mortar is not None and name in _LIMITED:
+        options["mortar"] = find_mortar(mortar)
+    elif mortar is not None:
         raise SceneError(
             f"engine {name}: its joints never fail, so a mortar changes nothing; "
             f"use the engine {' or '.join(_LIMITED)}"
         )
+    engine = ENGINES[name](network, **options)
     vars(engine)["recipe"] = Recipe(name, network.scene, options)
     return engine
 
