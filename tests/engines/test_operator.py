@@ -23,10 +23,18 @@ from seqopt.engines.rigid._mixed import solve_dense
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._refinement import _held_operator, _hold_loose
 from seqopt.engines.rigid._response_maps import _GATHERED, loads_of
-from seqopt.engines.rigid.compliance import ComplianceEngine, _solve_batch
+from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
-from tests.builders import branch, from_both_sides, hinged, six_bricks, small_arch, torsion_free
+from tests.builders import (
+    branch,
+    from_both_sides,
+    hinged,
+    six_bricks,
+    small_arch,
+    solve_batch,
+    torsion_free,
+)
 
 SCENES = {
     "arch": small_arch(5),
@@ -73,7 +81,7 @@ def test_every_field_is_that_of_a_direct_solve(name, grips):
         if len(free_nodes(scene, bricks)) < grips:
             continue
         columns = grip_columns(net, bricks, sets_of(scene, bricks, grips))
-        fields, trusted = _solve_batch(builder.operator(bricks), columns, Want.ALL)
+        fields, trusted = solve_batch(builder.operator(bricks), columns, Want.ALL)
         direct = solve_dense(net, bricks, columns)
         assert trusted.all()
         for field in _NAMES:
@@ -270,7 +278,7 @@ def test_answers_do_not_depend_on_how_they_are_summed(monkeypatch, name, grips):
     found = []
     for few, held in ((10**9, None), (0, None), (0, np.unique(columns // 2))):
         monkeypatch.setattr("seqopt.engines.rigid._operator._FEW", few)
-        found.append(_solve_batch(builder.operator(bricks, held), columns, Want.ALL)[0])
+        found.append(solve_batch(builder.operator(bricks, held), columns, Want.ALL)[0])
     for field in _NAMES:
         once, *others = (getattr(fields, field) for fields in found)
         for other in others:
@@ -299,7 +307,7 @@ def test_which_bricks_are_loaded():
         assert operator.covers(np.array(held, dtype=int)) is covered
     size = operator.nbytes
     assert size >= operator.flexibility.nbytes + operator.twist.nbytes + operator.wrench.nbytes
-    more = operator.displacement.nbytes  # made when it is asked for
+    more = operator.of_loads("displacement").nbytes  # made when it is asked for
     assert operator.nbytes == size + more + (operator.maps.nbytes - operator_maps(net))
 
 

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.engines.interface import FLAGS, SPACE, Basis
+from seqopt.engines.interface import SPACE, Basis
 from seqopt.engines.rigid._growth import Growth, SpanningTree
 from seqopt.engines.rigid._response_maps import (
     AT_ONCE,
@@ -73,8 +73,8 @@ class ComplianceOperator(FrozenValue):
     @property
     def nbytes(self) -> int:
         """Bytes of the arrays that there are by now."""
-        made = vars(self).keys() & {"flexibility", "twist", "wrench", *FLAGS}
-        return self.maps.nbytes + sum(int(vars(self)[name].nbytes) for name in made)
+        made = self.flexibility, self.twist, self.wrench, *self._made.values()
+        return self.maps.nbytes + sum(int(each.nbytes) for each in made)
 
     @cached_property
     def place(self) -> Ints:
@@ -131,8 +131,8 @@ class ComplianceOperator(FrozenValue):
         few = name == "support" or 2 * self.axis.size <= max(_FEW, len(index))
         if few:  # whatever was asked before: answers do not depend on it
             loads = self.loads(index, force) if loads is None else loads
-            return loads.sum(getattr(self, name))
-        states = self.twist if name in _OF_TWISTS else self.wrench
+            return loads.sum(self.of_loads(name))
+        states = self._states(name)
         out = np.empty((len(index), self.maps.count(name)))
         step = max(16, AT_ONCE // states.shape[1])
         for start in range(0, len(index), step):
@@ -153,34 +153,25 @@ class ComplianceOperator(FrozenValue):
         for i in range(nodes):  # two may share an edge
             out[np.arange(len(index)), self.inner_edge[brick[:, i]]] += along[:, i]
 
-    @cached_property
-    def edge_force(self) -> Floats:
-        """Axial forces of all edges under every load, (l + 1, E)."""
-        out, width = self.maps.apply("edge_force", self.wrench), self.directions
-        out[-1, self.inner_edge] += self.at_second
-        rows = 2 * width * np.arange(len(self.held))[:, None] + width + np.arange(width)
-        out[rows, self.inner_edge[self.held][:, None]] += self.axis[self.held]
-        return frozen(out)
+    def of_loads(self, name: str) -> Floats:
+        """Return a field under every load, (l + 1, Q), made when it is first asked for."""
+        if name not in self._made:
+            out = self.maps.apply(name, self._states(name))
+            if name == "edge_force":
+                width = self.directions
+                out[-1, self.inner_edge] += self.at_second
+                rows = 2 * width * np.arange(len(self.held))[:, None] + width + np.arange(width)
+                out[rows, self.inner_edge[self.held][:, None]] += self.axis[self.held]
+            self._made[name] = frozen(out)
+        return self._made[name]
 
     @cached_property
-    def displacement(self) -> Floats:
-        """Displacements of all nodes, (l + 1, 3n)."""
-        return frozen(self.maps.apply("displacement", self.twist))
+    def _made(self) -> dict[str, Floats]:
+        return {}
 
-    @cached_property
-    def support(self) -> Floats:
-        """Force and moment at every ground end of the scene, (l + 1, 6G)."""
-        return frozen(self.maps.apply("support", self.wrench))
-
-    @cached_property
-    def joint_wrench(self) -> Floats:
-        """Wrenches of all springs of the network, (l + 1, 6S)."""
-        return frozen(self.maps.apply("joint_wrench", self.wrench))
-
-    @cached_property
-    def brick_twist(self) -> Floats:
-        """Twists of all bricks, (l + 1, 6b)."""
-        return frozen(self.maps.apply("brick_twist", self.twist))
+    def _states(self, name: str) -> Floats:
+        """Return what a field follows from under every load: twists or wrenches."""
+        return self.twist if name in _OF_TWISTS else self.wrench
 
 
 class OperatorBuilder:
