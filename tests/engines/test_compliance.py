@@ -17,9 +17,9 @@ from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._refinement import _Corrector
 from seqopt.engines.rigid._response_maps import loads_of
-from seqopt.engines.rigid.compliance import _CANCEL, _EVEN, ComplianceEngine, _cancels, _solve_batch
+from seqopt.engines.rigid.compliance import _CANCEL, _EVEN, ComplianceEngine, _cancels
 from seqopt.network.build import build_network
-from tests.builders import from_both_sides, six_bricks, small_arch
+from tests.builders import from_both_sides, six_bricks, small_arch, solve_batch
 from tests.limit_scenes import LOOSE_AT, chain, loosened
 from tests.reference_chain import solve_exactly
 
@@ -47,9 +47,9 @@ def test_grips_on_both_sides_of_a_joint_that_hardly_turns(monkeypatch):
     net = build_network(loosened(chain(16), 1e-7, only_turning=True))
     columns = grip_columns(net, 16, BOTH_SIDES)
     operator = OperatorBuilder(net, grow_tree(net)).operator(16)
-    plain, trusted = _solve_batch(operator, columns, Want.ALL, accuracy=1e-7)
+    plain, trusted = solve_batch(operator, columns, Want.ALL, accuracy=1e-7)
     assert trusted.all()
-    assert _solve_batch(operator, columns)[1].any()
+    assert solve_batch(operator, columns)[1].any()
     better, worse = ComplianceEngine(net).solve(16, BOTH_SIDES, Want.ALL), 0.0
     for row, grips in enumerate(columns):
         exact = solve_exactly(net, 16, grips)
@@ -59,7 +59,7 @@ def test_grips_on_both_sides_of_a_joint_that_hardly_turns(monkeypatch):
         gap = np.abs(plain.displacement[row, nodes] - exact.displacement).max()
         worse = max(worse, gap / size)
     assert worse > 5e-9
-    assert not _solve_batch(operator, columns, even=False)[1].all()
+    assert not solve_batch(operator, columns, even=False)[1].all()
 
 
 def evenly(scene, joint, kind, share):
@@ -216,8 +216,8 @@ def test_what_is_only_to_be_compared_is_corrected_less(monkeypatch):
     sets, engine = [[199, 198, 197]], ComplianceEngine(net)
     operator = OperatorBuilder(net, grow_tree(net)).operator(100)
     columns = grip_columns(net, 100, sets)
-    assert not _solve_batch(operator, columns)[1].any()
-    assert _solve_batch(operator, columns, accuracy=compliance._SCREEN)[1].all()
+    assert not solve_batch(operator, columns)[1].any()
+    assert solve_batch(operator, columns, accuracy=compliance._SCREEN)[1].all()
     monkeypatch.setattr(compliance, "Refinement", None)
     engine.solve(100, sets, Want.RESPONSES | Want.SCREEN)
     with pytest.raises(TypeError):

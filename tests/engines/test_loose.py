@@ -21,14 +21,22 @@ from seqopt.engines.rigid._mechanism import require_resistance, ungripped_system
 from seqopt.engines.rigid._mixed import solve_dense, solve_mixed
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._refinement import Refinement, _Corrector, _held_operator, _hold_loose
-from seqopt.engines.rigid.compliance import ComplianceEngine, _solve_batch
+from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS
-from tests.builders import all_nodes, block, hinged, on_soft_ground, six_bricks, torsion_free
+from tests.builders import (
+    all_nodes,
+    block,
+    hinged,
+    on_soft_ground,
+    six_bricks,
+    solve_batch,
+    torsion_free,
+)
 from tests.limit_scenes import HELD, chain, loosened, without_joint
 from tests.reference_chain import solve_exactly
 
@@ -171,7 +179,7 @@ def test_the_operator_of_a_loose_structure_is_symmetric(arch25):
     matrix = operator.flexibility
     assert np.abs(matrix - matrix.T).max() <= 1e-12 * np.abs(matrix).max()
     assert operator.directions == 3
-    assert len(operator.brick_twist) == 6 * 20 + 3 + 1
+    assert len(operator.of_loads("brick_twist")) == 6 * 20 + 3 + 1
 
 
 def test_a_saddle_among_many_systems():
@@ -203,7 +211,7 @@ def test_close_grips_on_a_long_chain_are_corrected_together(count, together):
     sets = [(tip, tip - 1, tip - 2), (tip, tip - 2, tip - 4), (tip - 1, tip - 2, tip - 3)]
     engine = ComplianceEngine(net)
     columns = grip_columns(net, count, sets)
-    _, trusted = _solve_batch(engine._operator(count, columns), columns)
+    _, trusted = solve_batch(engine._operator(count, columns), columns)
     assert not trusted.any()
     fields = engine.solve(count, sets, Want.ALL)
     for row, places in enumerate(columns):

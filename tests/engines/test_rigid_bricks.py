@@ -12,10 +12,10 @@ from seqopt.engines.rigid import compliance as trial
 from seqopt.engines.rigid._grip_equations import _solve_positive
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._operator import OperatorBuilder
-from seqopt.engines.rigid.compliance import ComplianceEngine, _solve_batch
+from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
-from tests.builders import hinged, six_bricks
+from tests.builders import hinged, six_bricks, solve_batch
 from tests.limit_scenes import HELD, LOOSE_AT, chain, loosened
 from tests.reference_chain import solve_exactly
 
@@ -46,7 +46,7 @@ def test_grips_beyond_a_loose_joint(factor, only_turning):
     operator = OperatorBuilder(net, grow_tree(net)).operator(25)
     columns = grip_columns(net, 25, np.array(sets))
     for accuracy in (1e-9, 1e-6):
-        fields, trusted = _solve_batch(operator, columns, Want.ALL, accuracy=accuracy)
+        fields, trusted = solve_batch(operator, columns, Want.ALL, accuracy=accuracy)
         assert trusted[2]
         assert not trusted[:2].any() or factor >= 1e3 * np.finfo(float).eps / accuracy
         for row in np.flatnonzero(trusted):
@@ -107,7 +107,7 @@ def test_loads_in_two_directions():
         wrench=space.wrench[[*kept, 36]],
     )
     columns = np.array([(0, 7, 11), (6, 7, 2), (3, 9, 8), (4, 1, 10)])
-    (more, sound), (less, trusted) = (_solve_batch(o, columns, Want.ALL) for o in (space, plane))
+    (more, sound), (less, trusted) = (solve_batch(o, columns, Want.ALL) for o in (space, plane))
     assert sound.all()
     assert trusted.all()
     for name in ("edge_force", "displacement", "support"):

@@ -11,9 +11,9 @@ from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid import compliance as trial
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._operator import OperatorBuilder
-from seqopt.engines.rigid.compliance import ACCURACY, _solve_batch, _try_forces
+from seqopt.engines.rigid.compliance import ACCURACY, _try_forces
 from seqopt.network.build import build_network
-from tests.builders import small_arch
+from tests.builders import small_arch, solve_batch
 
 
 @pytest.fixture
@@ -41,10 +41,10 @@ def test_asked_twice_it_says_the_same(asked):
 
 @pytest.mark.parametrize("chunk", [1, 2, 3, 5])
 def test_sets_are_trusted_whatever_stands_beside_them(monkeypatch, asked, chunk):
-    whole, trusted = _solve_batch(*asked, Want.ALL)
+    whole, trusted = solve_batch(*asked, Want.ALL)
     assert trusted.all()
     monkeypatch.setattr(trial, "_CHUNK", chunk)
-    parts, also = _solve_batch(*asked, Want.ALL)
+    parts, also = solve_batch(*asked, Want.ALL)
     assert also.all()
     size = np.abs(whole.edge_force).max()
     assert np.abs(parts.edge_force - whole.edge_force).max() <= 1e-9 * size

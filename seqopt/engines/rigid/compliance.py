@@ -99,19 +99,6 @@ def _try_forces(
     return _Tried(operator, columns, index, force, pairs, good)
 
 
-def _solve_batch(
-    operator: ComplianceOperator,
-    columns: Ints,
-    want: Want = Want.RESPONSES,
-    *,
-    even: bool = True,
-    accuracy: float = ACCURACY,
-) -> tuple[Fields, Bools]:
-    """Return the fields of grip sets, as `_Tried.fields`, and which of them (S,) are accurate."""
-    tried = _try_forces(operator, columns, even=even, accuracy=accuracy)
-    return Fields(**tried.fields(want)), tried.trusted
-
-
 def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
     """Return whether motions cancel at the grips of sets (S,), by forces (S, k) at rows (S, k)."""
     out = np.zeros(len(index), dtype=bool)
@@ -125,31 +112,6 @@ def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
         left = np.abs(operator.answer("displacement", rows, pull)).max(axis=1)
         out[start : start + _CHUNK] = parts.max(axis=1) > _CANCEL * left
     return out
-
-
-class _Kept:
-    """The operators that were asked for last, by brick count.
-
-    ``most``: bytes that they may take when a further one is to be made.
-    """
-
-    def __init__(self, most: float) -> None:
-        self._most = most
-        self._operators: dict[int, ComplianceOperator] = {}  # the one asked last comes last
-
-    def take(self, bricks: int) -> ComplianceOperator | None:
-        """Return the operator of a brick count, if it is here, and give it away."""
-        return self._operators.pop(bricks, None)
-
-    def put(self, bricks: int, operator: ComplianceOperator) -> None:
-        """Keep an operator as the one that was asked last."""
-        self._operators[bricks] = operator
-
-    def make_room(self) -> None:
-        """Drop those that were not asked for longest, until the rest takes little memory."""
-        total = sum(operator.nbytes for operator in self._operators.values())
-        while total > self._most:
-            total -= self._operators.pop(next(iter(self._operators))).nbytes
 
 
 _KEPT = 32e6  # bytes of operators that may stay when another is made
@@ -171,7 +133,7 @@ class ComplianceEngine(NamedEngine):
         super().__init__(network)
         self._basis, self._accuracy = basis, accuracy
         self._tree, self._even = grow_tree(self.network), _count_even(self.network)
-        self._kept = _Kept(_KEPT)
+        self._kept: dict[int, ComplianceOperator] = {}  # the one that was asked last comes last
         self._refinement: Refinement | None = None  # of the brick count that was asked last
 
     @failing_in_a_line
@@ -197,16 +159,22 @@ class ComplianceEngine(NamedEngine):
 
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
-        known = self._kept.take(bricks)
+        known = self._kept.pop(bricks, None)
         if known is None or not known.covers(columns // 2):
             held = np.union1d(columns // 2, np.arange(0) if known is None else known.held)
             if 2 * len(held) >= bricks:
                 held = np.arange(bricks)
-            self._kept.make_room()
+            self._make_room()
             with one_thread():
                 known = self._builder.operator(bricks, held)
-        self._kept.put(bricks, known)
+        self._kept[bricks] = known
         return known
+
+    def _make_room(self) -> None:
+        """Drop operators that were not asked for longest, until the rest takes little memory."""
+        total = sum(operator.nbytes for operator in self._kept.values())
+        while total > _KEPT:
+            total -= self._kept.pop(next(iter(self._kept))).nbytes
 
     @cached_property
     def _shared(self) -> Shared:
