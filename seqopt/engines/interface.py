@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
-from functools import cache, cached_property, wraps
+from functools import cache, cached_property
 from itertools import combinations
-from typing import ParamSpec, Protocol, SupportsIndex, TypeVar
+from typing import Protocol, SupportsIndex
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -255,27 +255,19 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
     return np.asarray(columns, dtype=np.int64)
 
 
-_Asked = ParamSpec("_Asked")
-_Answer = TypeVar("_Answer")
-
-
-def failing_in_a_line(solve: Callable[_Asked, _Answer]) -> Callable[_Asked, _Answer]:
-    """Return a function whose numerical failures are a `SolverError`."""
-
-    @wraps(solve)
-    def solved(*arguments: _Asked.args, **named: _Asked.kwargs) -> _Answer:
-        try:
-            return solve(*arguments, **named)
-        except (np.linalg.LinAlgError, ValueError) as error:
-            # SciPy says so of arrays that it does not take
-            if not isinstance(error, np.linalg.LinAlgError) and "infs or NaNs" not in str(error):
-                raise
-            raise SolverError(
-                f"the equations have no answer in numbers ({error}); correct lengths, masses or "
-                "stiffnesses beyond all bounds in the scene"
-            ) from error
-
-    return solved
+@contextmanager
+def failing_in_a_line() -> Iterator[None]:
+    """Let numerical failures be a `SolverError`, of a function that this decorates too."""
+    try:
+        yield
+    except (np.linalg.LinAlgError, ValueError) as error:
+        # SciPy says so of arrays that it does not take
+        if not isinstance(error, np.linalg.LinAlgError) and "infs or NaNs" not in str(error):
+            raise
+        raise SolverError(
+            f"the equations have no answer in numbers ({error}); correct lengths, masses or "
+            "stiffnesses beyond all bounds in the scene"
+        ) from error
 
 
 def no_sets(network: Network, bricks: int, held: int) -> Fields:
@@ -330,7 +322,7 @@ class SerialEngine(NamedEngine):
     All fields are evaluated whatever is asked: the solution dominates the cost.
     """
 
-    @failing_in_a_line
+    @failing_in_a_line()
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self.network, bricks, grips)

@@ -136,7 +136,7 @@ class ComplianceEngine(NamedEngine):
         self._kept: dict[int, ComplianceOperator] = {}  # the one that was asked last comes last
         self._refinement: Refinement | None = None  # of the brick count that was asked last
 
-    @failing_in_a_line
+    @failing_in_a_line()
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self._network, bricks, grips)
