@@ -17,7 +17,6 @@ from seqopt.sequence.two_robots import (
     alternate,
     cast,
     find_robots,
-    find_turns,
     in_words,
     placing_node,
     sequential,
@@ -78,8 +77,7 @@ def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sch
     """
     network = network_of(network)
     every = {brick.name for brick in network.scene.bricks}
-    pairs = find_turns(network, "two-robot", every, robots)
-    parts = alternate(network, every, pairs, lambda _, bricks: OpenGrip(bricks - 1))
+    parts = alternate(network, "two-robot", every, robots, lambda _, count: OpenGrip(count - 1))
     steps = [OpenStep(number, *part) for number, part in enumerate(parts, start=1)]
     return open_schedule("two-robot", network, steps)
 

@@ -310,16 +310,19 @@ METHODS: dict[str, Method[tuple[Step, ...]]] = {"sequential": sequential, "canti
 
 def alternate(
     network: Network,
+    method: str,
     swap_after: Set[int],
-    pairs: Sequence[_Pair],
+    robots: Sequence[str],
     grip: Callable[[int, int], _Grip],
 ) -> Iterator[tuple[StepKind, int, tuple[_Grip | None, ...]]]:
-    """Yield the steps in which two robots place and hold, as `_take_turns` says who does.
+    """Yield the steps in which two robots, that may be named, place and hold by turns.
 
     After each brick one of the two releases, if it holds anything; after the last one both do.
     ``grip`` says what a robot, by its index, holds of the brick that it places, by the brick count.
     """
     placed = network.scene.placed
+    chosen = find_robots(network.scene, robots, method, 2)
+    pairs = _take_turns(network, swap_after, chosen, [(chosen[0], chosen[1])] if robots else [])
     grips: list[_Grip | None] = [None] * len(network.scene.robots)
     for count, (brick, (placer, holder)) in enumerate(zip(placed, pairs, strict=True), start=1):
         grips[placer] = grip(placer, count)
@@ -332,25 +335,16 @@ def alternate(
             yield StepKind.RELEASE, count, tuple(grips)
 
 
-def find_turns(
-    network: Network, method: str, swap_after: Set[int], robots: Sequence[str]
-) -> list[_Pair]:
-    """Return who places and who holds in a method of two robots that may be named."""
-    chosen = find_robots(network.scene, robots, method, 2)
-    return _take_turns(network, swap_after, chosen, [(chosen[0], chosen[1])] if robots else [])
-
-
 def _two_robots(
     network: Network, method: str, swap_after: Set[int], robots: Sequence[str]
 ) -> tuple[Step, ...]:
     """Return the sequence in which holder and placer swap after placing some of the bricks."""
     scene = network.scene
-    pairs = find_turns(network, method, swap_after, robots)
 
     def node(robot: int, count: int) -> int:
         return placing_node(network, scene.robots[robot], scene.placed[count - 1])
 
-    parts = alternate(network, swap_after, pairs, node)
+    parts = alternate(network, method, swap_after, robots, node)
     steps = [Step(number, *part) for number, part in enumerate(parts, start=1)]
     check_support(network, steps)
     return check_sequence(scene, steps)

@@ -15,7 +15,6 @@ from seqopt.sequence.steps import Step, StepKind
 from seqopt.sequence.three_robots import open_schedule, three_robot_loop
 from seqopt.sequence.two_robots import (
     _begins_elsewhere,
-    _take_turns,
     alternate,
     cantilever,
     degeneration,
@@ -136,12 +135,11 @@ def test_that_bricks_lie_along_is_not_enough_where_ends_take_turns():
     """Held only after bricks that lie along, one end was placed while the other was held."""
     network = build_network(replace(from_both_ends(11), robots=anywhere(2)))
     scene, along = network.scene, lies_along(network)
-    pairs = _take_turns(network, along, [0, 1])
 
     def node(robot, count):
         return placing_node(network, scene.robots[robot], scene.placed[count - 1])
 
-    parts = alternate(network, along, pairs, node)
+    parts = alternate(network, "cantilever", along, (), node)
     steps = [Step(number, *part) for number, part in enumerate(parts, start=1)]
     assert grows_from_what_is_held(network, steps)
 
