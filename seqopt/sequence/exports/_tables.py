@@ -15,10 +15,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 from seqopt._files import harmless
-from seqopt.errors import StepError
-from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Step, StepKind, check_sequence
+from seqopt.sequence.steps import Step
 
 
 class BlockState(Enum):
@@ -66,9 +64,6 @@ def step_states(scene: Scene, steps: Sequence[Step]) -> Iterator[StepStates]:
         before = step.bricks
 
 
-_FORMAT, _VERSION = "seqopt-plan", 1
-
-
 def plan_csv(scene: Scene, steps: Sequence[Step]) -> str:
     """Return a plan as CSV, a row per step.
 
@@ -109,38 +104,14 @@ def plan_json(scene: Scene, steps: Sequence[Step]) -> str:
         for row in step_states(scene, steps)
     ]
     whole = {
-        "format": _FORMAT,
-        "version": _VERSION,
+        "format": "seqopt-plan",
+        "version": 1,
         "scene": scene.name,
         "blocks": [brick.name for brick in scene.placed],
         "robots": [robot.name for robot in scene.robots],
         "steps": rows,
     }
     return json.dumps(whole, ensure_ascii=False) + "\n"
-
-
-def parse_plan_json(scene: Scene, text: str) -> tuple[Step, ...]:
-    """Return the checked steps of a plan that `plan_json` wrote."""
-    try:
-        whole = json.loads(text)
-        if (whole["format"], whole["version"]) != (_FORMAT, _VERSION):
-            raise StepError(f"plan: format is {short(whole['format'])}; give a {_FORMAT}")
-        if whole["blocks"] != [brick.name for brick in scene.placed]:
-            raise StepError(f"plan: its blocks are not those of scene {scene.name}")
-        robots = [robot.name for robot in scene.robots]
-        unknown = {name for row in whole["steps"] for name in row["holds"]} - set(robots)
-        if unknown:
-            raise StepError(f"plan: there is no robot {short(min(unknown))} in scene {scene.name}")
-        steps, count = [], 0
-        for i, row in enumerate(whole["steps"], start=1):
-            count += len(row["placed"])
-            grips = tuple(row["holds"].get(name, {}).get("node") for name in robots)
-            steps.append(Step(i, StepKind(row["type"]), count, grips))
-    except StepError:
-        raise
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise StepError(f"plan: no {_FORMAT} document: {short(error, 80)}") from error
-    return check_sequence(scene, steps)
 
 
 def sequencer_json(scene: Scene, steps: Sequence[Step]) -> str:
