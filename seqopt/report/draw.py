@@ -10,7 +10,6 @@ one.
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -124,20 +123,14 @@ def _drawing_order(corners: Floats, toward: Floats) -> list[int]:
             far, near = pair[::side]
             behind[near].add(far)
             hides[far].append(near)
-    depth = seen[..., 2].mean(axis=1).tolist()
-    ready = [(depth[i], i) for i, waits in enumerate(behind) if not waits]
-    heapq.heapify(ready)
-    order, left = [], dict.fromkeys(range(len(depth)))
-    while left:  # a circle starts at its farthest
-        i = heapq.heappop(ready)[1] if ready else min(left, key=lambda k: depth[k])
-        if i not in left:
-            continue
-        del left[i]
+    left: list[int] = np.argsort(seen[..., 2].mean(axis=1), kind="stable").tolist()
+    order = []
+    while left:  # the farthest with none of the rest behind it, or, in a circle, of all
+        i = next((k for k in left if not behind[k]), left[0])
+        left.remove(i)
         order.append(i)
         for near in hides[i]:
             behind[near].discard(i)
-            if not behind[near] and near in left:
-                heapq.heappush(ready, (depth[near], near))
     return order
 
 
