@@ -40,7 +40,6 @@ WORDS = {
 OVER = "over payload"
 LEGEND = {OVER: "a robot would hold more than it can", OUTSIDE: "its numbers are not reliable"}
 PAGE = "report.html"
-FORCES = {"F_largest": "F_rob"}  # another name for the same
 FIRST = (CLOSED, FREE)  # of a comparison: its other rows may be more than are seen at once
 PLANS = ("plan.csv", "pick.csv", "steps_*.csv")  # of optimize, pareto and compare
 SMALL = 60  # bricks up to which a plan is shown beside the fixed methods
@@ -204,7 +203,7 @@ def front_page(
         (build,) = _builds(placed, {name: plan}, {name: left})
         another = placed.build_order != scene.build_order
         builds.append(replace(build, order=placed.build_order) if another else build)
-    words = {name: WORDS.get(FORCES.get(name, name), name) for name in map(str, table)}
+    words = {**WORDS, "F_largest": WORDS["F_rob"]}  # another name for the same
     points = table.rename(columns=words).set_axis(names)
     lengths = [name for name in points if str(name).endswith("1e-3 mm")]
     points = points.assign(**{str(name): 1e6 * points[name] for name in lengths})
