@@ -26,7 +26,7 @@ from scipy.sparse.csgraph import connected_components
 from seqopt._showing import Shown, display
 from seqopt.arrays import Ints, Terse
 from seqopt.errors import StepError, did_you_mean
-from seqopt.network.network import GROUND, Network
+from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
 
@@ -136,13 +136,10 @@ ScheduledGrips = tuple[int | OpenGrip | None, ...]
 
 
 @dataclass(frozen=True)
-class OpenStep:
+class OpenStep(AnyStep):
     """A step whose grips are nodes, open moves, or none."""
 
-    number: int  # from 1
-    kind: StepKind
-    bricks: int  # how many stand, in build order
-    grips: ScheduledGrips  # of each of the scene's robots
+    grips: ScheduledGrips
 
     @cached_property
     def moves(self) -> tuple[int, ...]:
@@ -324,10 +321,10 @@ def islands(network: Network, bricks: int) -> tuple[_Island, ...]:
     ones = np.ones(len(pairs), dtype=bool)
     graph = coo_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(bricks + 1, bricks + 1))
     part = connected_components(graph, directed=False)[1].tolist()
-    found: dict[int, set[int]] = {label: set() for label in part if label != part[0]}
+    found: dict[int, set[int]] = {}
     for brick, label in zip(network.scene.placed, part[1:], strict=False):
-        if label in found:
-            found[label].add(brick.name)
+        if label != part[0]:
+            found.setdefault(label, set()).add(brick.name)
     return tuple(map(frozenset, found.values()))
 
 
@@ -356,12 +353,7 @@ def check_support(
 
 
 def _always_tied(network: Network) -> bool:
-    """Return whether every brick is tied to one that is supported as soon as it is placed."""
+    """Return whether every brick is tied to the ground or one before it as soon as it is placed."""
     springs = network.springs
-    acting = springs.stiffness.any(axis=1)
-    supported = {GROUND}
-    rows = np.column_stack([springs.bodies, springs.since])[acting].tolist()
-    for first, second, since in rows:
-        if first in supported and since == second + 1:
-            supported.add(second)
-    return len(supported) == 1 + len(network.scene.placed)
+    at_once = springs.stiffness.any(axis=1) & (springs.since == springs.bodies[:, 1] + 1)
+    return len(np.unique(springs.bodies[at_once, 1])) == len(network.scene.placed)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from enum import Enum
 from itertools import chain
 from numbers import Integral
-from typing import Protocol
 
 from seqopt.errors import StepError
 from seqopt.scene.parts import Robot
@@ -25,7 +24,17 @@ class StepKind(Enum):
 
 
 @dataclass(frozen=True)
-class Step:
+class AnyStep:
+    """A step, or one with grips that are still open: anything but a node or None."""
+
+    number: int  # from 1
+    kind: StepKind
+    bricks: int  # how many are placed, in build order
+    grips: tuple[object, ...]  # of each of the scene's robots
+
+
+@dataclass(frozen=True)
+class Step(AnyStep):
     """One step of the build: the bricks placed, and the node that every robot holds.
 
     Parameters
@@ -50,35 +59,12 @@ class Step:
     (1, 2)
     """
 
-    number: int
-    kind: StepKind
-    bricks: int
     grips: Grips
 
     @property
     def held(self) -> tuple[int, ...]:
         """The nodes held, in the order of the robots."""
         return tuple(node for node in self.grips if node is not None)
-
-
-class AnyStep(Protocol):
-    """A step, or one with grips that are still open: anything but a node or None."""
-
-    @property
-    def number(self) -> int:
-        """From 1."""
-
-    @property
-    def kind(self) -> StepKind:
-        """What the step does."""
-
-    @property
-    def bricks(self) -> int:
-        """How many bricks are placed, in build order."""
-
-    @property
-    def grips(self) -> tuple[object, ...]:
-        """The node that each of the scene's robots holds, or None."""
 
 
 def idle_robots(scene: Scene, steps: Iterable[AnyStep]) -> tuple[str, ...]:
