@@ -17,6 +17,7 @@ from seqopt.network._mechanics import (
     deformation,
     node_motion,
     point_motion,
+    spread,
     spring_maps,
 )
 from seqopt.network.network import Network
@@ -71,10 +72,8 @@ def share(network: Network) -> Shared:
     """Return what the systems of all brick counts are cut from."""
     springs, size = network.springs, network.inner.size
     brick = np.repeat(np.arange(len(network.inner)), 2)
-    arm = network.node_position[network.inner.ravel()] - network.centroid[brick]
-    column = np.repeat(6 * brick[:, None] + np.arange(6), 3, axis=0).ravel()
-    moved = (point_motion(arm).ravel(), column, np.arange(0, 18 * size + 1, 6))
-    inner = sparse.csr_array(moved, shape=(3 * size, 3 * size))
+    moved = point_motion(network.node_position[network.inner.ravel()] - network.centroid[brick])
+    inner = spread(np.arange(size), brick, moved, (size, len(network.inner)))
     gap = deformation(springs.bodies, springs.position, network.centroid, springs.axes)
     return Shared(build_statics(network), gap, inner)
 
