@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -132,14 +131,12 @@ class _Turn(NamedTuple):
 
 
 def _rotation(count: int, turns: int) -> list[_Turn]:
-    """Return who does what, turn by turn; a role is named by the first brick that it places."""
-    mover, placer, holding = count - 1, 0, deque(range(1, count - 1))
-    out = []
-    for _ in range(turns):
-        out.append(_Turn(mover, placer, holding.popleft()))
-        holding.append(placer)
-        mover, placer = out[-1].oldest, mover
-    return out
+    """Return who does what, turn by turn; a role is named by the first brick that it places.
+
+    Who has held longest moves in the next turn, and places in the one after.
+    """
+    oldest = [*range(1, count - 1), 0, count - 1]  # again and again
+    return [_Turn(*(oldest[(k - ago) % count] for ago in (1, 2, 0))) for k in range(turns)]
 
 
 def _loop(network: Network, order: Sequence[int], turns: Sequence[_Turn]) -> list[OpenStep]:
