@@ -10,7 +10,7 @@ from __future__ import annotations
 import gzip
 import json
 from base64 import b64encode
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from hashlib import sha256
 from html import escape
@@ -29,7 +29,8 @@ from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, overloads
 from seqopt.responses.quantities import number_text
 from seqopt.responses.table import OUTSIDE, Departure, force_column
-from seqopt.scene.boxes import boxes, vertices_of
+from seqopt.scene.boxes import vertices_of
+from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Order, Scene
 from seqopt.scene.shape import normal_of
 from seqopt.sequence.steps import Step
@@ -37,7 +38,6 @@ from seqopt.sequence.steps import Step
 LARGEST = 32767
 FIELDS = ("twist", "edge", "push", "turn")  # packed, a row for every step
 ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#b85c00", "#444444", "#1f5fa8")
-FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 RESPONSES = {
     "F_largest": "largest grip force, N",
     "M_sup_Nm": "largest support moment, N m",
@@ -100,17 +100,11 @@ class Scatter:
 def _structure_data(network: Network) -> dict[str, object]:
     """Return a structure as lists, ready for JSON; edges end with their brick count."""
     scene = network.scene
-    rows = zip(scene.placed, network.centroid, _solids(scene), strict=True)
     return {
         "name": scene.name,
         "bricks": [
-            {
-                "name": brick.name,
-                "center": _rounded(center),
-                "corners": _rounded(corners),
-                "faces": faces,
-            }
-            for brick, center, (corners, faces) in rows
+            {"name": brick.name, "center": _rounded(center), **_solid(brick)}
+            for brick, center in zip(scene.placed, network.centroid, strict=True)
         ],
         "nodes": {
             str(node): {"at": _rounded(scene.node_position(node)), "brick": i}
@@ -131,14 +125,10 @@ def _structure_data(network: Network) -> dict[str, object]:
     }
 
 
-def _solids(scene: Scene) -> Iterator[tuple[Floats, Sequence[Sequence[int]]]]:
-    """Yield corners (k, 3) and faces of all bricks; the viewer draws a face as a fan."""
-    for brick, corners in zip(scene.placed, boxes(scene.placed).corners(), strict=True):
-        if brick.shape is None:
-            yield corners, FACES
-        else:
-            points, faces = vertices_of(brick)
-            yield points, [_fan(points, tuple(face)) for face in faces]
+def _solid(brick: Brick) -> dict[str, object]:
+    """Return corners (k, 3) and faces of a brick; the viewer draws a face as a fan."""
+    points, faces = vertices_of(brick)
+    return {"corners": _rounded(points), "faces": [_fan(points, tuple(face)) for face in faces]}
 
 
 def _fan(points: Floats, face: tuple[int, ...]) -> tuple[int, ...]:
