@@ -117,20 +117,18 @@ def _drawing_order(corners: Floats, toward: Floats) -> list[int]:
     seen = corners @ toward.T
     pairs = _overlapping(seen[..., :2])
     behind: list[set[int]] = [set() for _ in corners]
-    hides: list[list[int]] = [[] for _ in corners]
     for pair, side in zip(pairs.tolist(), _in_front(seen, pairs).tolist(), strict=True):
         if side:
             far, near = pair[::side]
             behind[near].add(far)
-            hides[far].append(near)
     left: list[int] = np.argsort(seen[..., 2].mean(axis=1), kind="stable").tolist()
     order = []
     while left:  # the farthest with none of the rest behind it, or, in a circle, of all
         i = next((k for k in left if not behind[k]), left[0])
         left.remove(i)
         order.append(i)
-        for near in hides[i]:
-            behind[near].discard(i)
+        for waits in behind:
+            waits.discard(i)
     return order
 
 
