@@ -28,7 +28,7 @@ from seqopt.errors import ProblemError
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, overloads
 from seqopt.responses.quantities import number_text
-from seqopt.responses.table import OUTSIDE, Departure, force_column
+from seqopt.responses.table import OUTSIDE, Departure, force_column, step_fields
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Order, Scene
@@ -204,8 +204,7 @@ def _fields(engine: Engine, build: Build) -> dict[str, Floats]:
     edge = np.zeros((count, len(network.edge_nodes)))
     support = np.zeros((count, len(network.springs.support), 6))
     for i, step in enumerate(build.steps):
-        held = np.array([step.held], dtype=np.int64).reshape(1, -1)
-        found = engine.solve(step.bricks, held, Want.EDGES | Want.BRICKS | Want.SUPPORT)
+        found = step_fields(engine, step, Want.EDGES | Want.BRICKS | Want.SUPPORT)
         twist[i, : step.bricks] = found.brick_twist[0]
         edge[i, : found.edge_force.shape[1]] = found.edge_force[0]
         support[i] = found.support[0]

@@ -242,10 +242,10 @@ def support_columns(scene: Scene) -> list[tuple[str, str]]:
     return [(f"F_sup_{name}_N", f"M_sup_{name}_Nm") for name in names]
 
 
-def step_fields(engine: Engine, step: Step) -> Fields:
+def step_fields(engine: Engine, step: Step, want: Want = Want.RESPONSES) -> Fields:
     """Return the full fields of one step, of one grip set; errors of the engine name the step."""
     with step_named(step):
-        return engine.solve(step.bricks, np.array([step.held], dtype=np.int64).reshape(1, -1))
+        return engine.solve(step.bricks, np.array([step.held], dtype=np.int64).reshape(1, -1), want)
 
 
 @contextmanager
