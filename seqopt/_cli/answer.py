@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from seqopt._cli.terminal import complain, note, show, show_text
 from seqopt.errors import (
@@ -22,6 +22,7 @@ from seqopt.errors import (
     WorkerError,
 )
 
+NOT_IN_JSON = {"NaN": None, "Infinity": "inf", "-Infinity": "-inf"}  # and what is said in its place
 LESS = "take fewer bricks, robots that reach less, or a computer with more memory"
 
 
@@ -72,17 +73,18 @@ class Answer:
     failures: tuple[str, ...] = ()  # what went wrong although there is an answer: as notes
     status: Status = Status.DONE
 
-    def document(self, command: str) -> dict[str, object]:
+    def document(self, command: str) -> Any:
         """Return what scripts are told of a command, ready for JSON."""
-        return {
+        said = {
             "command": command,
             "seqopt": version("seqopt"),
-            **{name: plain(value) for name, value in self.facts.items()},
-            "written": [str(path) for path in self.written],
-            "notes": list(self.notes),
-            "failures": list(self.failures),
-            "exit_status": int(self.status),
+            **self.facts,
+            "written": self.written,
+            "notes": self.notes,
+            "failures": self.failures,
+            "exit_status": self.status,
         }
+        return plain(said)
 
 
 def print_answer(answer: Answer, options: argparse.Namespace) -> Status:
@@ -107,7 +109,7 @@ def print_answer(answer: Answer, options: argparse.Namespace) -> Status:
     return answer.status
 
 
-def plain(value: object) -> object:
+def plain(value: object) -> Any:
     """Return a value as JSON can hold it, numbers with all of their digits.
 
     What is not known (NaN) is null, what is infinite the text ``inf`` or ``-inf``; a table is a
@@ -118,23 +120,19 @@ def plain(value: object) -> object:
     >>> plain({"gap": float("nan"), "bond": float("inf"), "nodes": (1, 20)})
     {'gap': None, 'bond': 'inf', 'nodes': [1, 20]}
     """
-    if isinstance(value, float) and not math.isfinite(value):
-        return None if math.isnan(value) else str(value)
-    if isinstance(value, str | int | float | None):
-        return value
-    if isinstance(value, Mapping):
-        return {str(name): plain(part) for name, part in value.items()}
-    if isinstance(value, Sequence | set | frozenset):
-        return [plain(part) for part in value]
-    return _unpacked(value)
+    return json.loads(json.dumps(value, default=_unpacked), parse_constant=NOT_IN_JSON.get)
 
 
-def _unpacked(value: object) -> object:
+def _unpacked(value: object) -> Any:
     """Return what a table, an array, a member of an enumeration or anything else holds."""
     import pandas as pd  # noqa: PLC0415  # help needs none of it
 
     if isinstance(value, pd.DataFrame):
-        return plain(value.to_dict(orient="records"))
+        return value.to_dict(orient="records")
+    if isinstance(value, Mapping):
+        return dict(value)
+    if isinstance(value, Sequence | set | frozenset):
+        return list(value)
     if hasattr(value, "tolist"):
-        return plain(value.tolist())
-    return plain(value.value) if isinstance(value, Enum) else str(value)
+        return value.tolist()
+    return value.value if isinstance(value, Enum) else str(value)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
@@ -78,13 +77,9 @@ def plan_files(
     return files
 
 
-def _plain(value: object) -> object:
+def _plain(value: object) -> Any:
     """Return what JSON can hold: null in the place of numbers that are not finite."""
-    if isinstance(value, Mapping):
-        return {str(name): _plain(part) for name, part in value.items()}
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    return json.loads(json.dumps(value), parse_constant={}.get)
 
 
 def put_table(path: Path | None, table: pd.DataFrame, said: str) -> dict[str, Any]:

@@ -23,7 +23,7 @@ STYLES = {"heading": "1", "bad": "1;31", "doubt": "33"}  # of terminals: bold, b
 CLEAR = "\r\033[K"  # of a terminal: the line it is on
 LONGEST = 2000  # characters of a line on standard error
 BEGIN = re.compile(
-    r"seqopt: (error|warning|solver failed|time is over|out of memory|payload exceeded)(?=:)"
+    r"^seqopt: (error|warning|solver failed|time is over|out of memory|payload exceeded)(?=:)"
 )
 
 
@@ -139,10 +139,7 @@ def _for_people(text: str, style: str) -> str:
     """Return a line as it is, or wrapped and with its first word in color for a terminal."""
     if is_terminal(sys.stderr):
         text = wrapped(text, rest="  ")
-    begin = BEGIN.match(text)
-    if begin is None:
-        return text
-    return painted(begin[0], style, sys.stderr) + text[begin.end() :]
+    return BEGIN.sub(lambda begin: painted(begin[0], style, sys.stderr), text)
 
 
 def flush() -> None:

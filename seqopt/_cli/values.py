@@ -29,6 +29,7 @@ SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORE
 MOST_WORKERS = 1024
 LARGEST = 1e100  # number: products of larger ones overflow
 COUNTS = ("least_grips", "regrips")
+UNBOUND = {("regrips", "any"): None, ("placers", "any"): (), ("candidates", "all"): ""}
 RULES = ("newest", "payload", "ending", "placers", "candidates", *COUNTS)
 
 
@@ -177,15 +178,12 @@ def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:
     for text in texts:
         name, _, value = text.partition("=")
         _known_word(name, RULES, f"--rule {text}", StepError)
-        given[name] = value
-        if name in COUNTS and value.isdecimal():
-            given[name] = int(value)
+        if (name, value) in UNBOUND:
+            given[name] = UNBOUND[name, value]
         elif name == "placers":
-            given[name] = () if value == "any" else parse_robots(value)
-        elif (name, value) == ("regrips", "any"):
-            given[name] = None
-        elif (name, value) == ("candidates", "all"):
-            given[name] = ""
+            given[name] = parse_robots(value)
+        else:
+            given[name] = int(value) if name in COUNTS and value.isdecimal() else value
     return FreeRules(**given)  # type: ignore[arg-type]
 
 

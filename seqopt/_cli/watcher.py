@@ -51,7 +51,8 @@ class Watcher:
         self._over.set()
         self._shows = False
         if self._lock.acquire(timeout=TICK):  # an interrupt may have met whoever has it
-            self._close()
+            if self._bar is not None:
+                self._bar.close()
             self._lock.release()
 
     def __call__(self, told: object) -> None:
@@ -99,11 +100,6 @@ class Watcher:
             return stage.left - (now - self._told)
         took = now - self._began[stage.what][0] if stage.share > 0 else 0.0
         return took * (1 - stage.share) / max(stage.share, 1e-9)
-
-    def _close(self) -> None:
-        if self._bar is not None:
-            self._bar.close()
-            self._bar = None
 
 
 def _bar() -> tqdm[None]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import (
@@ -141,12 +142,10 @@ def _timely(
 ) -> Iterator[tuple[Step, Fields]]:
     """Yield the answers that come in time, from the first one that is asked for."""
     end = time.perf_counter() + seconds
-    while True:
-        try:
+    with suppress(TimeoutError):
+        while True:
             with ending(end - time.perf_counter()):
                 answer = next(answers, None)
-        except TimeoutError:
-            return
-        if answer is None:
-            return
-        yield answer
+            if answer is None:
+                return
+            yield answer
