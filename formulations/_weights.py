@@ -57,7 +57,10 @@ class Weighable(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
-    """The weights (S,) with the highest bound, and the best choice that was met, with its value."""
+    """The weights (S,) with the highest bound, and the best choice that was met, with its value.
+
+    ``met``: all choices that were, the best first.
+    """
 
     weights: Floats
     bound: float
@@ -88,8 +91,15 @@ def best_weights(choices: Weighable, watch: Watch) -> Weighed:
             break
         ask = highest if step % 2 == 0 else 0.5 * (highest + best)
     values = {choice: choices.aim.value(totals) for choice, totals in met.items()}
-    chosen = min(values, key=values.__getitem__)
-    return Weighed(best, bound, chosen, values[chosen], tuple(met))
+    ranked = sorted(values, key=values.__getitem__)
+    return Weighed(best, bound, ranked[0], values[ranked[0]], tuple(ranked))
+
+
+def provers(choices: Weighable, weighed: Weighed) -> Floats:
+    """Return weights that prove bounds of beginnings, (J, S): the best, and single scenarios."""
+    if choices.aim.most(choices.scenarios) < 1:
+        return weighed.weights[None]
+    return np.vstack([weighed.weights, np.eye(choices.scenarios)])
 
 
 def _highest(totals: Floats, most: float) -> tuple[Floats, float]:

@@ -110,7 +110,7 @@ def references(scene: Scene, count: int, limit: float) -> pd.DataFrame:
         )
         row = {"aim": str(aim), "scenarios": count, "objective": plan.objective[str(aim)]}
         row |= {"bound": plan.selection.bound, "solve_s": plan.seconds["solve"]}
-        row |= {"program": told.value, "program_bound": told.bound}
+        row |= {"program": told.objective, "program_bound": told.bound}
         found.append(row | {"program_s": time.perf_counter() - start, "limit_s": limit})
     return pd.DataFrame(found)
 

@@ -16,7 +16,6 @@ hundreds of times faster by dynamic programs.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import cvxpy as cp
 import numpy as np
@@ -24,26 +23,17 @@ import numpy as np
 from formulations.solvers import minimize, minimize_whole
 from seqopt.graph.layers.costs import TINY, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.formulation import Watch
+from seqopt.plan.calling.formulation import Selection, Watch
 from seqopt.plan.calling.priced_paths import layered_flow
-
-
-@dataclass(frozen=True)
-class _Reference:
-    """What the program says: its value and a bound on it, and the choice of the largest flow."""
-
-    value: float
-    bound: float
-    choice: tuple[int, ...]
 
 
 def _solve_program(
     layers: Sequence[LayeredCosts], most: float, *, whole: bool, watch: Watch | None = None
-) -> _Reference:
-    """Return the least worst or tail total over scenarios, or a bound on it.
+) -> Selection:
+    """Return the choice of the largest flow, with the value of the program and a bound on it.
 
     ``layers``: of every scenario, for the same moves; ``most``: the largest weight of a scenario: 1
-    for the worst total; ``whole``: whether choices are whole; if not, the value is a bound;
+    for the worst total; ``whole``: whether choices are whole; if not, the objective is a bound;
     ``watch``: says when to stop. Raises `InfeasibleError` if no choice is allowed in all scenarios;
     `SolverError` if the solver ends without an optimum.
     """
@@ -65,6 +55,5 @@ def _solve_program(
         optimum = minimize_whole(program, feasible=True, watch=watch)
     else:
         optimum = minimize(program, feasible=True, time_limit=watch.left)
-    value, bound = optimum.value * scale, optimum.bound * scale
-    known = np.isfinite(value)
-    return _Reference(value, bound, flow.choice(np.asarray(arcs.value)) if known else ())
+    choice = flow.choice(np.asarray(arcs.value)) if np.isfinite(optimum.value) else ()
+    return Selection(choice, optimum.value * scale, optimum.bound * scale)

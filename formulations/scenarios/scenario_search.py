@@ -23,13 +23,13 @@ the highest bounds are, and the least of these bounds stays a bound on what was 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
 
-from formulations._weights import CLOSE, Weighed, best_weights
+from formulations._weights import CLOSE, Weighed, best_weights, provers
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.scenarios import Choice, ScenarioArcs, ScenarioLayers, largest_of, scenario_arcs
@@ -39,15 +39,6 @@ from seqopt.problem.problem import Aim
 WIDTH = 20_000  # beginnings that are kept after every move
 NUMBERS = 2e7  # that beginnings with all candidates of the next move may be
 IMPROVED = 50  # choices met that are improved move by move first
-
-
-@dataclass(frozen=True)
-class _Searched:
-    """The best choice, what the aim makes of its totals, and a bound on that of any choice."""
-
-    choice: Choice
-    value: float
-    bound: float
 
 
 class _Layer(NamedTuple):
@@ -72,25 +63,24 @@ def solve(problem: ScenarioLayers, *, watch: Watch, width: int = WIDTH) -> Selec
     weighed = best_weights(arcs, watch)
     found = _close_gap(arcs, weighed, watch, width)
     weights = {str(i): float(w) for i, w in enumerate(weighed.weights, start=1)}
-    end = End.STOPPED if watch.over else End.DONE
-    return Selection(found.choice, found.value, found.bound, weights, end=end)
+    return replace(found, prices=weights, end=End.STOPPED if watch.over else End.DONE)
 
 
-def _close_gap(arcs: ScenarioArcs, weighed: Weighed, watch: Watch, width: int = WIDTH) -> _Searched:
+def _close_gap(arcs: ScenarioArcs, weighed: Weighed, watch: Watch, width: int = WIDTH) -> Selection:
     """Return the best choice as far as it can be found, with a bound.
 
     ``weighed``: of `best_weights`; ``width``: how many beginnings are kept after every move.
     """
     choice, value = weighed.choice, weighed.value
-    for start in sorted(weighed.met, key=lambda c: arcs.aim.value(arcs.totals(c)))[:IMPROVED]:
+    for start in weighed.met[:IMPROVED]:
         if watch.over:
             break
         choice, value = min((choice, value), arcs.improved(start), key=lambda pair: pair[1])
     watch.tell(value, weighed.bound)
     level = value - CLOSE * max(abs(value), abs(weighed.bound))
     if weighed.bound >= level or watch.over:
-        return _Searched(choice, value, min(weighed.bound, value))
-    layers, bound = _grown(arcs, _provers(arcs, weighed), level, (watch, width))
+        return Selection(choice, value, min(weighed.bound, value))
+    layers, bound = _grown(arcs, provers(arcs, weighed), level, (watch, width))
     bound = max(bound, weighed.bound)
     last = layers[-1]
     if len(layers) == len(arcs.arcs) + 1 and len(last.node):
@@ -100,31 +90,24 @@ def _close_gap(arcs: ScenarioArcs, weighed: Weighed, watch: Watch, width: int = 
             choice = _traced(layers, best)
             value = arcs.aim.value(arcs.totals(choice))
     watch.tell(value, min(bound, value))
-    return _Searched(choice, value, min(bound, value))
-
-
-def _provers(arcs: ScenarioArcs, weighed: Weighed) -> Floats:
-    """Return weights that prove bounds of beginnings, (J, S): the best, and single scenarios."""
-    if arcs.aim.most(arcs.scenarios) < 1:
-        return weighed.weights[None]
-    return np.vstack([weighed.weights, np.eye(arcs.scenarios)])
+    return Selection(choice, value, min(bound, value))
 
 
 def _grown(
-    arcs: ScenarioArcs, provers: Floats, level: float, effort: tuple[Watch, int]
+    arcs: ScenarioArcs, proving: Floats, level: float, effort: tuple[Watch, int]
 ) -> tuple[list[_Layer], float]:
     """Return the beginnings after every move, and a bound on all that were left out.
 
     Fewer layers than moves come back where time was over.
     """
     watch, width = effort
-    to_go = [arcs.to_go(weights)[1] for weights in provers]
+    to_go = [arcs.to_go(weights)[1] for weights in proving]
     layers = [_Layer(np.zeros((1, arcs.scenarios)), np.zeros(1, int), np.zeros(1, int))]
     bound = level
     for k in range(len(arcs.arcs)):
         if watch.over:
             return layers, -np.inf
-        grown, lowest = _followed(arcs, k, layers[-1], (provers, [rest[k + 1] for rest in to_go]))
+        grown, lowest = _followed(arcs, k, layers[-1], (proving, [rest[k + 1] for rest in to_go]))
         kept = np.flatnonzero(lowest < level)
         most = _fitting(arcs, k + 1, width)
         if len(kept) > most:
@@ -145,10 +128,10 @@ def _followed(
     arcs: ScenarioArcs, k: int, layer: _Layer, proofs: tuple[Floats, Sequence[Floats]]
 ) -> tuple[_Layer, Floats]:
     """Return every beginning with every candidate of the next move, and bounds of them."""
-    provers, to_go = proofs
+    proving, to_go = proofs
     parent, node = np.nonzero(~arcs.shut[k][layer.node])
     totals = layer.totals[parent] + arcs.arcs[k][:, layer.node[parent], node].T
-    bounds = (totals @ w + rest[node] for w, rest in zip(provers, to_go, strict=True))
+    bounds = (totals @ w + rest[node] for w, rest in zip(proving, to_go, strict=True))
     return _Layer(totals, node, parent), reduce(np.maximum, bounds)
 
 

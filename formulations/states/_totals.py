@@ -11,14 +11,14 @@ are left out, and so is one of a state where another one is nowhere above.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from typing import NamedTuple
 
 import numpy as np
 
-from formulations._weights import CLOSE, Weighed, best_weights
+from formulations._weights import CLOSE, Weighed, best_weights, provers
 from seqopt.arrays import Floats, Ints
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances
@@ -84,10 +84,8 @@ def _below(value: float) -> float:
 def _labeled(paths: _Paths, weighed: Weighed, watch: Watch) -> LeastTotal:
     """Return the best path, by labels continued in the order of what they come to at least."""
     graph, best, path = paths.graph, weighed.value, weighed.choice
-    provers = weighed.weights[None]
-    if paths.aim.most(paths.scenarios) == 1:
-        provers = np.vstack([provers, np.eye(paths.scenarios)])
-    left = np.array([distances(graph, graph.amounts @ w, back=True) for w in provers])
+    proving = provers(paths, weighed)
+    left = np.array([distances(graph, graph.amounts @ w, back=True) for w in proving])
     starts = np.searchsorted(graph.source, np.arange(graph.states + 1))
     heap = [(weighed.bound, 0, 0, -1, np.zeros(paths.scenarios))]
     kept: dict[int, Floats] = {}
@@ -103,10 +101,10 @@ def _labeled(paths: _Paths, weighed: Weighed, watch: Watch) -> LeastTotal:
         kept[state] = np.vstack([others, totals])
         popped.append((state, before))
         if graph.ends[state] and paths.aim.value(totals) < best:
-            path, best = _back(popped), paths.aim.value(totals)
+            path, best = path_of(popped, len(popped) - 1), paths.aim.value(totals)
         moves: Ints = np.arange(starts[state], starts[state + 1])
         then = totals + graph.amounts[moves]
-        bounds = (then @ provers.T + left[:, graph.target[moves]].T).max(axis=1)
+        bounds = (then @ proving.T + left[:, graph.target[moves]].T).max(axis=1)
         for k in np.flatnonzero(bounds < _below(best)).tolist():
             count += 1
             row = (float(bounds[k]), -count, int(graph.target[moves[k]]), len(popped) - 1, then[k])
@@ -114,9 +112,9 @@ def _labeled(paths: _Paths, weighed: Weighed, watch: Watch) -> LeastTotal:
     return LeastTotal(path, best, best, weighed.weights)
 
 
-def _back(popped: list[tuple[int, int]]) -> tuple[int, ...]:
-    """Return the states of the last label's path by where each comes from, the start left out."""
-    path, last = list[int](), len(popped) - 1
+def path_of(popped: Sequence[tuple[int, int]], last: int) -> tuple[int, ...]:
+    """Return the states of a label's path by where each one comes from, the start left out."""
+    path = list[int]()
     while last > 0:
         state, last = popped[last]
         path.append(state)

@@ -36,6 +36,7 @@ from operator import le
 
 import numpy as np
 
+from formulations.states._totals import path_of
 from formulations.states.on_graph import Choice, on_graph
 from seqopt.arrays import Floats
 from seqopt.graph.graph import Graph
@@ -60,7 +61,7 @@ def _best_label(graph: Graph, to_go: Floats, watch: Watch) -> Choice:
     best, last = (np.inf,) * len(peaks), -1
     while heap:
         if len(popped) % 1000 == 0 and watch.over:
-            return Choice(_back(popped, last), heap[0][0][:1], stopped=True)
+            return Choice(path_of(popped, last), heap[0][0][:1], stopped=True)
         least, _, taken, state, before = heappop(heap)
         if not _improves(least, best) or _beaten(least, kept[state]):
             continue
@@ -73,7 +74,7 @@ def _best_label(graph: Graph, to_go: Floats, watch: Watch) -> Choice:
             bound = _and(peaks, more, ahead[to])
             if _improves(bound, best) and not _beaten(bound, kept[to]):
                 heappush(heap, (bound, move, more, to, len(popped) - 1))
-    return Choice(_back(popped, last), best)
+    return Choice(path_of(popped, last), best)
 
 
 def _and(peaks: Sequence[bool], first: Sequence[float], then: Sequence[float]) -> _Values:
@@ -95,15 +96,6 @@ def _improves(bound: _Values, best: _Values) -> bool:
 def _beaten(bound: _Values, others: list[_Values]) -> bool:
     """Return whether one of others is nowhere above."""
     return any(all(map(le, other, bound)) for other in others)
-
-
-def _back(popped: list[tuple[int, int]], last: int) -> tuple[int, ...]:
-    """Return the states of a path by where each label comes from, the start left out."""
-    path = []
-    while last > 0:
-        state, last = popped[last]
-        path.append(state)
-    return tuple(reversed(path))
 
 
 def _left(graph: Graph) -> Floats:

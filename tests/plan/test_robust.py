@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import seqopt
 from formulations.scenarios import scenario_search
 from formulations.scenarios.scenario_program import _solve_program
-from formulations.scenarios.scenario_search import _close_gap, _Searched, best_weights
+from formulations.scenarios.scenario_search import _close_gap, best_weights
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.costs import LayeredCosts
@@ -25,7 +25,7 @@ from seqopt.graph.scenarios import (
     largest_of,
     scenario_arcs,
 )
-from seqopt.plan.calling.formulation import Watch
+from seqopt.plan.calling.formulation import Selection, Watch
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.plan.solving import graph_of, layers_of
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar, parse_robust
@@ -130,10 +130,10 @@ def test_plans_agree_with_the_program(aim, layers):
         return
     plan = seqopt.solve(Posed(layers, aim))
     most = aim.most(len(layers))
-    assert _solve_program(layers, most, whole=True).value == pytest.approx(
+    assert _solve_program(layers, most, whole=True).objective == pytest.approx(
         plan.certificate.objective, abs=1e-5
     )
-    relaxed = _solve_program(layers, most, whole=False).value
+    relaxed = _solve_program(layers, most, whole=False).objective
     assert relaxed == pytest.approx(plan.certificate.bound, abs=1e-4 * max(1.0, abs(relaxed)))
 
 
@@ -204,8 +204,8 @@ LAYERS = tuple(
 @pytest.mark.parametrize(
     ("found", "match"),
     [
-        (_Searched((0,), 2.5, 2.0), "objective is 3, not 2.5 as claimed"),
-        (_Searched((1,), 4.0, 4.5), "bound is 4.5, above the objective 4"),
+        (Selection((0,), 2.5, 2.0), "objective is 3, not 2.5 as claimed"),
+        (Selection((1,), 4.0, 4.5), "bound is 4.5, above the objective 4"),
     ],
 )
 def test_a_false_claim_is_refused(monkeypatch, found, match):
