@@ -201,7 +201,8 @@ def _listen(solver: highspy.Highs, watch: Watch, told: Callable[[float], float])
 
     def hear(event: Any) -> None:
         data = event.data_out
-        watch.tell(_finite(told(data.mip_primal_bound), math.inf), told(data.mip_dual_bound))
+        value = told(data.mip_primal_bound)
+        watch.tell(value if math.isfinite(value) else math.inf, told(data.mip_dual_bound))
         end(event)
 
     def end(event: Any) -> None:
@@ -212,10 +213,6 @@ def _listen(solver: highspy.Highs, watch: Watch, told: Callable[[float], float])
     solver.cbMipInterrupt += hear
     solver.cbSimplexInterrupt += end
     solver.cbIpmInterrupt += end
-
-
-def _finite(value: float, otherwise: float) -> float:
-    return value if abs(value) < highspy.kHighsInf else otherwise
 
 
 def _end(solver: highspy.Highs, seconds: float) -> str:

@@ -147,9 +147,8 @@ def _pass(ground: _Ground, limit: float, width: int, watch: Watch) -> tuple[Path
         if watch.over:
             return None, -np.inf
         now, out = _narrowed(ground, k, _extended(ground, k, now, limit), 4 * width)
-        left = min(left, out)
-        now, out = _narrowed(ground, k, _undominated(now), width)
-        left = min(left, out)
+        now, more = _narrowed(ground, k, _undominated(now), width)
+        left = min(left, out, more)
         if not len(now.at):
             return None, left
         kept.append(now)
