@@ -79,7 +79,7 @@ def plan_files(
 
 def _plain(value: object) -> Any:
     """Return what JSON can hold: null in the place of numbers that are not finite."""
-    return json.loads(json.dumps(value), parse_constant={}.get)
+    return json.loads(json.dumps(value), parse_constant=lambda _: None)
 
 
 def put_table(path: Path | None, table: pd.DataFrame, said: str) -> dict[str, Any]:

@@ -142,13 +142,10 @@ def _require_known(options: argparse.Namespace, *, of_states: bool) -> None:
         if getattr(options, name, None):
             raise ProblemError(f"--{name}: {why}")
     if options.robots.isdecimal() and not free:
-        said = "a count of robots goes with"
-        where = (
-            f"--schedule {options.schedule}: {said}"
-            if of_states
-            else f"--robots: {said} --schedule"
-        )
-        raise StepError(f"{where} {FREE}")
+        said = f"--robots: a count of robots goes with --schedule {FREE}"
+        if of_states:
+            said = f"--schedule {options.schedule}: a count of robots goes with {FREE}"
+        raise StepError(said)
 
 
 def _asked_aim(options: argparse.Namespace) -> RobustAim:
@@ -160,14 +157,10 @@ def _asked_aim(options: argparse.Namespace) -> RobustAim:
 
 def _asked_scenarios(options: argparse.Namespace, scene: Scene) -> tuple[Scenarios, Scenarios]:
     """Return the scenarios to choose by, and those of the next seed that judge."""
-    count, other, seed = COUNT, None, 0
-    if options.scenarios is not None:
-        count = count_word(options.scenarios, "--scenarios", MOST)
-    if options.unseen is not None:
-        other = count_word(options.unseen, "--unseen", MOST)
-    if options.seed is not None:
-        seed = count_word(options.seed, "--seed", MOST, least=0)
-    return _drawn(scene, options, count, seed), _drawn(scene, options, other or count, seed + 1)
+    count = count_word(options.scenarios, "--scenarios", MOST, usual=COUNT)
+    other = count_word(options.unseen, "--unseen", MOST, usual=count)
+    seed = count_word(options.seed, "--seed", MOST, least=0)
+    return _drawn(scene, options, count, seed), _drawn(scene, options, other, seed + 1)
 
 
 def _drawn(scene: Scene, options: argparse.Namespace, count: int, seed: int) -> Scenarios:

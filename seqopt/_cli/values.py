@@ -40,16 +40,18 @@ def number_word(text: str, where: str, *, zero: bool = False) -> float:
     except ValueError:
         value = -1.0
     if not 0 < value <= LARGEST and not (zero and value == 0):
-        raise ProblemError(
-            f"{where}: {text!r} is not a positive number"
-            + (" or zero" if zero else "")
-            + (f" up to {LARGEST:g}" if value > LARGEST else "")
-        )
+        most = f" up to {LARGEST:g}" if value > LARGEST else ""
+        raise ProblemError(f"{where}: {text!r} is not a positive number{' or zero' * zero}{most}")
     return value
 
 
-def count_word(text: str, where: str, most: int, least: int = 1) -> int:
-    """Return a whole number from the least to the most; ``where`` is the argument."""
+def count_word(text: str | None, where: str, most: int, least: int = 1, usual: int = 0) -> int:
+    """Return a whole number from the least to the most, or the usual one where none is given.
+
+    ``where`` is the argument, for messages.
+    """
+    if text is None:
+        return usual
     if not (text.isascii() and text.isdecimal()) or not least <= int(text[:12]) <= most:
         raise ProblemError(f"{where} {text}: give a whole number from {least} to {most}")
     return int(text)
@@ -192,13 +194,12 @@ def asked_criterion(options: argparse.Namespace) -> Criterion:
     usual = DEFAULTS["any other"].criterion.name
     criterion = parse_criterion(options.criteria or usual, options.crown)
     kinds: dict[str, Any] = {"ranked": Ranked, "among": Among}
-    given = {name: text for name in kinds if (text := getattr(options, name)) is not None}
-    if not given:
-        return criterion
-    if not isinstance(criterion, RankSum):
-        name, text = next(iter(given.items()))
-        raise ProblemError(f"--{name} {text}: {criterion.name} has no ranks; leave it out")
-    return replace(criterion, **{name: kinds[name](text) for name, text in given.items()})
+    for name, kind in kinds.items():
+        if (text := getattr(options, name)) is not None:
+            if not isinstance(criterion, RankSum):
+                raise ProblemError(f"--{name} {text}: {criterion.name} has no ranks; leave it out")
+            criterion = replace(criterion, **{name: kind(text)})
+    return criterion
 
 
 def parse_criterion(text: str, crown: str | None = None) -> Criterion:

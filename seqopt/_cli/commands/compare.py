@@ -6,6 +6,7 @@ import argparse
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -143,7 +144,7 @@ def _facts(result: Comparison) -> dict[str, object]:
     return {
         "rows": table.rename_axis("name").reset_index(),
         "largest_by_robot": result.maxima.to_dict(),
-        "paper_by_robot": None if result.printed is None else _paper(result),
+        "paper_by_robot": _paper(result),
         "loop": None
         if loop is None
         else {
@@ -157,11 +158,11 @@ def _facts(result: Comparison) -> dict[str, object]:
     }
 
 
-def _paper(result: Comparison) -> dict[str, object]:
-    """Return the largest responses that the paper prints, by method and quantity."""
-    assert result.printed is not None  # asked for
-    table = result.printed.set_axis(result.maxima.columns, axis=1)
-    return {str(name): column.to_dict() for name, column in table.items()}
+def _paper(result: Comparison) -> dict[Any, Any] | None:
+    """Return the largest responses that the paper prints, if any, by method and quantity."""
+    if result.printed is None:
+        return None
+    return result.printed.set_axis(result.maxima.columns, axis=1).to_dict()
 
 
 def _tell(

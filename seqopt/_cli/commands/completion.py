@@ -59,8 +59,8 @@ def _completed(whole: argparse.ArgumentParser) -> argparse.ArgumentParser:
         "scene": words([*builtin_scenes(), *(f"{kind}:" for kind in KINDS)], files=True),
         "schedule": words([*SCHEDULES, FREE], files=True),
     }
-    paths: dict[Any, object] = dict.fromkeys(("DIR", "PLAN_DIR"), shtab.DIRECTORY)
-    paths["FILE"] = shtab.FILE
+    folder = shtab.DIRECTORY
+    paths: dict[Any, object] = {"DIR": folder, "PLAN_DIR": folder, "FILE": shtab.FILE}
     for command in _commands(whole):
         command.description = COMMANDS[command.prog.split()[-1]].about
         for action in command._actions:
