@@ -28,7 +28,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
-from seqopt.errors import WorkerError
+from seqopt.errors import WorkerError, message_of
 
 _MEMORY = Path("/proc/meminfo")
 _OWN = Path("/proc/self/statm")
@@ -458,8 +458,9 @@ class _Course(Generic[_Task, _Result]):
             lost = [call for call in ended if call.cancelled() or call.exception() is not None]
             self.waiting |= dict(self.running.pop(call) for call in lost)
             return
+        said = message_of(error).rstrip(": ")
         raise WorkerError(
-            f"workers ended {self.failures} times without an answer ({_said(error)}); give another "
+            f"workers ended {self.failures} times without an answer ({said}); give another "
             "executor, or fewer workers where memory is short; a script starts under "
             'if __name__ == "__main__":'
         ) from error
@@ -476,8 +477,3 @@ def _attempt(function: Callable[[_Task], _Result], task: _Task) -> tuple[bool, _
 
 def _nothing(*arguments: object) -> None:
     """Do nothing, and know no result."""
-
-
-def _said(error: BaseException) -> str:
-    """Return what an error of others says, in a line."""
-    return " ".join(f"{type(error).__name__}: {error}".split()).rstrip(": ")
