@@ -28,14 +28,13 @@ def undisturbed() -> Iterator[None]:
 
     masks = hasattr(signal, "pthread_sigmask")  # other threads may still take them: see note
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, _ENDS) if masks else set()
-    answered = [(number, signal.getsignal(number)) for number in _ENDS]
-    answers = [(number, answer) for number, answer in answered if callable(answer)]
+    answers = {n: answer for n in _ENDS if callable(answer := signal.getsignal(n))}
     try:
-        for number, _ in answers:
+        for number in answers:
             signal.signal(number, note)
         yield
     finally:
-        for number, answer in answers:
+        for number, answer in answers.items():
             signal.signal(number, answer)
         if masks:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)

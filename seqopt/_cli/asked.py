@@ -40,6 +40,12 @@ def scene_facts(scene: Scene) -> dict[str, object]:
     }
 
 
+def size_line(scene: Scene) -> str:
+    """Return what a scene is called and how large it is, in words."""
+    size = f"{len(scene.bricks)} bricks, {len(scene.joints)} joints"
+    return f"{scene.name}: {size}, {len(scene.grounds)} ground ends"
+
+
 def asked_scene(options: argparse.Namespace) -> Scene:
     """Return the scene that a command is asked for, in the order that it is asked for."""
     if options.order == "search":

@@ -60,6 +60,10 @@ STRICT = {
     "--strict": "end with exit status 1 if a robot would exceed its payload in a step, or results "
     "leave the linear range"
 }
+STEPS_USAGE = (
+    "[SCENE] --method NAME [--out FILE] [other options]",
+    "[SCENE] --plan FILE [--out FILE] [other options]",
+)
 CSV_OUT = {"--out FILE": "CSV file to write (default: standard output)"}
 
 

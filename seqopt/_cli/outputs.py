@@ -54,27 +54,24 @@ def plan_files(
 
     The trial is of the plan in other scenarios.
     """
-    table = plan.responses()
-    files: dict[str, bytes | str] = {
-        "plan.csv": csv_text(table),
+    tables, stands = {"plan": plan.responses()}, list[str]()
+    if not isinstance(plan.graph, States):
+        tables["selection"] = plan.table()
+    elif plan.graph.standing is not None:
+        tables["stability"] = plan.stability()
+        stands = [str(verdict) for verdict in tables["stability"]["verdict"]]
+    if isinstance(plan.graph, Layers):
+        tables["responses"] = plan.alternatives()
+    if rows := trace_rows(plan.trace):
+        tables["trace"] = pd.DataFrame(rows)
+    if trial is not None:
+        tables["scenarios"] = trial.table
+    return {
+        **{f"{name}.csv": csv_text(table) for name, table in tables.items()},
         "summary.json": json.dumps(_plain(report), indent=2) + "\n",
         "scene.json": dump_scene(plan.engine.network.scene),
+        PAGE: plan_page(plan.engine, plan.title, tables["plan"], plan.result, stands),
     }
-    stands: list[str] = []
-    if not isinstance(plan.graph, States):
-        files["selection.csv"] = csv_text(plan.table())
-    elif plan.graph.standing is not None:
-        verdicts = plan.stability()
-        files["stability.csv"] = csv_text(verdicts)
-        stands = [str(verdict) for verdict in verdicts["verdict"]]
-    if isinstance(plan.graph, Layers):
-        files["responses.csv"] = csv_text(plan.alternatives())
-    if rows := trace_rows(plan.trace):
-        files["trace.csv"] = csv_text(pd.DataFrame(rows))
-    if trial is not None:
-        files["scenarios.csv"] = csv_text(trial.table)
-    files[PAGE] = plan_page(plan.engine, plan.title, table, plan.result, stands)
-    return files
 
 
 def _plain(value: object) -> Any:

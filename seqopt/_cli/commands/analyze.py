@@ -20,6 +20,7 @@ from seqopt._cli.asked import (
 )
 from seqopt._cli.options import (
     CSV_OUT,
+    STEPS_USAGE,
     declare,
     engine_options,
     form_options,
@@ -43,10 +44,7 @@ DESCRIPTION = (
     "Compute how the structure responds in every step of one sequence, and write a table with the "
     "columns of Table A.1 of Bruun et al.: forces in N, moments in N m, displacements in 0.001 mm."
 )
-USAGE = (
-    "[SCENE] --method NAME [--out FILE] [other options]",
-    "[SCENE] --plan FILE [--out FILE] [other options]",
-)
+USAGE = STEPS_USAGE
 EXAMPLES = (
     "seqopt analyze arch25 --method cantilever --out cantilever.csv",
     "seqopt analyze my.json --plan plan.csv --out responses.csv",

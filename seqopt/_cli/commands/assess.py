@@ -7,7 +7,14 @@ from dataclasses import asdict
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
-from seqopt._cli.options import CSV_OUT, declare, form_options, scene_options, steps_options
+from seqopt._cli.options import (
+    CSV_OUT,
+    STEPS_USAGE,
+    declare,
+    form_options,
+    scene_options,
+    steps_options,
+)
 from seqopt._cli.outputs import keep_apart, put_table
 from seqopt._cli.values import asked_mortar
 from seqopt.contact.mortar import MORTARS
@@ -20,10 +27,7 @@ DESCRIPTION = (
     "joints may open and slide; say how much bond, friction and robot force it needs, which tilt "
     "it survives, and which brick and joint fail first."
 )
-USAGE = (
-    "[SCENE] --method NAME [--out FILE] [other options]",
-    "[SCENE] --plan FILE [--out FILE] [other options]",
-)
+USAGE = STEPS_USAGE
 EXAMPLES = (
     "seqopt assess arch25 --method cantilever --out stands.csv",
     "seqopt assess arch25 --method sequential --mortar dry",

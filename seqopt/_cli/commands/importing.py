@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import scene_facts
+from seqopt._cli.asked import scene_facts, size_line
 from seqopt._cli.options import declare, form_options
 from seqopt._cli.values import count_word, number_word
 from seqopt._files import require_apart, write_text
@@ -66,10 +66,7 @@ def run(options: argparse.Namespace) -> Answer:
     scene = import_scene(options.file, options.format, _given(options))
     write_text(options.out, dump_scene(scene))
     assumed = scene.provenance.splitlines()
-    said = (
-        f"{scene.name}: {len(scene.bricks)} bricks, {len(scene.joints)} joints, "
-        f"{len(scene.grounds)} ground ends; written to {options.out}"
-    )
+    said = f"{size_line(scene)}; written to {options.out}"
     return Answer(
         facts={"scene": scene_facts(scene), "assumed": assumed},
         text="\n".join([*assumed, said]),

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import asked_scene, scene_facts
+from seqopt._cli.asked import asked_scene, scene_facts, size_line
 from seqopt._cli.options import declare, form_options, scene_options
 from seqopt._cli.outputs import keep_apart
 from seqopt._files import write_text
@@ -82,7 +83,10 @@ def _list(options: argparse.Namespace) -> Answer:
         name: load_scene(name)
         for name in with_progress("reading built-in scenes", builtin_scenes(), options.tell)
     }
-    lines = [f"{name}: {_size(scene)}; {ABOUT[name]}" for name, scene in found.items()]
+    lines = [
+        f"{name}: {len(scene.bricks)} bricks, {len(scene.joints)} joints; {ABOUT[name]}"
+        for name, scene in found.items()
+    ]
     lines += [kind.about for kind in KINDS.values()]
     facts = {
         "scenes": [{**scene_facts(scene), "about": ABOUT[name]} for name, scene in found.items()],
@@ -91,16 +95,12 @@ def _list(options: argparse.Namespace) -> Answer:
     return Answer(facts=facts, text="\n".join(lines))
 
 
-def _size(scene: Scene) -> str:
-    return f"{len(scene.bricks)} bricks, {len(scene.joints)} joints"
-
-
-def _described(scene: Scene, facts: dict[str, object]) -> Iterator[str]:
+def _described(scene: Scene, facts: dict[str, Any]) -> Iterator[str]:
     """Yield what is in a scene, line by line."""
-    yield f"{scene.name}: {_size(scene)}, {len(scene.grounds)} ground ends"
+    yield size_line(scene)
     yield f"network: {facts['nodes']} nodes, {facts['edges']} edges"
     for robot in scene.robots:
-        reach = type(robot.reach).__name__.lower()
+        reach = facts["reaches"][robot.name]
         yield f"{robot.name}: payload {robot.payload:g} N, reach {reach}"
     yield f"weight: {facts['weight_N']:.1f} N"
     for i, line in enumerate(scene.provenance.splitlines()):
