@@ -16,10 +16,10 @@ from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError
-from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.costs import Budget, LayeredCosts, array_by_array, least_path, least_to_go
 from seqopt.graph.layers.layers import Layers
 from seqopt.problem.problem import Aim, RobustAim
-from seqopt.problem.requirements import Criterion, Limit, ResponsesAsked
+from seqopt.problem.requirements import ResponsesAsked
 from seqopt.responses._choices import Evaluation
 from seqopt.responses.resources import Resources
 from seqopt.scene._checks import short
@@ -43,7 +43,10 @@ def _recipe_for(engine: Engine, scene: Scene) -> Recipe:
 
 def engine_for(engine: Engine, scene: Scene) -> Engine:
     """Return an engine of the same kind and settings for another scene."""
-    recipe = _recipe_for(engine, scene)
+    return _made(_recipe_for(engine, scene))
+
+
+def _made(recipe: Recipe) -> Engine:
     return make_engine(recipe.engine, recipe.scene, **recipe.options)  # type: ignore[arg-type]
 
 
@@ -86,25 +89,20 @@ class _ScenarioTask:
     """One scenario, as it is sent to a worker.
 
     ``name``: for messages; ``recipe``: of its engine; ``schedule``: the nominal one, whose steps
-    and candidates hold in every scenario; ``criterion``: with the numbers of the nominal scene;
-    ``also``: responses that are evaluated beside those that these name.
+    and candidates hold in every scenario; ``asked``: by a criterion with the numbers of the nominal
+    scene, by limits, and beside these.
     """
 
     name: str
     recipe: Recipe
     schedule: Schedule
-    criterion: Criterion
-    limits: tuple[Limit, ...]
-    also: tuple[str, ...]
+    asked: ResponsesAsked
     resources: Resources
 
     def problem(self) -> Layers:
         """Return the placement problem of this scenario."""
-        recipe = self.recipe
-        engine = make_engine(recipe.engine, recipe.scene, **recipe.options)  # type: ignore[arg-type]
-        asked = ResponsesAsked(self.criterion, self.limits, self.also)
-        evaluation = Evaluation(engine, self.schedule, asked, self.resources)
-        return Layers(self.criterion, self.limits, evaluation)
+        evaluation = Evaluation(_made(self.recipe), self.schedule, self.asked, self.resources)
+        return Layers(self.asked.criterion, self.asked.limits, evaluation)
 
 
 def _tasks_of(problem: Layers, scenes: Sequence[Scene]) -> tuple[_ScenarioTask, ...]:
@@ -113,20 +111,13 @@ def _tasks_of(problem: Layers, scenes: Sequence[Scene]) -> tuple[_ScenarioTask, 
     ``problem``: the nominal one. Raises `ProblemError` if the engine was not made by name, so that
     nobody knows how to make it for another scene.
     """
-    asked = problem.evaluation.wanted
-    also = asked.also if isinstance(asked, ResponsesAsked) else ()
+    also = getattr(problem.evaluation.wanted, "also", ())
+    asked = ResponsesAsked(problem.criterion, problem.limits, also)
     alone = problem.evaluation.resources.alone()
+    recipes = (_recipe_for(problem.engine, scene) for scene in scenes)
     return tuple(
-        _ScenarioTask(
-            f"scenario {i}",
-            _recipe_for(problem.engine, scene),
-            problem.schedule,
-            problem.criterion,
-            problem.limits,
-            also,
-            alone,
-        )
-        for i, scene in enumerate(scenes, start=1)
+        _ScenarioTask(f"scenario {i}", recipe, problem.schedule, asked, alone)
+        for i, recipe in enumerate(recipes, start=1)
     )
 
 
@@ -151,26 +142,23 @@ def _scenario_costs(
 
 def _costs(task: _ScenarioTask) -> ScenarioCosts:
     problem = task.problem()
+    evaluation = problem.evaluation
     try:
         problem.require_possible()
-        sums, peaks = problem.sums, problem.peaks
+        return ScenarioCosts(problem.sums, problem.peaks, evaluation.models, evaluation.seconds)
     except MechanismError as error:
         raise MechanismError(f"{task.name}: {error}", error.mode) from error
     except SolverError as error:
         raise SolverError(f"{task.name}: {error}") from error
-    evaluation = problem.evaluation
-    return ScenarioCosts(sums, peaks, evaluation.models, evaluation.seconds)
 
 
 def _require_sendable(tasks: Sequence[_ScenarioTask], crew: Crew | None) -> None:
     """Raise an error if tasks are to go to other processes and cannot be sent."""
-    if crew is None:
-        return
     try:
-        pickle.dumps(tasks[:1])
+        pickle.dumps(tasks[: crew is not None])
     except Exception as error:  # whatever objects of others may raise
         raise ProblemError(
-            f"criterion {tasks[0].criterion.name}: it cannot be sent to other processes ({error}); "
+            f"criterion {tasks[0].asked.criterion.name}: it cannot be sent to other processes ({error}); "
             "define it in a module, or let this process work alone"
         ) from error
 
@@ -217,10 +205,7 @@ class ScenarioArcs(FrozenValue):
             np.where(shut, np.inf, np.tensordot(weights, arc, 1))
             for arc, shut in zip(self.arcs, self.shut, strict=True)
         ]
-        rest = [np.zeros(costs[-1].shape[1])]
-        for cost in reversed(costs):
-            rest.insert(0, (cost + rest[0]).min(axis=1))
-        return costs, rest
+        return costs, least_to_go(costs)
 
     def cheapest(self, weights: Floats) -> tuple[Choice, float]:
         """Return the choice of least weighted total, and that total.
@@ -228,27 +213,22 @@ class ScenarioArcs(FrozenValue):
         ``weights`` (S,). Result (tuple of int, float).
         """
         costs, rest = self.to_go(weights)
-        choice: list[int] = []
-        for cost, after in zip(costs, rest[1:], strict=True):
-            choice.append(int(np.argmin(cost[choice[-1] if choice else 0] + after)))
-        return tuple(choice), float(rest[0][0])
+        return least_path(costs, rest), float(rest[0][0])
 
     def improved(self, choice: Choice) -> tuple[Choice, float]:
         """Return what a choice becomes by changing the one move that helps most, again and again.
 
         ``choice``: an allowed one. Results: ``value``: what the aim makes of its totals.
         """
-        totals = self.totals(choice)
-        value = self.aim.value(totals)
         while True:
+            totals = self.totals(choice)
+            value = self.aim.value(totals)
             found = [self._changed(choice, totals, k) for k in range(len(choice))]
             k = int(np.argmin([worth for _, worth in found]))
             candidate, worth = found[k]
             if not worth < value - BETTER * max(abs(value), abs(worth)):
                 return choice, value
             choice = (*choice[:k], candidate, *choice[k + 1 :])
-            totals = self.totals(choice)
-            value = self.aim.value(totals)
 
     def _changed(self, choice: Choice, totals: Floats, k: int) -> tuple[int, float]:
         """Return the best candidate of one move, the others staying, and what it is worth."""
@@ -383,7 +363,7 @@ class ScenarioLayers(Shown):
 
         ``aim``: sums or peaks.
         """
-        return tuple(c.sums if aim is Aim.SUM else c.peaks for c in self.costs)
+        return tuple(map(aim.costs, self.costs))
 
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
         """Return the checked steps of the build; see `Layers.steps`.
@@ -414,9 +394,7 @@ def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
 
     ``layers``: of the same moves. Raises `InfeasibleError` if no choice is allowed in all of them.
     """
-    single = tuple(map(_largest, zip(*(each.single for each in layers), strict=True)))
-    shared = tuple(map(_largest, zip(*(each.shared for each in layers), strict=True)))
-    out = LayeredCosts(single, shared)
+    out = array_by_array(_largest, *layers)
     try:
         out.continuable()
     except InfeasibleError as error:
@@ -424,7 +402,7 @@ def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
     return out
 
 
-def _largest(costs: Sequence[Floats]) -> Floats:
+def _largest(*costs: Floats) -> Floats:
     """Return the largest of costs, one after the other: all in one array would be a large one."""
     out = np.array(costs[0])
     for each in costs[1:]:

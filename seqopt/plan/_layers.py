@@ -24,13 +24,7 @@ from seqopt.plan.calling.formulation import (
     formulations,
     timed,
 )
-from seqopt.plan.judge.certificate import (
-    Certificate,
-    certify_partial,
-    certify_scenarios,
-    judge,
-    require_anew,
-)
+from seqopt.plan.judge.certificate import certify_partial, judge, require_anew
 from seqopt.plan.plan import Plan
 from seqopt.plan.search._pair_search import search_pairs
 from seqopt.plan.search._window_search import search_windows
@@ -47,19 +41,15 @@ def with_budgets(problem: Layers, asked: Sequence[AskedBudget]) -> Layers:
     """
     budgets: list[Budget] = []
     for each in asked:
-        bound = each.bound
+        if each.response:
+            budget = steps_over(problem, each.response, each.level, each.bound)
+        else:
+            budget = travel(problem, each.bound)
         if each.share:
             free = best_choice(problem, Aim.SUM).choice
-            bound *= _budget(problem, each, np.inf).spent(free)
-        budgets.append(_budget(problem, each, bound))
-    return replace(problem, budgets=tuple(budgets))
-
-
-def _budget(problem: Layers, asked: AskedBudget, bound: float) -> Budget:
-    """Return the budget of how much there is, in its unit."""
-    if not asked.response:
-        return travel(problem, bound)
-    return steps_over(problem, asked.response, asked.level, bound)
+            budget = replace(budget, bound=each.bound * budget.spent(free))
+        budgets.append(budget)
+    return replace(problem, budgets=tuple(budgets)) if budgets else problem
 
 
 def best_choice(problem: PlacementProblem, aim: Aim) -> Selection:
@@ -92,11 +82,8 @@ def solve_layers(graph: PlacementProblem, formulation: Formulation, run: Run) ->
     if run.lazy:
         require_proof(run.proof)
         return _solve_lazily(graph, formulation, run)
-    return (
-        _solve_all(graph, formulation, run)
-        if run.proof
-        else _solve_windows(graph, formulation, run)
-    )
+    solving = _solve_all if run.proof else _solve_windows
+    return solving(graph, formulation, run)
 
 
 def on_the_way(plan: Plan) -> Plan:
@@ -118,26 +105,23 @@ def _solve_all(graph: PlacementProblem, formulation: Formulation, run: Run) -> P
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
     with timed(seconds, "verify"):
-        certificate = _judged(graph, selection, formulation)
+        certificate = judge(graph, selection, formulation)
         steps = graph.steps(selection.choice)
         for layers in _from_cache(graph):
             require_anew(layers, selection.choice)
-    order = {stage: seconds[stage] for stage in ("compile", "solve", "verify")}
-    return Plan(graph, graph, formulation, selection, certificate, steps, {**stages, **order})
+    stages = {**stages, **{stage: seconds[stage] for stage in ("compile", "solve", "verify")}}
+    return Plan(graph, graph, formulation, selection, certificate, steps, stages)
 
 
 def _solve_windows(graph: PlacementProblem, formulation: Formulation, run: Run) -> Plan:
     """Return the plan of a search that solves only the models it meets."""
     alone = formulation.window_options
     if alone is None or run.options not in ({}, alone):
-        able = [
-            n for n, other in formulations(On.LAYERS).items() if other.window_options is not None
-        ]
-        asked = " ".join(
-            [formulation.name, *(f"{name}={value}" for name, value in run.options.items())]
-        )
+        known = formulations(On.LAYERS)
+        able = [name for name in known if known[name].window_options is not None]
+        options = "".join(f" {name}={value}" for name, value in run.options.items())
         raise ProblemError(
-            f"{asked} looks beyond the window of a move and needs all models: "
+            f"{formulation.name}{options} looks beyond the window of a move and needs all models: "
             f"use {' or '.join(able)} without options, or ask for the proof"
         )
     if not isinstance(graph, Layers):
@@ -154,9 +138,8 @@ def _solve_windows(graph: PlacementProblem, formulation: Formulation, run: Run) 
         steps = graph.steps(found.choice)
         require_anew(graph, found.choice, found.met)
     stages = {"respond": respond, "rank": seconds["search"] - respond, "verify": seconds["verify"]}
-    return Plan(
-        graph, graph, formulation, Selection(found.choice, np.nan), None, steps, stages, found
-    )
+    chosen = Selection(found.choice, np.nan)
+    return Plan(graph, graph, formulation, chosen, None, steps, stages, found)
 
 
 def _solve_lazily(graph: PlacementProblem, formulation: Formulation, run: Run) -> Plan:
@@ -168,28 +151,12 @@ def _solve_lazily(graph: PlacementProblem, formulation: Formulation, run: Run) -
     seconds: dict[str, float] = {}
     with timed(seconds, "search"):
         found = search_pairs(graph, formulation, Watch(run.time_limit, run.progress))
+    chosen, along = found.selection, found.along
     with timed(seconds, "verify"):
-        certificate = certify_partial(found.costs, found.selection, found.objective)
-        steps = graph.steps(found.selection.choice)
-        require_anew(graph, found.selection.choice, found.along.met)
-    return Plan(
-        graph,
-        graph,
-        formulation,
-        found.selection,
-        certificate,
-        steps,
-        seconds,
-        found.along,
-        found.models,
-    )
-
-
-def _judged(graph: PlacementProblem, selection: Selection, formulation: Formulation) -> Certificate:
-    if formulation.on is On.SCENARIOS:
-        assert isinstance(graph, ScenarioLayers)  # it was given these
-        return certify_scenarios(graph, selection)
-    return judge(graph, selection, formulation)
+        certificate = certify_partial(found.costs, chosen, found.objective)
+        steps = graph.steps(chosen.choice)
+        require_anew(graph, chosen.choice, along.met)
+    return Plan(graph, graph, formulation, chosen, certificate, steps, seconds, along, found.models)
 
 
 def _from_cache(graph: PlacementProblem) -> Iterator[Layers]:

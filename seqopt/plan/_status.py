@@ -50,6 +50,19 @@ class FoundOrder:
             return Status.FEASIBLE
         return Status.OPTIMAL if self.proven else Status.CLAIMED
 
+    def described(self) -> dict[str, object]:
+        """Return what the summary of a plan says of the order, ready for JSON."""
+        found = self.selection
+        return {
+            "order": [*found.order],
+            "orders": self.problem.among.value,
+            "order_status": str(self.status),
+            "order_bound": found.bound if isfinite(found.bound) else None,
+            "order_bound_proven": self.proven,
+            "order_evaluated": found.evaluated,
+            "order_stopped": found.stopped,
+        }
+
     @property
     def bound_said(self) -> str:
         """What no order stays below, and whether that is proven, in words."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
 from itertools import pairwise
 
 import numpy as np
@@ -44,13 +45,11 @@ def _worths(
             costs = search.costs(k)
             margin = np.delete(costs, now).min(initial=np.inf) - costs[now]
             yield {"cost": costs[now], "margin": margin}
-            continue
-        layered = aim.costs(problem)
-        yield {
-            "single_cost": layered.single[k][now],
-            "shared_cost": layered.shared[k][before, now],
-            "rank_in_window": rank_of(move_costs(problem, k, before), now),
-        }
+        else:
+            layered = aim.costs(problem)
+            rank = rank_of(move_costs(problem, k, before), now)
+            single, shared = layered.single[k][now], layered.shared[k][before, now]
+            yield {"single_cost": single, "shared_cost": shared, "rank_in_window": rank}
 
 
 def split_objectives(problem: Layers, choice: tuple[int, ...], *, heuristic: bool) -> Objectives:
@@ -60,13 +59,10 @@ def split_objectives(problem: Layers, choice: tuple[int, ...], *, heuristic: boo
     `split_gap`; None where there are no ranks.
     """
     values = under_both(problem, choice)
-    if None in values.values():
-        return {"objectives": None, "gap_parts": None}
-    parts = split_gap(problem, choice) if heuristic else None
-    if parts is None:
-        return {"objectives": values, "gap_parts": None}
-    split: dict[str, float | None] = {"short_sight": parts.short_sight}
-    return {"objectives": values, "gap_parts": split | {"objective": parts.objective}}
+    known = None not in values.values()
+    parts = split_gap(problem, choice) if known and heuristic else None
+    split = None if parts is None else asdict(parts)
+    return {"objectives": values if known else None, "gap_parts": split}
 
 
 def moves_table(problem: Layers, choice: Sequence[int], grips: pd.DataFrame) -> pd.DataFrame:
@@ -77,25 +73,23 @@ def moves_table(problem: Layers, choice: Sequence[int], grips: pd.DataFrame) -> 
     ``to_step`` (the last in which the node is held), ``bricks``, ``robot``, ``brick``, ``node``,
     ``largest_force_N`` and ``candidates`` (how many there were).
     """
-    schedule = problem.schedule
+    moves, nodes = problem.schedule.moves, problem.nodes(choice)
+    brick_of = problem.schedule.scene.brick_of_node
     held = {(row["robot"], row["from_step"]): row for row in grips.to_dict("records")}
-    rows = []
-    for k, (move, now) in enumerate(zip(schedule.moves, choice, strict=True), start=1):
-        own, node = held[move.robot, move.step], move.candidates[now]
-        rows.append(
-            {
-                "move": k,
-                "step": move.step,
-                "to_step": own["to_step"],
-                "bricks": move.bricks,
-                "robot": move.robot,
-                "brick": schedule.scene.brick_of_node[node].name,
-                "node": node,
-                "largest_force_N": own["largest_force_N"],
-                "candidates": len(move.candidates),
-            }
-        )
-    return pd.DataFrame(rows)
+    own = [held[move.robot, move.step] for move in moves]
+    return pd.DataFrame(
+        {
+            "move": range(1, len(moves) + 1),
+            "step": [move.step for move in moves],
+            "to_step": [row["to_step"] for row in own],
+            "bricks": [move.bricks for move in moves],
+            "robot": [move.robot for move in moves],
+            "brick": [brick_of[node].name for node in nodes],
+            "node": nodes,
+            "largest_force_N": [row["largest_force_N"] for row in own],
+            "candidates": [len(move.candidates) for move in moves],
+        }
+    )
 
 
 def choice_table(problem: Layers, choices: StepChoices) -> pd.DataFrame:
@@ -124,10 +118,10 @@ def alternatives(
     parts = []
     for posed, choices, before in _looked_at(problem, choice, search):
         table = choice_table(posed, choices)
-        columns = ["node", "second_node"][: table.index.nlevels]
+        columns = ["node", "second_node"] if before is None else ["second_node"]
+        columns = columns[: table.index.nlevels]
         nodes = pd.DataFrame(table.index.to_frame(index=False).to_numpy(), columns=columns)
         if before is not None:
-            nodes = nodes.rename(columns={"node": "second_node"})
             nodes.insert(0, "node", before)
         nodes.insert(0, "step", choices.step.number)
         parts.append(pd.concat([nodes, table.reset_index(drop=True)], axis=1))
@@ -139,9 +133,8 @@ def _looked_at(
 ) -> Iterator[tuple[Layers, StepChoices, int | None]]:
     """Yield steps and, where only one choice before is kept, the node of that choice."""
     if search is not None or not problem.evaluation.streams:
-        for posed in (problem,) if search is None else search.explored:
-            for choices in posed.evaluation.steps:
-                yield posed, choices, None
+        explored = (problem,) if search is None else search.explored
+        yield from ((posed, each, None) for posed in explored for each in posed.evaluation.steps)
         return
     nodes, before = problem.nodes(choice), (0, *choice)
     for k in range(len(problem.schedule.moves)):

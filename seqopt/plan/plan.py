@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import isfinite, isinf
+from math import inf, isfinite
 
 import pandas as pd
 
@@ -43,10 +43,12 @@ from seqopt.problem.problem import Aim, Problem, judged_by
 from seqopt.problem.requirements import Excess, overloads
 from seqopt.responses._choices import window_models
 from seqopt.responses.table import analyze
-from seqopt.sequence.rules import Ending
+from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step, StepKind, idle_robots
 from seqopt.stability.assessment import stability_table
+
+COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stability of states
 
 
 @dataclass(frozen=True, repr=False)
@@ -104,9 +106,7 @@ class Plan(ShownBuild):
     @property
     def layers(self) -> Layers:
         """The layers of candidates that it was chosen from; a `ProblemError` says if none were."""
-        graph = self.graph
-        if isinstance(graph, ScenarioLayers):
-            return graph.nominal
+        graph = self.graph.nominal if isinstance(self.graph, ScenarioLayers) else self.graph
         if isinstance(graph, Layers):
             return graph
         chosen = "states, which have no candidates" if isinstance(graph, States) else "costs alone"
@@ -120,9 +120,14 @@ class Plan(ShownBuild):
         return self.graph
 
     @property
+    def _of_scene(self) -> States | Layers:
+        """What it was chosen from, of the scene itself; a `ProblemError` if that is costs alone."""
+        return self.graph if isinstance(self.graph, States) else self.layers
+
+    @property
     def engine(self) -> Engine:
         """What computes the responses, of the scene in the order of the plan."""
-        return self.graph.engine if isinstance(self.graph, States) else self.layers.engine
+        return self._of_scene.engine
 
     @property
     def scene_name(self) -> str:
@@ -132,9 +137,7 @@ class Plan(ShownBuild):
     @property
     def method(self) -> str:
         """The name of the schedule, or ``free``."""
-        if isinstance(self.graph, States):
-            return self.graph.method
-        return self.layers.schedule.method
+        return self._of_scene.method
 
     @property
     def title(self) -> str:
@@ -157,12 +160,16 @@ class Plan(ShownBuild):
     @property
     def objective(self) -> dict[str, float]:
         """The value of every goal by its name; of a tilt, what is survived, in degrees."""
-        if isinstance(self.graph, States):
-            found = zip(self.goals, self.graph.goals, self.selection.objective, strict=True)  # type: ignore[arg-type]
-            return {name: goal.shown(value) for name, goal, value in found}
-        if self.certificate is None:
-            return {}
-        return dict(zip(self.goals, self.certificate.values, strict=True))
+        if isinstance(self.selection, StatePath):
+            return self._by_goal(self.selection.objective)
+        return {} if self.certificate is None else self._by_goal(self.certificate.values)
+
+    def _by_goal(self, values: Sequence[float]) -> dict[str, float]:
+        """Return values of the first goals by their names, as people read them."""
+        if not isinstance(self.graph, States):
+            return dict(zip(self.goals, values, strict=True))
+        found = zip(self.goals, self.graph.goals, values, strict=False)
+        return {name: goal.shown(value) for name, goal, value in found}
 
     @property
     def gap(self) -> float | None:
@@ -192,7 +199,7 @@ class Plan(ShownBuild):
     @property
     def among(self) -> str:
         """Which candidates alone were looked at, in words; empty for all."""
-        return self.graph.among if isinstance(self.graph, States) else self.layers.schedule.left_out
+        return self._of_scene.among
 
     @property
     def status(self) -> Status:
@@ -200,18 +207,16 @@ class Plan(ShownBuild):
 
         A margin of stability is optimal within the gap, which ``result`` and the summary name.
         """
-        proof = self.certificate
+        proof, graph = self.certificate, self.graph
         if self.order is not None and self.order.status is not Status.OPTIMAL:
             return self.order.status
         if isinstance(self.selection, StatePath) and self.selection.stopped:
             return Status.FEASIBLE
         if proof is None:
             return Status.UNPROVEN
-        if isinstance(self.graph, States):
-            exact = self.formulation.kind is not FormulationKind.HEURISTIC
-            if exact and not self.graph.budgets and not self.graph.totals:
-                return Status.OPTIMAL
-        if proof.gap <= TOLERANCE:
+        judged_exact = isinstance(graph, States) and not (graph.budgets or graph.totals)
+        exact = judged_exact and self.formulation.kind is not FormulationKind.HEURISTIC
+        if exact or proof.gap <= TOLERANCE:
             return Status.OPTIMAL
         return Status.CLAIMED if proof.claimed_gap <= TOLERANCE else Status.FEASIBLE
 
@@ -220,11 +225,10 @@ class Plan(ShownBuild):
         """The value of the plan, and what is proven about it, in words."""
         if isinstance(self.graph, States):
             values = ", ".join(f"{name} {value:.6g}" for name, value in self.objective.items())
-            left_open = 0.0 if self.certificate is None else self.certificate.gap
-            within = left_open > TOLERANCE and not isinf(left_open)
-            left = f" within {left_open:.2g}" if within else ""
+            left = 0.0 if self.certificate is None else self.certificate.gap
+            within = f" within {left:.2g}" if TOLERANCE < left < inf else ""
             among = f" among candidates {self.among}" if self.among else ""
-            return f"{values}, {self.status}{left}{among}"
+            return f"{values}, {self.status}{within}{among}"
         if self.certificate is None:
             return "not compared with the optimum"
         among = self.among if isinstance(self.graph, Layers | ScenarioLayers) else ""
@@ -292,12 +296,9 @@ class Plan(ShownBuild):
     def _responses(self) -> pd.DataFrame:
         table = analyze(self.engine, self.steps)
         if not isinstance(self.graph, States):
-            schedule = self.layers.schedule
-            open_at = {step.number: step.moves for step in schedule.steps}
-            table["optimized_robot"] = [
-                ";".join(schedule.moves[m].robot for m in open_at[number])
-                for number in table["step"]
-            ]
+            moves, steps = self.layers.schedule.moves, self.layers.schedule.steps
+            robots = {s.number: ";".join(moves[m].robot for m in s.moves) for s in steps}
+            table["optimized_robot"] = table["step"].map(robots)
         return table
 
     def table(self) -> pd.DataFrame:
@@ -370,8 +371,8 @@ class Plan(ShownBuild):
 def _summarized(plan: Plan) -> dict[str, object]:
     """Return the summary of a plan, with the same keys whatever it was chosen from."""
     graph, proof, scene = plan.graph, plan.certificate, plan.engine.network.scene
-    of_states = isinstance(graph, States)
     asked = _states_asked(graph) if isinstance(graph, States) else _layers_asked(plan)
+    narrowed = plan.among and plan.status.endswith("optimal")
     return {
         "scene": scene.name,
         "schedule": plan.method,
@@ -379,7 +380,7 @@ def _summarized(plan: Plan) -> dict[str, object]:
         "kind": plan.formulation.kind.value,
         **asked,
         "candidates": f"heuristic: {plan.among}" if plan.among else "all",
-        "status": f"{plan.status} among these" if _narrowed(plan) else str(plan.status),
+        "status": f"{plan.status} among these" if narrowed else str(plan.status),
         "ended": plan.ended.value,
         "stopped": plan.stopped,
         "objective": plan.objective,
@@ -387,7 +388,7 @@ def _summarized(plan: Plan) -> dict[str, object]:
         "gap": plan.gap,
         "claimed_gap": None if proof is None or plan.gap is None else proof.claimed_gap,
         **plan.objectives(),
-        "budgets": _spent_states(plan) if of_states else _spent(plan),
+        "budgets": _spent(plan),
         "steps": len(plan.steps),
         "steps_before_release": len(plan.steps) - _letting_go(plan),
         "regrips": plan.regrips,
@@ -396,25 +397,20 @@ def _summarized(plan: Plan) -> dict[str, object]:
         "payload_exceeded": [str(excess) for excess in plan.overloads],
         "models_evaluated": plan.models,
         "states_in_proof": 0 if proof is None else proof.states,
-        **_order(plan),
+        **({} if plan.order is None else plan.order.described()),
         "seconds": dict(plan.seconds),
         **provenance(plan.engine),
     }
 
 
-def _narrowed(plan: Plan) -> bool:
-    return bool(plan.among) and plan.status.endswith("optimal")
-
-
 def _layers_asked(plan: Plan) -> dict[str, object]:
     """Return what was asked of candidates."""
     layers, graph = plan.layers, plan.graph
-    scenarios = len(graph.scenes) if isinstance(graph, ScenarioLayers) else 0
     return {
         "aims": list(plan.goals),
         "criterion": layers.criterion.name,
         **layers.criterion.settings,
-        "scenarios": scenarios,
+        "scenarios": len(graph.scenes) if isinstance(graph, ScenarioLayers) else 0,
         "limits": {limit.response: limit.bound for limit in layers.limits},
         "rules": {},
         "stands": None,
@@ -423,12 +419,10 @@ def _layers_asked(plan: Plan) -> dict[str, object]:
 
 def _states_asked(graph: States) -> dict[str, object]:
     """Return what was asked of states."""
-    rules = graph.rules
-    stands = None
+    rules, stands = graph.rules, None
     if graph.standing is not None:
-        sets = graph.stability
-        counts = {"looked_at": sets.looked_at, "programs": sets.programs}
-        stands = {**graph.standing.described(), **counts, "undecided": sets.undecided}
+        sets = {name: getattr(graph.stability, name) for name in COUNTED}
+        stands = {**graph.standing.described(), **sets}
     return {
         "aims": list(graph.names[: len(graph.aims)]),
         **judged_by(graph.goals, graph.criterion),
@@ -441,70 +435,39 @@ def _states_asked(graph: States) -> dict[str, object]:
 
 def _bounds(plan: Plan) -> dict[str, float | None]:
     """Return what no plan stays below, by aim; claimed of a search that ended early."""
-    proof, graph = plan.certificate, plan.graph
-    if isinstance(graph, States) and isinstance(plan.selection, StatePath):
-        early = proof is None or plan.selection.stopped
-        bounds = plan.selection.bound if early or proof is None else proof.bounds
-        found = zip(graph.names, graph.aims, bounds, strict=False)
-        return {name: g.shown(b) if isfinite(b) else None for name, g, b in found}
-    if proof is None:
-        return {}
-    return {
-        name: b if isfinite(b) else None for name, b in zip(plan.goals, proof.bounds, strict=True)
-    }
-
-
-def _spent_states(plan: Plan) -> dict[str, dict[str, float | None]]:
-    """Return what there is of every budget of states, and what is spent."""
-    graph = plan.states
-    names = plan.goals[len(graph.aims) :]
-    return {
-        name: {"bound": cap, "spent": plan.objective[name], "price": None}
-        for name, cap in zip(names, graph.budgets, strict=True)
-    }
+    proof, chosen = plan.certificate, plan.selection
+    bounds: tuple[float, ...] = () if proof is None else proof.bounds
+    if isinstance(chosen, StatePath):
+        early = proof is None or chosen.stopped
+        bounds = (chosen.bound if early else bounds)[: len(plan.states.aims)]
+    found = plan._by_goal(bounds) if bounds else {}
+    return {name: bound if isfinite(bound) else None for name, bound in found.items()}
 
 
 def _spent(plan: Plan) -> dict[str, dict[str, float | None]]:
-    """Return what there is of every budget of candidates, what is spent, and its price."""
-    graph, chosen = plan.graph, plan.selection
-    assert isinstance(chosen, Selection)
-    assert not isinstance(graph, States)
-    problem: PlacementProblem = graph
-    return {
-        budget.name: {
-            "bound": budget.bound if isfinite(budget.bound) else None,
-            "spent": budget.spent(chosen.choice),
-            "price": chosen.prices.get(budget.name),
+    """Return what there is of every budget, what is spent, and of candidates its price."""
+    chosen, out = plan.selection, {}
+    if isinstance(plan.graph, States):
+        capped = zip(plan.goals[len(plan.graph.aims) :], plan.graph.budgets, strict=True)
+        return {
+            name: {"bound": cap, "spent": plan.objective[name], "price": None}
+            for name, cap in capped
         }
-        for budget in problem.budgets
-    }
+    for budget in plan.graph.budgets:
+        bound = budget.bound if isfinite(budget.bound) else None
+        price = chosen.prices.get(budget.name) if isinstance(chosen, Selection) else None
+        out[budget.name] = {"bound": bound, "spent": budget.spent(plan.choice), "price": price}
+    return out
 
 
 def _letting_go(plan: Plan) -> int:
     """Return how many steps at the end only let go."""
-    if not isinstance(plan.graph, States) or isinstance(plan.graph.rules, Schedule):
+    rules = plan.graph.rules if isinstance(plan.graph, States) else None
+    if not isinstance(rules, FreeRules) or rules.ending is Ending.HELD:
         return 0
-    rules, steps = plan.graph.rules, plan.steps
-    if rules.ending is Ending.HELD:
-        return 0
-    kinds = [step.kind is StepKind.RELEASE for step in reversed(steps)]
     count = 0
-    while kinds[count] and len(steps[-1 - count].held) < rules.least_grips:
+    for step in reversed(plan.steps):
+        if step.kind is not StepKind.RELEASE or len(step.held) >= rules.least_grips:
+            break
         count += 1
     return count
-
-
-def _order(plan: Plan) -> dict[str, object]:
-    """Return what there is to say of an order that was sought; nothing of one that was given."""
-    if plan.order is None:
-        return {}
-    found = plan.order.selection
-    return {
-        "order": [*found.order],
-        "orders": plan.order.problem.among.value,
-        "order_status": str(plan.order.status),
-        "order_bound": found.bound if isfinite(found.bound) else None,
-        "order_bound_proven": plan.order.proven,
-        "order_evaluated": found.evaluated,
-        "order_stopped": found.stopped,
-    }

@@ -39,8 +39,14 @@ from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 
 Graph = Layers | ScenarioLayers | States | AllOrders
+GRAPHS = {States: On.STATES, AllOrders: On.ORDERS, ScenarioLayers: On.SCENARIOS}
 AIMS = {Aim.SUM: Goal(Measure.SUM), Aim.PEAK: Goal(Measure.PEAK)}
-USUAL = {On.LAYERS: "overlap_dp", On.STATES: "schedule_search", On.ORDERS: "order_search"}
+USUAL = {
+    On.LAYERS: "overlap_dp",
+    On.SCENARIOS: "scenario_search",
+    On.STATES: "schedule_search",
+    On.ORDERS: "order_search",
+}
 
 
 def pose(  # noqa: PLR0913  # every question is a word of its own
@@ -121,8 +127,6 @@ def in_layers(moves: Schedule | FreeRules) -> bool:
 def usual(problem: Problem) -> str:
     """Return the name of the formulation that solves a problem if none is named."""
     on = natural(problem)
-    if on is On.SCENARIOS:
-        return "scenario_search"
     if on is On.LAYERS and problem.scenarios:
         return "minimax"
     return "labels" if on is On.LAYERS and problem.budgets else USUAL[on]
@@ -158,27 +162,20 @@ def states_of(problem: Problem) -> States:
 
 def _usual_criterion(problem: Problem) -> Criterion:
     """Return the criterion with the numbers of the scene; raise what the usual graph says."""
-    on = natural(problem)
-    if on in (On.STATES, On.ORDERS):
+    if natural(problem) in (On.STATES, On.ORDERS):
         return states_of(problem).criterion
     parse_budgets(problem.budgets)
-    if problem.scenarios:
-        return _scenarios(problem).nominal.criterion
-    return _plain_layers(problem).criterion
+    layers = _scenarios(problem).nominal if problem.scenarios else _plain_layers(problem)
+    return layers.criterion
 
 
 def _plain_layers(problem: Problem) -> Layers:
     """Return layers of candidates without budgets."""
     if "plain" not in problem.graphs:
+        asked = problem.engine, problem.schedule, problem.criterion, problem.limits
         counted = [b.response for b in parse_budgets(problem.budgets) if b.response]
-        problem.graphs["plain"] = candidate_layers(
-            problem.engine,
-            problem.schedule,
-            problem.criterion,
-            problem.limits,
-            (*problem.also, *counted),
-            problem.resources,
-        )
+        also = (*problem.also, *counted)
+        problem.graphs["plain"] = candidate_layers(*asked, also, problem.resources)
     found: Layers = problem.graphs["plain"]
     return found
 
@@ -188,9 +185,7 @@ def _layers(problem: Problem) -> Layers | ScenarioLayers:
     _require_candidates(problem)
     if problem.scenarios:
         return _scenarios(problem)
-    asked = parse_budgets(problem.budgets)
-    layers = _plain_layers(problem)
-    return with_budgets(layers, asked) if asked else layers
+    return with_budgets(_plain_layers(problem), parse_budgets(problem.budgets))
 
 
 def _scenarios(problem: Problem) -> ScenarioLayers:
@@ -205,28 +200,25 @@ def _scenarios(problem: Problem) -> ScenarioLayers:
 
 def _require_candidates(problem: Problem) -> None:
     """Raise an error if something is asked that layers of candidates do not know."""
+    of_states = problem.goals not in ((), *((goal,) for goal in AIMS.values()))
     why = {
         "orders": problem.orders is not None,
-        f"aim {', '.join(map(str, problem.goals))}": len(problem.goals) > 1
-        or any(goal not in AIMS.values() for goal in problem.goals),
+        f"aim {', '.join(map(str, problem.goals))}": of_states,
         "stands": problem.stands is not None,
     }
-    for name, asked in why.items():
-        if asked:
-            raise ProblemError(
-                f"{name}: it is about states of the build, not about candidates alone; take "
-                "schedule_search or another formulation of states"
-            )
+    for name in (name for name, asked in why.items() if asked):
+        raise ProblemError(
+            f"{name}: it is about states of the build, not about candidates alone; take "
+            "schedule_search or another formulation of states"
+        )
 
 
 def _states(problem: Problem) -> States:
     """Return the states of a problem, with all that is asked of them."""
     over = problem.over if problem.scenarios else WORST_PEAK
     goals = problem.goals or (AIMS[over.aim],)
-    found = build_states(
-        problem.engine, problem.moves, problem.criterion, goals, problem.limits, problem.stands
-    )
-    found = replace(found, resources=problem.resources)
+    asked = problem.engine, problem.moves, problem.criterion, goals, problem.limits
+    found = replace(build_states(*asked, problem.stands), resources=problem.resources)
     if caps := parse_caps(problem.budgets):
         found = within(found, caps)
     return over_scenarios(found, problem.scenarios, over) if problem.scenarios else found
@@ -329,8 +321,8 @@ def _able(problem: Problem) -> tuple[On, ...]:
     first = natural(problem)
     if first is On.LAYERS:
         return (On.LAYERS, On.STATES)
-    chosen_from_candidates = not isinstance(problem.moves, FreeRules) and len(problem.goals) <= 1
-    return (first, On.LAYERS) if first is On.STATES and chosen_from_candidates else (first,)
+    of_candidates = not isinstance(problem.moves, FreeRules) and len(problem.goals) <= 1
+    return (first, On.LAYERS) if first is On.STATES and of_candidates else (first,)
 
 
 def _require_goal(problem: Problem, formulation: Formulation) -> None:
@@ -345,13 +337,10 @@ def _require_goal(problem: Problem, formulation: Formulation) -> None:
 
 def _of_graph(problem: object, formulation: Formulation | str | None) -> Formulation:
     """Return the formulation of a graph of choices that is given."""
-    if isinstance(problem, States):
-        return as_formulation(formulation or "schedule_search", On.STATES)
-    if isinstance(problem, AllOrders):
-        return as_formulation(formulation or "order_search", On.ORDERS)
-    if isinstance(problem, ScenarioLayers):
-        peak = problem.aim.aim is Aim.PEAK
-        usual_one, on = ("minimax", On.LAYERS) if peak else ("scenario_search", On.SCENARIOS)
-        return as_formulation(formulation or usual_one, on)
-    known = getattr(problem, "budgets", None)
-    return as_formulation(formulation or ("labels" if known else "overlap_dp"), On.LAYERS)
+    on = next((on for kind, on in GRAPHS.items() if isinstance(problem, kind)), On.LAYERS)
+    name = USUAL[on]
+    if isinstance(problem, ScenarioLayers) and problem.aim.aim is Aim.PEAK:
+        on, name = On.LAYERS, "minimax"
+    elif on is On.LAYERS and getattr(problem, "budgets", None):
+        name = "labels"
+    return as_formulation(formulation or name, on)

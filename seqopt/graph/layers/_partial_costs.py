@@ -135,11 +135,7 @@ def least_possible(costs: PartialCosts) -> float:
     for single, rows in zip(costs.single[1:], costs.rows[1:], strict=True):
         pairs = np.full((len(so_far), len(single)), costs.floor)
         for before, row in rows.items():
-            seen = ~np.isnan(row)
-            pairs[before, seen] = row[seen]
-        arrived = so_far[:, None] + pairs
-        if costs.aim is Aim.PEAK:
-            arrived = np.maximum(so_far[:, None], pairs)
-        total = arrived.min(axis=0)
-        so_far = total + single if costs.aim is Aim.SUM else np.maximum(total, single)
+            pairs[before] = np.where(np.isnan(row), costs.floor, row)
+        arrived = costs.join(so_far[:, None], pairs).min(axis=0)
+        so_far = costs.join(arrived, single)
     return float(so_far.min())

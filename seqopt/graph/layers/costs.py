@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,6 +74,10 @@ class LayeredCosts(FrozenValue):
         """How many candidates every move has."""
         return tuple(len(single) for single in self.single)
 
+    def arcs(self) -> list[Floats]:
+        """Return what a pair and its later choice cost together, (C_{k-1}, C_k) for every move."""
+        return [shared + single for shared, single in zip(self.shared, self.single, strict=True)]
+
     def parts(self, choice: Sequence[int]) -> list[float]:
         """Return the costs that a choice meets.
 
@@ -120,6 +124,43 @@ class LayeredCosts(FrozenValue):
         return tuple(good)
 
 
+def array_by_array(made: Callable[..., Floats], *costs: LayeredCosts | Budget) -> LayeredCosts:
+    """Return the costs that a function makes of several, given the arrays of one place at once."""
+    single = tuple(map(made, *(each.single for each in costs)))
+    return LayeredCosts(single, tuple(map(made, *(each.shared for each in costs))))
+
+
+def where_allowed(costs: LayeredCosts, amounts: LayeredCosts | Budget) -> LayeredCosts:
+    """Return amounts of choices that are allowed by costs; the others are infinite."""
+
+    def taken(cost: Floats, amount: Floats) -> Floats:
+        return np.where(np.isfinite(cost), amount, np.inf)
+
+    return array_by_array(taken, costs, amounts)
+
+
+def least_to_go(arcs: Sequence[Floats]) -> list[Floats]:
+    """Return the least sum of arcs to the end, from the source, (1,), and every candidate (C_k,).
+
+    ``arcs`` (sequence of (C_{k-1}, C_k) float): as of `LayeredCosts.arcs`.
+    """
+    rest = [np.zeros(arcs[-1].shape[1])]
+    for arc in reversed(arcs):
+        rest.insert(0, (arc + rest[0]).min(axis=1))
+    return rest
+
+
+def least_path(arcs: Sequence[Floats], rest: Sequence[Floats]) -> tuple[int, ...]:
+    """Return the choice whose arcs add up to least.
+
+    ``rest``: as of `least_to_go`.
+    """
+    choice: list[int] = []
+    for arc, ahead in zip(arcs, rest[1:], strict=True):
+        choice.append(int(np.argmin(arc[choice[-1] if choice else 0] + ahead)))
+    return tuple(choice)
+
+
 def _copied(costs: Floats) -> Floats:
     """Return a copy; one number for all choices stays one number."""
     given = np.asarray(costs)
@@ -156,7 +197,7 @@ class Budget(FrozenValue):
 
     def __post_init__(self) -> None:
         try:
-            LayeredCosts(self.single, self.shared)
+            _ = self.amounts
         except ProblemError as error:
             raise ProblemError(f"budget {self.name!r}: {error}") from error
         if not all(np.isfinite(amounts).all() for amounts in (*self.single, *self.shared)):
@@ -165,12 +206,17 @@ class Budget(FrozenValue):
             raise ProblemError(f"budget {self.name!r}: the bound is {self.bound}; give a number")
         super().__post_init__()
 
+    @property
+    def amounts(self) -> LayeredCosts:
+        """What choices take, in place of costs; made anew each time, as judges need it."""
+        return LayeredCosts(self.single, self.shared)
+
     def spent(self, choice: Sequence[int]) -> float:
         """Return what a choice takes of the budget.
 
         ``choice``: a candidate for every move. Result: in the unit of the budget.
         """
-        return LayeredCosts(self.single, self.shared).cost(choice)
+        return self.amounts.cost(choice)
 
     def slack(self, choice: Sequence[int]) -> float:
         """Return what a choice leaves of the budget, as a share.
@@ -179,7 +225,7 @@ class Budget(FrozenValue):
         and the amounts taken, all without sign, so that amounts that cancel count in full. Negative
         beyond the bound; zero if nothing is left, one if there is no cap.
         """
-        taken = LayeredCosts(self.single, self.shared).parts(choice)
+        taken = self.amounts.parts(choice)
         left = self.bound - sum(taken)
         if left in (0, np.inf):
             return min(left, 1.0)
@@ -212,7 +258,7 @@ class Joined:
     def singles(self) -> tuple[Floats, ...]:
         """Return the costs of each move's candidates where it alone is open.
 
-        Result (tuple of (C_k,) float): `least` where it never is.
+        Result (tuple of (C_k,) float): nothing where it never is, or no more than any cost.
         """
         return tuple(self.single(k) for k in range(len(self._sizes)))
 
@@ -232,13 +278,8 @@ class Joined:
         shared = tuple(self._of((k - 1, k), pair) for k, pair in enumerate(pairs))
         return LayeredCosts(self.singles(), shared)
 
-    @property
-    def least(self) -> float:
-        """What counts where no step is open: nothing, or no more than any cost."""
-        if self._join is np.add or np.isinf(self._least):
-            return 0.0
-        return self._least
-
     def _of(self, moves: tuple[int, ...], shape: tuple[int, ...]) -> Floats:
-        found = self._found.get(moves)
-        return np.broadcast_to(self.least, shape) if found is None else found
+        if moves in self._found:
+            return self._found[moves]
+        nothing = self._join is np.add or np.isinf(self._least)
+        return np.broadcast_to(0.0 if nothing else self._least, shape)

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
+from typing import cast
 
 import numpy as np
 import pandas as pd
@@ -33,8 +34,8 @@ from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses.quantities import robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.responses.table import analyze
-from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
-from seqopt.sequence.steps import Step
+from seqopt.sequence.schedule import OpenGrip, Schedule
+from seqopt.sequence.steps import Grips, Step
 
 
 def compared(
@@ -115,22 +116,11 @@ def _window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepCh
     return tuple(replace(each, moves=moves[each.step.number]) for each in found.steps)
 
 
-def _by_move(steps: Sequence[StepChoices]) -> Mapping[int, Sequence[StepChoices]]:
-    """Return the steps that each move decides: those in which it is the last that is open."""
-    found = defaultdict[int, list[StepChoices]](list)
-    for choices in steps:
-        found[choices.moves[-1]].append(choices)
-    return found
-
-
-def _window_kept(decided: Sequence[StepChoices], before: int) -> tuple[StepChoices, ...]:
-    """Return the steps that a move decides after a candidate of the one before, from all pairs."""
-    out = []
-    for choices in decided:
-        row = before if len(choices.moves) == 2 else slice(None)
-        responses = {name: values[row] for name, values in choices.responses.items()}
-        out.append(StepChoices(choices.step, choices.moves, responses))
-    return tuple(out)
+def _after(choices: StepChoices, before: int) -> StepChoices:
+    """Return a step, of two open moves only the choices after a candidate of the first."""
+    row = before if len(choices.moves) == 2 else slice(None)
+    responses = {name: values[row] for name, values in choices.responses.items()}
+    return replace(choices, responses=responses)
 
 
 def pairs_as_moves(
@@ -192,6 +182,16 @@ class Layers(Shown):
     def schedule(self) -> Schedule:
         """The steps and moves."""
         return self.evaluation.schedule
+
+    @property
+    def method(self) -> str:
+        """The name of the schedule."""
+        return self.schedule.method
+
+    @property
+    def among(self) -> str:
+        """Which candidates alone are looked at, in words; empty for all."""
+        return self.schedule.left_out
 
     @property
     def sums(self) -> LayeredCosts:
@@ -262,30 +262,29 @@ class Layers(Shown):
         """
         if self.evaluation.streams:
             return _window_anew(self.evaluation, move, before)
-        return _window_kept(self._decided.get(move, ()), before)
+        return tuple(_after(choices, before) for choices in self._decided.get(move, ()))
 
     @cached_property
     def _decided(self) -> Mapping[int, Sequence[StepChoices]]:
-        return _by_move(self.evaluation.steps)
+        """The steps that each move decides: those in which it is the last that is open."""
+        found = defaultdict[int, list[StepChoices]](list)
+        for choices in self.evaluation.steps:
+            found[choices.moves[-1]].append(choices)
+        return found
 
     @cached_property
     def others(self) -> dict[Criterion, Layers]:
         """The same problem under other criteria that need the same responses, as they are met."""
         return {}
 
-    def step_costs(self, choices: StepChoices, rows: slice | int = slice(None)) -> Floats:
-        """Return the costs of a step's choices, infinite where they are not allowed.
-
-        ``rows``: fixes the earlier move of a shared step to one candidate: costs, ranks included,
-        are then those among the candidates of the later move alone. Result ((C,) or (C, D) float).
-        """
-        responses = {name: values[rows] for name, values in choices.responses.items()}
+    def step_costs(self, choices: StepChoices) -> Floats:
+        """Return the costs of a step's choices, (C,) or (C, D), infinite where not allowed."""
         move = self.schedule.moves[choices.moves[-1]]
         criterion = _spread_over_pairs(choices, self.criterion)
-        costs = criterion.costs(responses, move.bricks, len(move.candidates))
+        costs = criterion.costs(choices.responses, move.bricks, len(move.candidates))
         costs = np.where(np.isfinite(costs), costs, np.inf)
         for limit in self.limits:
-            costs[limit.exceeded(responses[limit.response])] = np.inf
+            costs[limit.exceeded(choices.responses[limit.response])] = np.inf
         return costs
 
     def require_possible(self) -> None:
@@ -293,7 +292,8 @@ class Layers(Shown):
 
         Raises `InfeasibleError`, naming the limit, the value and the steps.
         """
-        fixed = [_closed(step) for step in self.schedule.steps if not step.moves]
+        given = (step for step in self.schedule.steps if not step.moves)
+        fixed = [Step(s.number, s.kind, s.bricks, cast(Grips, s.grips)) for s in given]
         if not (self.limits and fixed):
             return
         table = analyze(self.engine, fixed)
@@ -322,12 +322,6 @@ class Layers(Shown):
         ``choice``: a candidate for every move. Raises `StepError` if a step is impossible.
         """
         return self.schedule.fill(self.nodes(choice))
-
-
-def _closed(step: OpenStep) -> Step:
-    """Return an open step in which no grip is open."""
-    grips = tuple(grip if isinstance(grip, int) else None for grip in step.grips)
-    return Step(step.number, step.kind, step.bricks, grips)
 
 
 def candidate_layers(
@@ -415,11 +409,9 @@ def travel(problem: Layers, bound: float) -> Budget:
     schedule = problem.schedule
     for k, move in enumerate(schedule.moves):
         robot = [r.name for r in schedule.scene.robots].index(move.robot)
-        grips = [step.grips[robot] for step in schedule.steps]
-        steps = range(len(grips))
-        mine = [i for i in steps if grips[i] == OpenGrip(k)]
-        before = next((grips[i] for i in reversed(steps[: mine[0]]) if grips[i] is not None), None)
-        after = next((grips[i] for i in steps[mine[-1] + 1 :] if grips[i] is not None), None)
+        held = [step.grips[robot] for step in schedule.steps if step.grips[robot] is not None]
+        first, count = held.index(OpenGrip(k)), held.count(OpenGrip(k))
+        before, after = [None, *held][first], [*held, None][first + count]
         for other in (before, after):
             if isinstance(other, int):
                 single[k] += _distances(problem, move.candidates, (other,))[:, 0]

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Bools, Floats
-from seqopt.graph.layers.costs import TINY, LayeredCosts
+from seqopt.graph.layers.costs import TINY, LayeredCosts, least_to_go
 from seqopt.graph.layers.layers import Layers, compared
 from seqopt.problem.criteria import Ranked, RankSum, WeightedSum, WorstRatio
 from seqopt.problem.requirements import Criterion
@@ -73,10 +76,7 @@ def split_gap(problem: Layers, choice: Sequence[int]) -> GapParts | None:
     if conditional is None:
         return None
     charged = problem.sums
-    there, best = (
-        _least_among_least(conditional.sums, charged),
-        _least_among_least(charged, charged),
-    )
+    there, best = (_least_among_least(first, charged) for first in (conditional.sums, charged))
     scale = max(sum(map(abs, charged.parts(choice))), TINY)
     if not np.isfinite([there, best]).all():
         return None
@@ -88,8 +88,7 @@ def _least_among_least(first: LayeredCosts, second: LayeredCosts) -> float:
 
     ``first``, ``second``: of the same choices. Result: infinite if no choice is allowed.
     """
-    arcs = [shared + single for shared, single in zip(first.shared, first.single, strict=True)]
-    total, kept = np.zeros(1), on_a_least_path(arcs)
+    total, kept = np.zeros(1), on_a_least_path(first.arcs())
     for single, shared, mask in zip(second.single, second.shared, kept, strict=True):
         total = np.where(mask, total[:, None] + shared + single, np.inf).min(axis=0)
     return float(total.min())
@@ -101,23 +100,21 @@ def on_a_least_path(arcs: Sequence[Floats], size: float = TINY) -> list[Bools]:
     ``arcs`` (sequence of (C_{k-1}, C_k) float): what a pair and its later choice cost together;
     ``size``: of costs: what `TIED_SUMS` is at least relative to.
     """
-    reached, ways = np.zeros(1), []
+    reached = [np.zeros(1)]
     for arc in arcs:
-        ways.append(reached)
-        reached = (reached[:, None] + arc).min(axis=0)
-    least = float(reached.min())
+        reached.append((reached[-1][:, None] + arc).min(axis=0))
+    least = float(reached[-1].min())
     most = least + TIED_SUMS * max(abs(least), size)
-    to_go = np.zeros(arcs[-1].shape[1])
+    ends = zip(reached[:-1], arcs, least_to_go(arcs)[1:], strict=True)
     out = []
-    for arc, way in zip(reversed(arcs), reversed(ways), strict=True):
-        through = arc + to_go
-        whole = way[:, None] + through
+    for before, arc, after in ends:
+        whole = before[:, None] + (arc + after)
         out.append(np.isfinite(whole) & (whole <= most))
-        to_go = through.min(axis=1)
-    return out[::-1]
+    return out
 
 
 TIED = 1e-9  # costs this close, relative to the largest, are equal
+TERMS = {RankSum: ("before", "after"), WeightedSum: ("terms",), WorstRatio: ("limits",)}
 
 
 def move_costs(problem: Layers, move: int, before: int, without: int | None = None) -> Floats:
@@ -161,48 +158,43 @@ def rank_moves(problem: Layers, choice: Sequence[int]) -> pd.DataFrame:
     first rank), ``turned_by_candidates`` (others whose absence changes the winner) and
     ``turned_by_criteria`` (responses whose absence does).
     """
-    rows = []
-    for k, move in enumerate(problem.schedule.moves):
-        before = choice[k - 1] if k else 0
-        costs = move_costs(problem, k, before)
-        winner = int(np.argmin(costs))
-        others = np.delete(costs, winner)
-        turned, dropped = _turning(problem, k, before, costs)
-        rows.append(
-            {
-                "move": k + 1,
-                "step": move.step,
-                "bricks": move.bricks,
-                "robot": move.robot,
-                "node": move.candidates[choice[k]],
-                "rank": rank_of(costs, choice[k]),
-                "winner": move.candidates[winner],
-                "margin": float(others.min() - costs[winner]) if len(others) else np.inf,
-                "tied": int((costs <= costs[winner] + _tie(costs)).sum()),
-                "turned_by_candidates": " ".join(str(move.candidates[j]) for j in turned),
-                "turned_by_criteria": " ".join(dropped),
-            }
-        )
-    return pd.DataFrame(rows)
+    return pd.DataFrame([*map(partial(_reliability, problem, choice), range(len(choice)))])
+
+
+def _reliability(problem: Layers, choice: Sequence[int], k: int) -> dict[str, object]:
+    """Return the row of a move in `rank_moves`."""
+    before, candidates = (0, *choice)[k], problem.schedule.moves[k].candidates
+    costs = move_costs(problem, k, before)
+    winner = int(np.argmin(costs))
+    turned, dropped = _turning(problem, k, before, costs)
+    return _chosen(problem, choice, k) | {
+        "rank": rank_of(costs, choice[k]),
+        "winner": candidates[winner],
+        "margin": float(np.delete(costs, winner).min(initial=np.inf) - costs[winner]),
+        "tied": int((costs <= costs[winner] + _tie(costs)).sum()),
+        "turned_by_candidates": " ".join(str(candidates[j]) for j in turned),
+        "turned_by_criteria": " ".join(dropped),
+    }
+
+
+def _chosen(problem: Layers, choice: Sequence[int], k: int) -> dict[str, object]:
+    """Return what a table says of a move whatever it is about."""
+    move = problem.schedule.moves[k]
+    what = {"move": k + 1, "step": move.step, "bricks": move.bricks, "robot": move.robot}
+    return {**what, "node": move.candidates[choice[k]]}
 
 
 def _turning(problem: Layers, move: int, before: int, costs: Floats) -> tuple[list[int], list[str]]:
     """Return the candidates and the responses without which another candidate would win."""
     winner = int(np.argmin(costs))
-    candidates = [
-        j
-        for j in range(len(costs))
-        if j != winner
-        and np.isfinite(costs[j])
-        and int(np.argmin(move_costs(problem, move, before, without=j))) != winner
-    ]
-    bricks = problem.schedule.moves[move].bricks
-    responses = [
-        name
-        for name, criterion in _without_one(problem.criterion, bricks)
-        if int(np.argmin(move_costs(replace(problem, criterion=criterion), move, before))) != winner
-    ]
-    return candidates, responses
+
+    def turns(other: Layers, without: int | None = None) -> bool:
+        return int(np.argmin(move_costs(other, move, before, without))) != winner
+
+    some = [int(j) for j in np.flatnonzero(np.isfinite(costs)) if j != winner]
+    less = _without_one(problem.criterion, problem.schedule.moves[move].bricks)
+    responses = [name for name, left in less if turns(replace(problem, criterion=left))]
+    return [j for j in some if turns(problem, j)], responses
 
 
 def _without(choices: StepChoices, candidate: int | None) -> StepChoices:
@@ -218,21 +210,12 @@ def _without(choices: StepChoices, candidate: int | None) -> StepChoices:
 
 def _without_one(criterion: Criterion, bricks: int) -> Iterator[tuple[str, Criterion]]:
     """Yield every criterion with one of its responses left out, and its name."""
-    names = criterion.wanted(bricks)
-    for name in names if len(names) > 1 else ():
-        if isinstance(criterion, RankSum):
-            before, after = (
-                tuple(t for t in terms if t[0] != name) or terms
-                for terms in (criterion.before, criterion.after)
-            )
-            yield name, replace(criterion, before=before, after=after)
-        elif isinstance(criterion, WeightedSum):
-            yield name, replace(criterion, terms=tuple(t for t in criterion.terms if t[0] != name))
-        elif isinstance(criterion, WorstRatio):
-            yield (
-                name,
-                replace(criterion, limits=tuple(t for t in criterion.limits if t[0] != name)),
-            )
+    names, fields = criterion.wanted(bricks), TERMS.get(type(criterion), ())
+    for name in names if fields and len(names) > 1 else ():
+        terms = {field: getattr(criterion, field) for field in fields}
+        left = {field: tuple(t for t in terms[field] if t[0] != name) for field in fields}
+        posed: Any = criterion
+        yield name, replace(posed, **{field: left[field] or terms[field] for field in fields})
 
 
 def rank_choice(problem: Layers, choice: Sequence[int]) -> pd.DataFrame:
@@ -247,25 +230,17 @@ def rank_choice(problem: Layers, choice: Sequence[int]) -> pd.DataFrame:
     sums = _to_go(problem.sums, np.add)
     peaks = _to_go(problem.peaks, np.maximum)
     rows = []
-    for k, move in enumerate(problem.schedule.moves):
-        before = choice[k - 1] if k else 0
-        window = move_costs(problem, k, before)
-        rows.append(
-            {
-                "move": k + 1,
-                "step": move.step,
-                "bricks": move.bricks,
-                "robot": move.robot,
-                "node": move.candidates[choice[k]],
-                "candidates": len(move.candidates),
-                "first_in_window": move.candidates[int(window.argmin())],
-                "rank_in_window": rank_of(window, choice[k]),
-                "rank_overlap": rank_of(problem.sums.shared[k][before] + sums[k], choice[k]),
-                "rank_peak": rank_of(
-                    np.maximum(problem.peaks.shared[k][before], peaks[k]), choice[k]
-                ),
-            }
-        )
+    for k, (before, now) in enumerate(pairwise((0, *choice))):
+        window, candidates = move_costs(problem, k, before), problem.schedule.moves[k].candidates
+        worst = np.maximum(problem.peaks.shared[k][before], peaks[k])
+        ranks = {
+            "candidates": len(candidates),
+            "first_in_window": candidates[int(window.argmin())],
+            "rank_in_window": rank_of(window, now),
+            "rank_overlap": rank_of(problem.sums.shared[k][before] + sums[k], now),
+            "rank_peak": rank_of(worst, now),
+        }
+        rows.append(_chosen(problem, choice, k) | ranks)
     return pd.DataFrame(rows)
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field, fields, is_dataclass
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, partial
 from numbers import Real
 from typing import Any, TypeVar
 
@@ -27,7 +27,6 @@ from seqopt.graph.scenarios import ScenarioLayers, largest_of
 from seqopt.plan.calling.formulation import (
     WATCH,
     End,
-    Finding,
     Formulation,
     Selection,
     Watch,
@@ -217,10 +216,7 @@ def require_fit(
             f"{formulation.name}: the budget {problem.budgets[0].name!r} couples all moves; "
             f"use {' or '.join(able)}"
         )
-    for name in options:
-        if name not in formulation.options:
-            known = ", ".join(formulation.options) or "no options"
-            raise ProblemError(f"option {name}: {formulation.name} has {known}")
+    formulation.require_options(options)
 
 
 def require_time(formulation: Formulation, time_limit: float) -> None:
@@ -265,13 +261,13 @@ def _called(
 ) -> Selection:
     """Return what a formulation returns, if that is a selection."""
     told = {WATCH: watch} if formulation.watched else {}
+
+    def judged() -> tuple[object, ...]:
+        return _costs(formulation, problem), problem.budgets
+
+    solve = partial(formulation.solve, problem, **told, **options)
     try:
-        return called(
-            formulation.name,
-            lambda: (_costs(formulation, problem), problem.budgets),
-            Selection,
-            lambda: formulation.solve(problem, **told, **options),
-        )
+        return called(formulation.name, judged, Selection, solve)
     except SolverError as error:
         if watch.interrupted:
             raise KeyboardInterrupt(str(error)) from error
@@ -289,25 +285,16 @@ def _costs(formulation: Formulation, problem: PlacementProblem) -> tuple[Layered
 def _with_numbers(formulation: Formulation, found: Selection, watch: Watch) -> Selection:
     """Return a selection with numbers where numbers belong, or raise a `SolverError`."""
     with readable(formulation.name):
-        seconds = float(found.compile_seconds)
+        seconds, objective, bound = map(
+            float, (found.compile_seconds, found.objective, found.bound)
+        )
         if not 0 <= seconds < np.inf:
             raise ValueError(f"compile_seconds is {seconds}")
-        trace = _traced(watch, float(found.objective), float(found.bound))
-        return Selection(
-            choice=tuple(operator.index(index) for index in found.choice),
-            objective=float(found.objective),
-            bound=float(found.bound),
-            prices={str(name): float(price) for name, price in found.prices.items()},
-            compile_seconds=seconds,
-            end=End.INTERRUPTED if watch.interrupted else End(found.end),
-            trace=trace,
-        )
-
-
-def _traced(watch: Watch, objective: float, bound: float) -> tuple[Finding, ...]:
-    """Return what was told, ending with what is claimed."""
-    watch.tell(objective, bound)
-    return watch.trace
+        watch.tell(objective, bound)  # the trace ends with what is claimed
+        choice = tuple(operator.index(index) for index in found.choice)
+        prices = {str(name): float(price) for name, price in found.prices.items()}
+        end = End.INTERRUPTED if watch.interrupted else End(found.end)
+        return Selection(choice, objective, bound, prices, seconds, end, watch.trace)
 
 
 @contextmanager

@@ -18,10 +18,17 @@ from scipy.optimize import linprog
 
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
-from seqopt.graph.layers.costs import TINY, Budget, LayeredCosts
+from seqopt.graph.layers.costs import (
+    TINY,
+    Budget,
+    LayeredCosts,
+    least_path,
+    least_to_go,
+    where_allowed,
+)
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.formulation import End, Selection, Watch
-from seqopt.plan.judge.certificate import TOLERANCE, least_sum
+from seqopt.plan.judge.certificate import TOLERANCE, least_sum, too_small
 from seqopt.problem.problem import Aim
 
 ACCURACY = 1e-7  # how far a reported optimum may lie above the true one, relative to the larger of
@@ -96,15 +103,14 @@ def layered_flow(problem: PlacementProblem) -> LayeredFlow:
     none is within one of the budgets; `ProblemError` if a budget is not for the moves and
     candidates of the problem.
     """
-    costs = problem.sums
+    costs, budgets = problem.sums, problem.budgets
     costs.continuable()
     feasible = _within_each(problem)
-    arcs = [shared + single for shared, single in zip(costs.shared, costs.single, strict=True)]
-    allowed = tuple(np.isfinite(arc) for arc in arcs)
-    cost = np.concatenate([arc[mask] for arc, mask in zip(arcs, allowed, strict=True)])
+    allowed = tuple(np.isfinite(arc) for arc in costs.arcs())
+    cost = _of_allowed(costs, allowed)
     scale = max(float(np.abs(cost).max()), TINY)
     balance, source = _balance(costs, allowed)
-    amounts = [_flow_amounts(budget, allowed) for budget in problem.budgets]
+    amounts = [_of_allowed(budget.amounts, allowed) for budget in budgets]
     units = [_unit_flow(amount) for amount in amounts]
     return LayeredFlow(
         cost=cost / scale,
@@ -112,9 +118,9 @@ def layered_flow(problem: PlacementProblem) -> LayeredFlow:
         balance=balance,
         source=source,
         amounts=tuple(a / unit for a, unit in zip(amounts, units, strict=True)),
-        caps=tuple(b.bound / unit for b, unit in zip(problem.budgets, units, strict=True)),
+        caps=tuple(b.bound / unit for b, unit in zip(budgets, units, strict=True)),
         units=tuple(units),
-        names=tuple(budget.name for budget in problem.budgets),
+        names=tuple(budget.name for budget in budgets),
         allowed=allowed,
         feasible=feasible,
     )
@@ -126,25 +132,14 @@ def _within_each(problem: PlacementProblem) -> bool:
     Raises `InfeasibleError` if no choice is within one of them; `ProblemError` if one is not for
     the moves and candidates of the problem.
     """
-    costs = problem.sums
     known = True
     for budget in problem.budgets:
-        if LayeredCosts(budget.single, budget.shared).sizes != costs.sizes:
+        if budget.amounts.sizes != problem.sums.sizes:
             raise ProblemError(f"budget {budget.name!r} is for other moves or candidates")
-        single, shared = (
-            tuple(np.where(np.isfinite(cost), amount, np.inf) for amount, cost in part)
-            for part in (
-                zip(budget.single, costs.single, strict=True),
-                zip(budget.shared, costs.shared, strict=True),
-            )
-        )
-        least = least_sum(LayeredCosts(single, shared))
+        least = least_sum(where_allowed(problem.sums, budget))
         sizes = sum(float(np.abs(a).max()) for a in (*budget.single, *budget.shared))
         if least > budget.bound + TOLERANCE * sizes:
-            raise InfeasibleError(
-                f"no choice is within all budgets: every choice uses at least {least:.6g} of "
-                f"{budget.name!r}, more than {budget.bound:.6g}; raise that bound"
-            )
+            raise too_small(budget, least)
         known = known and len(problem.budgets) == 1 and least <= budget.bound
     return known
 
@@ -152,26 +147,19 @@ def _within_each(problem: PlacementProblem) -> bool:
 def _balance(costs: LayeredCosts, allowed: Sequence[Bools]) -> tuple[sparse.csr_array, Floats]:
     """Return matrix and right side that conserve the unit."""
     starts = np.cumsum([0, 1, *costs.sizes])
-    rows, columns, values, arc = [], [], [], 0
-    for k, mask in enumerate(allowed):
-        first, second = np.nonzero(mask)
-        index = np.arange(arc, arc + len(first))
-        ends = [(starts[k] + first, 1.0)]
-        if k + 1 < len(allowed):
-            ends.append((starts[k + 1] + second, -1.0))
-        for row, sign in ends:
-            rows.append(row)
-            columns.append(index)
-            values.append(np.full(len(row), sign))
-        arc += len(first)
-    size = int(starts[len(allowed)])
-    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    return sparse.csr_array(entries, shape=(size, arc)), np.eye(1, size).ravel()
+    ends = [np.nonzero(mask) for mask in allowed]
+    out = np.concatenate([at + first for at, (first, _) in zip(starts, ends, strict=False)])
+    into = np.concatenate([at + last for at, (_, last) in zip(starts[1:], ends, strict=False)])
+    size, arcs = int(starts[len(allowed)]), np.arange(len(out))
+    onward = into < size  # nothing is left over at the last move
+    rows = np.concatenate([out, into[onward]]), np.concatenate([arcs, arcs[onward]])
+    signs = np.repeat([1.0, -1.0], [len(out), onward.sum()])
+    return sparse.csr_array((signs, rows), shape=(size, len(out))), np.eye(1, size).ravel()
 
 
-def _flow_amounts(budget: Budget, allowed: Sequence[Bools]) -> Floats:
-    parts = [shared + single for shared, single in zip(budget.shared, budget.single, strict=True)]
-    return np.concatenate([part[mask] for part, mask in zip(parts, allowed, strict=True)])
+def _of_allowed(costs: LayeredCosts, allowed: Sequence[Bools]) -> Floats:
+    """Return what all arcs that are allowed cost, one after the other."""
+    return np.concatenate([arc[mask] for arc, mask in zip(costs.arcs(), allowed, strict=True)])
 
 
 def _unit_flow(amounts: Floats) -> float:
@@ -206,8 +194,7 @@ def stopped(
 def at_least(costs: LayeredCosts, aim: Aim) -> float:
     """Return what each move costs at least, together: a bound that takes no search."""
     if aim is Aim.SUM:
-        arcs = (shared + single for shared, single in zip(costs.shared, costs.single, strict=True))
-        return sum(float(arc.min()) for arc in arcs)
+        return sum(float(arc.min()) for arc in costs.arcs())
     return max(float(part.min()) for part in (*costs.single, *costs.shared))
 
 
@@ -239,24 +226,8 @@ def _choices(problem: PlacementProblem, costs: LayeredCosts) -> Iterator[tuple[i
     assert choice is not None  # there is no time limit
     yield choice
     for budget in problem.budgets:
-        arcs = [
-            np.where(np.isfinite(shared + single), takes + own, np.inf)
-            for shared, single, takes, own in zip(
-                costs.shared, costs.single, budget.shared, budget.single, strict=True
-            )
-        ]
-        yield _least(arcs)
-
-
-def _least(arcs: list[Floats]) -> tuple[int, ...]:
-    """Return the choice whose pairs are together least."""
-    rest = [np.zeros(arcs[-1].shape[1])]
-    for arc in reversed(arcs[1:]):
-        rest.insert(0, (arc + rest[0]).min(axis=1))
-    choice: list[int] = []
-    for arc, ahead in zip(arcs, rest, strict=True):
-        choice.append(int(np.argmin(arc[choice[-1] if choice else 0] + ahead)))
-    return tuple(choice)
+        arcs = where_allowed(costs, budget).arcs()
+        yield least_path(arcs, least_to_go(arcs))
 
 
 ROUNDING = 1e-9  # of a budget or a cost: within this, sums are equal; budgets have as much more
@@ -324,10 +295,7 @@ class PricedPaths:
         priced = [
             arc + np.tensordot(prices, a, 1) for arc, a in zip(self.arcs, self.amounts, strict=True)
         ]
-        rest = [np.zeros(priced[-1].shape[1])]
-        for arc in reversed(priced):
-            rest.insert(0, (arc + rest[0]).min(axis=1))
-        return priced, rest
+        return priced, least_to_go(priced)
 
     def cheapest(self, prices: Floats) -> tuple[Path, float]:
         """Return the path that is cheapest at given prices, and the bound that they prove.
@@ -336,12 +304,10 @@ class PricedPaths:
         less, however sums are rounded.
         """
         priced, rest = self.to_go(prices)
-        choice: list[int] = []
-        for arc, ahead in zip(priced, rest[1:], strict=True):
-            choice.append(int(np.argmin(arc[choice[-1] if choice else 0] + ahead)))
         bound = float(rest[0][0] - prices @ self.caps)
         size = 1 + float(prices @ (1 + np.abs(self.caps)))  # of what is summed, per move
-        return self.path(choice), bound - EPS * (len(priced) + 1) ** 2 * size
+        path = self.path(least_path(priced, rest))
+        return path, bound - EPS * (len(priced) + 1) ** 2 * size
 
     def named(self, prices: Floats) -> dict[str, float]:
         """Return prices by budget, in the unit of the criterion per unit of the budget.
@@ -363,25 +329,22 @@ def priced_paths(problem: PlacementProblem) -> PricedPaths:
     costs.continuable()
     _within_each(problem)
     budgets = [budget for budget in problem.budgets if np.isfinite(budget.bound)]
-    arcs = [shared + single for shared, single in zip(costs.shared, costs.single, strict=True)]
+    arcs = costs.arcs()
     largest = max(float(np.abs(arc[np.isfinite(arc)]).max()) for arc in arcs)
     scale = 2.0 ** math.frexp(largest)[1] if largest else 1.0
     units = np.array([_unit(budget) for budget in budgets])
+    amounts = tuple(np.empty((len(budgets), *arc.shape)) for arc in arcs)
+    for b, (budget, unit) in enumerate(zip(budgets, units, strict=True)):
+        for found, taken in zip(amounts, budget.amounts.arcs(), strict=True):
+            found[b] = taken / unit
     return PricedPaths(
         arcs=tuple(arc / scale for arc in arcs),
-        amounts=tuple(_amounts(budgets, units, k, arc.shape) for k, arc in enumerate(arcs)),
+        amounts=amounts,
         caps=np.array([b.bound for b in budgets]) / units + ROUNDING,
         scale=scale,
         units=units,
         names=tuple(budget.name for budget in budgets),
     )
-
-
-def _amounts(budgets: Sequence[Budget], units: Floats, k: int, shape: tuple[int, ...]) -> Floats:
-    found = np.empty((len(budgets), *shape))
-    for row, budget, unit in zip(found, budgets, units, strict=True):
-        row[:] = (budget.shared[k] + budget.single[k]) / unit
-    return found
 
 
 def _unit(budget: Budget) -> float:

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from itertools import combinations
+from itertools import chain, combinations, islice
 
 import numpy as np
 
 from seqopt.errors import InfeasibleError, SeqoptError, SolverError
 from seqopt.graph._explore import Explorer
-from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.costs import Budget, LayeredCosts, array_by_array, where_allowed
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.paths import distances, least_peak
 from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import States
 from seqopt.plan.judge._budget_proof import least_within
 from seqopt.plan.judge._proof import Proof
-from seqopt.plan.judge.certificate import least_sum
+from seqopt.plan.judge.certificate import least_sum, too_small
 from seqopt.plan.search._margin_search import WORST, bisected, with_margin
 from seqopt.problem.problem import STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
@@ -36,35 +36,15 @@ def smallest_conflict(problem: PlacementProblem) -> tuple[Budget, ...]:
     ``problem``: its sums say which choices are allowed. Result: empty if no set of budgets is
     proven to conflict.
     """
-    for count in range(1, len(problem.budgets) + 1):
-        for some in combinations(problem.budgets, count):
-            if _conflict(problem.sums, some):
-                return some
-    return ()
+    counts = range(1, len(problem.budgets) + 1)
+    sets = chain.from_iterable(combinations(problem.budgets, count) for count in counts)
+    return next((some for some in sets if _conflict(problem.sums, some)), ())
 
 
 def _conflict(costs: LayeredCosts, budgets: tuple[Budget, ...]) -> bool:
     """Return whether it is proven that no allowed choice keeps all budgets."""
-    allowed = LayeredCosts(
-        *(
-            tuple(np.where(np.isfinite(part), 0.0, np.inf) for part in parts)
-            for parts in (costs.single, costs.shared)
-        )
-    )
-    return least_within(CostProblem(allowed, budgets), 1.0, {}, 1.0) >= PROVEN
-
-
-def _least_spent(costs: LayeredCosts, budget: Budget) -> float:
-    """Return the least that an allowed choice takes of a budget.
-
-    ``costs``: say which choices are allowed. Result: in its unit.
-    """
-    pairs = ((budget.single, costs.single), (budget.shared, costs.shared))
-    single, shared = (
-        tuple(np.where(np.isfinite(c), a, np.inf) for a, c in zip(amounts, parts, strict=True))
-        for amounts, parts in pairs
-    )
-    return least_sum(LayeredCosts(single, shared))
+    nothing = where_allowed(costs, array_by_array(np.zeros_like, costs))
+    return least_within(CostProblem(nothing, budgets), 1.0, {}, 1.0) >= PROVEN
 
 
 def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
@@ -79,20 +59,13 @@ def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
             f"claimed by {name}, and not proven: no choice is within all budgets; raise a bound"
         )
     if len(found) == 1:
-        least = _least_spent(problem.sums, found[0])
-        return InfeasibleError(
-            f"no choice is within all budgets: every choice uses at least {least:.6g} of "
-            f"{found[0].name!r}, more than {found[0].bound:.6g}; raise that bound"
-        )
+        return too_small(found[0], least_sum(where_allowed(problem.sums, found[0])))
+    named = [f"{budget.bound:.6g} of {budget.name!r}" for budget in found]
+    fewer = "each can alone" if len(found) == 2 else "any fewer of them can"
     return InfeasibleError(
-        f"no choice is within all budgets: {_listed(found)} cannot be kept together, though "
-        f"{'each can alone' if len(found) == 2 else 'any fewer of them can'}; raise one of them"
+        f"no choice is within all budgets: {', '.join(named[:-1])} and {named[-1]} cannot be kept "
+        f"together, though {fewer}; raise one of them"
     )
-
-
-def _listed(budgets: Sequence[Budget]) -> str:
-    named = [f"{budget.bound:.6g} of {budget.name!r}" for budget in budgets]
-    return f"{', '.join(named[:-1])} and {named[-1]}"
 
 
 STEPS = (Goal(Measure.STEPS),)
@@ -130,9 +103,8 @@ def confirmed(problem: States, name: str, seconds: float = np.inf) -> SeqoptErro
 def _over_budget(problem: States, found: Explorer, name: str) -> SeqoptError:
     """Return the error that names what each budget needs at least, where plans exist without."""
     graph, states = found.graph()
-    first = len(problem.goals) - len(problem.budgets)
     words = []
-    for k, cap in enumerate(problem.budgets, start=first):
+    for k, cap in enumerate(problem.budgets, start=len(problem.aims)):
         least = distances(graph, graph.amounts[:, k])[graph.ends].min()
         words.append(f"{problem.goals[k]} is at least {least:.6g}, and {cap:g} is allowed")
     proven = Proof(problem, {level: rows for level, _, rows in states}).is_impossible()
@@ -144,9 +116,8 @@ def _over_budget(problem: States, found: Explorer, name: str) -> SeqoptError:
 
 def _with_any_margin(problem: States) -> States:
     """Return a problem in which states must have the margins that are asked for, however little."""
-    for goal in problem.goals:
-        if goal.of_margins:
-            problem = with_margin(problem, goal.response, WORST[goal.response])
+    for name in (goal.response for goal in problem.goals if goal.of_margins):
+        problem = with_margin(problem, name, WORST[name])
     return problem
 
 
@@ -163,8 +134,8 @@ def _why_impossible(problem: States, seconds: float = np.inf) -> str:
     has to be raised. An engine that has a ``rigid`` one leaves this to it: what is tried here may
     be far beyond what joints carry, where discrete elements take seconds a state.
     """
-    problem = replace(problem, engine=getattr(problem.engine, "rigid", problem.engine))
-    problem = _with_any_margin(problem)
+    engine = getattr(problem.engine, "rigid", problem.engine)
+    problem = _with_any_margin(replace(problem, engine=engine))
     look = partial(explore, tell=partial(_in_time, time.perf_counter() + seconds))
     where = "no plan is allowed"
     try:
@@ -187,13 +158,10 @@ def _where(problem: States, look: Look) -> str:
 
 def _what_helps(problem: States, look: Look) -> str:
     """Return what opens a way, as the end of a line."""
-    ways = list(_opening(problem, look))
-    if not ways:
-        ways = [both] if (both := _pair(problem, look)) else []
+    ways = [*_opening(problem, look)] or [*islice(_pairs(problem, look), 1)]
     if not ways:
         return ", whatever two rules or limits are loosened; extend a reach or add a robot"
-    ways = [_enough(problem, way, look) for way in ways]
-    return f"; it becomes possible with {' or '.join(ways)}"
+    return f"; it becomes possible with {' or '.join(_enough(problem, w, look) for w in ways)}"
 
 
 def _opening(problem: States, look: Look) -> Iterator[str]:
@@ -220,13 +188,11 @@ def _loosened(problem: States) -> Iterator[tuple[str, FreeRules]]:
             yield text, rules
 
 
-def _pair(problem: States, look: Look) -> str:
-    """Return the first two that open a way together: rules, or a rule and a limit; or nothing."""
+def _pairs(problem: States, look: Look) -> Iterator[str]:
+    """Yield two that open a way together: rules, or a rule and a limit."""
     for text, rules in _loosened(problem):
-        other = next(_opening(replace(problem, rules=rules), look), "")
-        if other:
-            return f"{text} together with {other}"
-    return ""
+        for other in _opening(replace(problem, rules=rules), look):
+            yield f"{text} together with {other}"
 
 
 def _enough(problem: States, way: str, look: Look) -> str:
@@ -246,7 +212,7 @@ def _enough(problem: States, way: str, look: Look) -> str:
     found = [limit for limit in problem.limits if limit.response == way]
     if not found or way not in STATE_RESPONSES:
         return f"no limit on {way}" if found else way
-    rest = tuple(limit for limit in problem.limits if limit.response != way)
+    rest = tuple(limit for limit in problem.limits if limit not in found)
     least = worst_least(replace(problem, limits=rest), way, look)
     return f"{way}={least:.6g} instead of {found[0].bound:g}"
 

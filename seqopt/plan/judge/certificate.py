@@ -9,9 +9,9 @@ from itertools import chain
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue
-from seqopt.errors import FileError, SolverError
+from seqopt.errors import FileError, InfeasibleError, SolverError
 from seqopt.graph.layers._partial_costs import PartialCosts, least_possible
-from seqopt.graph.layers.costs import TINY, LayeredCosts
+from seqopt.graph.layers.costs import TINY, Budget, LayeredCosts, array_by_array
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.scenarios import ScenarioLayers
@@ -152,8 +152,7 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
     value = _value(costs, selection.choice, aim)
     sizes = [abs(part) for part in costs.parts(selection.choice)]
     scale = max(sum(sizes) if aim is Aim.SUM else max(sizes), TINY)
-    if not abs(value - selection.objective) <= TOLERANCE * scale:
-        raise SolverError(f"the objective is {value:.9g}, not {selection.objective:.9g} as claimed")
+    _require_claimed(value, selection, scale)
     spent = {budget.name: budget.spent(selection.choice) for budget in problem.budgets}
     for budget in problem.budgets:
         if budget.slack(selection.choice) < -TOLERANCE:
@@ -185,10 +184,7 @@ def certify_partial(costs: PartialCosts, selection: Selection, objective: float)
     what was claimed, or its bound is not that of the pairs.
     """
     scale = max(abs(objective), TINY)
-    if not abs(objective - selection.objective) <= TOLERANCE * scale:
-        raise SolverError(
-            f"the objective is {objective:.9g}, not {selection.objective:.9g} as claimed"
-        )
+    _require_claimed(objective, selection, scale)
     bound = least_possible(costs)
     if not selection.bound <= bound + TOLERANCE * scale:
         raise SolverError(f"the claimed bound {selection.bound:.9g} exceeds {bound:.9g}")
@@ -199,6 +195,12 @@ def certify_partial(costs: PartialCosts, selection: Selection, objective: float)
             f"the value of the choice is {objective:.9g}, and no more than {bound:.9g} is proven"
         )
     return Certificate((objective,), (bound,), gap, gap)
+
+
+def _require_claimed(value: float, selection: Selection, scale: float) -> None:
+    """Raise a `SolverError` unless a value is what is claimed; NaN never is."""
+    if not abs(value - selection.objective) <= TOLERANCE * scale:
+        raise SolverError(f"the objective is {value:.9g}, not {selection.objective:.9g} as claimed")
 
 
 def _value(costs: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
@@ -232,6 +234,14 @@ def least_sum(costs: LayeredCosts) -> float:
     for single, shared in zip(costs.single, costs.shared, strict=True):
         reached = (reached[:, None] + shared).min(axis=0) + single
     return float(reached.min())
+
+
+def too_small(budget: Budget, least: float) -> InfeasibleError:
+    """Return the error that says that every choice takes more of a budget than there is."""
+    return InfeasibleError(
+        f"no choice is within all budgets: every choice uses at least {least:.6g} of "
+        f"{budget.name!r}, more than {budget.bound:.6g}; raise that bound"
+    )
 
 
 def least_peak(costs: LayeredCosts) -> float:
@@ -270,11 +280,12 @@ def judge(
     formulation that is no heuristic and ran to its end misses the optimum.
     """
     formulation = as_formulation(formulation)
-    assert formulation.aim is not None  # it is for layers of candidates
+    if formulation.aim is None:
+        assert isinstance(problem, ScenarioLayers)  # others have no totals in scenarios
+        return certify_scenarios(problem, selection)
     certificate = certify(problem, selection, formulation.aim)
     promises = formulation.kind is not FormulationKind.HEURISTIC and selection.end is End.DONE
-    exact = promises and not problem.budgets
-    if exact and certificate.gap > TOLERANCE:
+    if promises and not problem.budgets and certificate.gap > TOLERANCE:
         raise SolverError(
             f"{formulation.name} promises the optimum {certificate.bound:.9g}, "
             f"but the value of its choice is {certificate.objective:.9g}"
@@ -289,15 +300,11 @@ def certify_scenarios(problem: ScenarioLayers, selection: Selection) -> Certific
     not worth what is claimed, weights do not fit the aim, or a bound is above the value.
     """
     layers = problem.layered(Aim.SUM)
-    weights = np.array(
-        [selection.prices.get(str(i), 0.0) for i in range(1, len(layers) + 1)], dtype=float
-    )
+    weights = [selection.prices.get(str(i), 0.0) for i in range(1, len(layers) + 1)]
     proven = _proven(problem, layers, weights)
-    totals = np.array([each.cost(selection.choice) for each in layers])
-    value = problem.aim.value(totals)
+    value = problem.aim.value(problem.values(selection.choice, Aim.SUM))
     scale = max(abs(value), abs(selection.objective), TINY)
-    if not abs(value - selection.objective) <= TOLERANCE * scale:
-        raise SolverError(f"the objective is {value:.9g}, not {selection.objective:.9g} as claimed")
+    _require_claimed(value, selection, scale)
     claimed = max(proven, selection.bound)
     if claimed > value + TOLERANCE * scale:
         raise SolverError(f"the bound is {claimed:.9g}, above the objective {value:.9g}")
@@ -305,38 +312,17 @@ def certify_scenarios(problem: ScenarioLayers, selection: Selection) -> Certific
     return Certificate((value,), (min(proven, value),), gaps[0], gaps[1])
 
 
-def _proven(problem: ScenarioLayers, layers: tuple[LayeredCosts, ...], weights: Floats) -> float:
+def _proven(
+    problem: ScenarioLayers, layers: tuple[LayeredCosts, ...], weights: Sequence[float]
+) -> float:
     """Return the bound that weights prove, by a judge that shares nothing with the search."""
-    used = [(w, each) for w, each in zip(weights, layers, strict=True) if w > 0]
+    used = [weight for weight in weights if weight > 0]
     most = problem.aim.most(len(layers)) * (1 + 1e-9)
-    if abs(sum(w for w, _ in used) - 1.0) > 1e-9 or max(w for w, _ in used) > most:
+    if abs(sum(used) - 1.0) > 1e-9 or max(used) > most:
         raise SolverError("the weights of scenarios do not fit the aim; the bound is none")
-    moves = range(len(layers[0].single))
-    single = tuple(_weighed([(w, each.single[k]) for w, each in used]) for k in moves)
-    shared = tuple(_weighed([(w, each.shared[k]) for w, each in used]) for k in moves)
-    return least_sum(_shut(LayeredCosts(single, shared), layers))
 
+    def weighed(*costs: Floats) -> Floats:  # infinite also where a scenario without weight is
+        parts = [weight * each for weight, each in zip(weights, costs, strict=True) if weight > 0]
+        return np.where(np.isfinite(costs).all(axis=0), sum(parts), np.inf)
 
-def _weighed(parts: list[tuple[float, Floats]]) -> Floats:
-    """Return the weighed sum of costs, infinite where one is."""
-    out = np.zeros_like(parts[0][1])
-    for weight, costs in parts:
-        out += weight * costs
-    return out
-
-
-def _shut(weighed: LayeredCosts, layers: tuple[LayeredCosts, ...]) -> LayeredCosts:
-    """Return costs that are infinite also where a scenario without weight allows nothing."""
-
-    def open_in_all(part: str, k: int) -> Floats:
-        return np.where(
-            np.isfinite([getattr(each, part)[k] for each in layers]).all(axis=0),
-            getattr(weighed, part)[k],
-            np.inf,
-        )
-
-    moves = range(len(weighed.single))
-    return LayeredCosts(
-        tuple(open_in_all("single", k) for k in moves),
-        tuple(open_in_all("shared", k) for k in moves),
-    )
+    return least_sum(array_by_array(weighed, *layers))

@@ -51,8 +51,8 @@ def judge_schedule(
     a limit is exceeded, or a plan is better than promised; `StepError` if a step breaks a rule.
     """
     values = _as_claimed(problem, selection, steps)
-    if selection.stopped:
-        return _stopped(values)
+    if selection.stopped:  # its bounds are claimed, not proven
+        return Certificate(values, (-np.inf,) * len(values), np.inf, np.inf)
     if problem.totals:
         return _over_totals(problem, selection, values[0], hint)
     proof = Proof(problem, hint)
@@ -63,8 +63,14 @@ def judge_schedule(
     for goal, value, bound in zip(problem.goals, promised, bounds, strict=True):
         if not goal.of_margins and not bound >= value - BELOW * abs(value):
             raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
-    gaps = [(v - b) / (abs(v) or 1.0) for v, b in zip(values, bounds, strict=True)]
-    return Certificate(values, bounds, max(gaps), max(gaps), {}, proof.states)
+    gap = _gap(values, bounds)
+    return Certificate(values, bounds, gap, gap, {}, proof.states)
+
+
+def _gap(values: Sequence[float], bounds: Sequence[float]) -> float:
+    """Return the most that bounds of the first goals leave open, over the size of their values."""
+    pairs = zip(values, bounds, strict=False)
+    return max((value - bound) / (abs(value) or 1.0) for value, bound in pairs)
 
 
 def _as_claimed(problem: States, selection: StatePath, steps: Sequence[Step]) -> tuple[float, ...]:
@@ -83,10 +89,11 @@ def _as_claimed(problem: States, selection: StatePath, steps: Sequence[Step]) ->
 def _bounds(problem: States, proof: Proof, values: tuple[float, ...]) -> tuple[float, ...]:
     """Return what no plan stays below, goal by goal; margins come first and have their width."""
     out = _margin_bounds(problem, proof, values)
-    if len(out) < len(values):
-        pairs = zip(proof.bounds(values), values, strict=True)
-        out += [v if b >= v - BELOW * abs(v) else b for b, v in pairs][len(out) :]
-    return tuple(out)
+    if len(out) == len(values):
+        return tuple(out)
+    pairs = zip(proof.bounds(values), values, strict=True)
+    found = [v if b >= v - BELOW * abs(v) else b for b, v in pairs]
+    return (*out, *found[len(out) :])
 
 
 def _margin_bounds(problem: States, proof: Proof, values: tuple[float, ...]) -> list[float]:
@@ -111,17 +118,15 @@ def _within_budgets(
         if not spent <= cap + TOLERANCE * cap:
             raise SolverError(f"{goal} is {spent:.9g}, more than the {cap:g} that are allowed")
     claimed, prices = selection.bound, selection.prices
-    fits = [aims <= len(prices), *(len(each) >= len(problem.budgets) for each in prices)]
-    if not all(fits):
+    if len(prices) < aims or any(len(each) < len(problem.budgets) for each in prices):
         raise SolverError("there is no price for every budget and goal")
     margins = _margin_bounds(problem, proof, values)
     bounds = (*margins, *proof.budget_bounds(values, claimed, prices)[len(margins) :])
     for goal, bound, said in zip(problem.aims, bounds, claimed, strict=False):
         if not goal.of_margins and not bound >= said - TOLERANCE * abs(said):
             raise SolverError(f"{goal}: no plan within budgets is promised below {said:.9g}")
-    bounds = tuple(min(b, v) for b, v in zip(bounds, values, strict=False))
-    gaps = [(v - b) / (abs(v) or 1.0) for v, b in zip(values, bounds, strict=False)]
-    left = max(gaps)
+    bounds = tuple(map(min, bounds, values))
+    left = _gap(values, bounds)
     return Certificate(values, (*bounds, *values[aims:]), left, left, {}, proof.states)
 
 
@@ -137,14 +142,8 @@ def _over_totals(
     claimed = min(value, max(bound, selection.bound[0]))
     if claimed > value - BELOW * abs(value):
         claimed = value
-    gap, left = ((value - b) / (abs(value) or 1.0) for b in (bound, claimed))
+    gap, left = (_gap((value,), (each,)) for each in (bound, claimed))
     return Certificate((value,), (bound,), gap, left, {}, proof.states)
-
-
-def _stopped(values: tuple[float, ...]) -> Certificate:
-    """Return the certificate of a search that ended early: its bounds are claimed, not proven."""
-    none = (-np.inf,) * len(values)
-    return Certificate(values, none, np.inf, np.inf)
 
 
 def plan_values(
@@ -159,21 +158,19 @@ def plan_values(
     """
     if problem.each:
         return _in_all(problem, steps, [plan_values(each, steps, claimed) for each in problem.each])
-    table = analyze(problem.engine, steps)
-    columns = _state_columns(problem, table)
+    columns = _state_columns(problem, analyze(problem.engine, steps))
     _require_limits(problem, columns)
     margins = _margins(problem, steps)
+    regrips = sum(step.kind is StepKind.REPOSITION for step in steps)
+    travel = _travel_of(problem, steps)
+    moves = {Measure.STEPS: len(steps), Measure.REGRIPS: regrips, Measure.TRAVEL: travel}
     out = []
     for k, goal in enumerate(problem.goals):
         if goal.of_margins:
             require_margin(goal.response, claimed[k], margins[goal.response])
             out.append(claimed[k])
-        elif goal.measure is Measure.STEPS:
-            out.append(float(len(steps)))
-        elif goal.measure is Measure.REGRIPS:
-            out.append(float(sum(step.kind is StepKind.REPOSITION for step in steps)))
-        elif goal.measure is Measure.TRAVEL:
-            out.append(_travel_of(problem, steps))
+        elif not goal.of_states:
+            out.append(float(moves[goal.measure]))
         else:
             costs = _costs(problem, goal, columns, len(steps))
             out.append(float(costs.max() if goal.measure is Measure.PEAK else costs.sum()))
@@ -228,12 +225,9 @@ def _travel_of(problem: States, steps: Sequence[Step]) -> float:
     Result: m; straight lines.
     """
     scene, total = problem.network.scene, 0.0
-    for robot in range(len(scene.robots)):
-        nodes = [step.grips[robot] for step in steps]
-        held = [node for node in nodes if node is not None]
-        for first, second in pairwise(held):
-            ends = [scene.node_position(node) for node in (first, second)]
-            total += float(np.linalg.norm(np.array(ends[0]) - np.array(ends[1])))
+    for nodes in zip(*(step.grips for step in steps), strict=True):  # robot by robot
+        held = [scene.node_position(node) for node in nodes if node is not None]
+        total += sum(float(np.linalg.norm(np.subtract(*ends))) for ends in pairwise(held))
     return total
 
 
