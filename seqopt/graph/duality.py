@@ -48,18 +48,18 @@ def potentials(graph: Graph, goal: int, value: float) -> tuple[float, Bools]:
     """Return the bound of a sum, and the moves that can be on a path of no more than a value."""
     costs = graph.amounts[:, goal]
     before, after = distances(graph, costs), distances(graph, costs, back=True)
-    bound, every = _sum_bound(graph, goal, before), np.ones(len(costs), dtype=bool)
+    bound, every = _sum_bound(graph, costs, before), np.ones(len(costs), dtype=bool)
     if bound == -np.inf or after[graph.ends].any() or not _hold(after, costs, graph, back=True):
         return bound, every
     return bound, before[graph.source] + costs + after[graph.target] <= tied(value)
 
 
-def _sum_bound(graph: Graph, goal: int, before: Floats) -> float:
-    """Return what the sum of a path is at least, by potentials of states (n,).
+def _sum_bound(graph: Graph, costs: Floats, before: Floats) -> float:
+    """Return what a sum of costs (m,) is at least on any path, by potentials of states (n,).
 
     Minus infinity where a move takes less than the difference of its states' potentials.
     """
-    if before[0] > 0 or not _hold(before, graph.amounts[:, goal], graph):
+    if before[0] > 0 or not _hold(before, costs, graph):
         return -np.inf
     return float(before[graph.ends].min(initial=np.inf))
 
@@ -69,10 +69,7 @@ def least_sum(graph: Graph, costs: Floats) -> float:
 
     Infinite where no path leads to an end, minus infinity where an inequality does not hold.
     """
-    before = distances(graph, costs)
-    if before[0] > 0 or not _hold(before, costs, graph):
-        return -np.inf
-    return float(before[graph.ends].min(initial=np.inf))
+    return _sum_bound(graph, costs, distances(graph, costs))
 
 
 def _hold(least: Floats, costs: Floats, graph: Graph, *, back: bool = False) -> bool:

@@ -16,7 +16,8 @@ from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError
-from seqopt.graph.layers.costs import Budget, LayeredCosts, array_by_array, least_path, least_to_go
+from seqopt.graph.layers._arcs import array_by_array, least_path, least_to_go
+from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import Layers
 from seqopt.problem.problem import Aim, RobustAim
 from seqopt.problem.requirements import ResponsesAsked
@@ -157,8 +158,9 @@ def _require_sendable(tasks: Sequence[_ScenarioTask], crew: Crew | None) -> None
     try:
         pickle.dumps(tasks[: crew is not None])
     except Exception as error:  # whatever objects of others may raise
+        name = tasks[0].asked.criterion.name
         raise ProblemError(
-            f"criterion {tasks[0].asked.criterion.name}: it cannot be sent to other processes ({error}); "
+            f"criterion {name}: it cannot be sent to other processes ({error}); "
             "define it in a module, or let this process work alone"
         ) from error
 

@@ -70,12 +70,13 @@ def line():
 
 def test_potentials_that_a_move_violates_prove_nothing():
     graph = line()
-    right = distances(graph, graph.amounts[:, 0])
-    assert _sum_bound(graph, 0, right) == 3.0
+    costs = graph.amounts[:, 0]
+    right = distances(graph, costs)
+    assert _sum_bound(graph, costs, right) == 3.0
     wrong = right.copy()
     wrong[2] = 3.5  # more than the move from the start takes
-    assert _sum_bound(graph, 0, wrong) == -np.inf
-    assert _sum_bound(graph, 0, right + 1) == -np.inf  # the start has a potential of its own
+    assert _sum_bound(graph, costs, wrong) == -np.inf
+    assert _sum_bound(graph, costs, right + 1) == -np.inf  # the start has a potential of its own
 
 
 def test_amounts_that_pay_without_end_are_refused():

@@ -38,27 +38,8 @@ from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Grips, Step
 
 
-def compared(
-    choices: StepChoices, schedule: Schedule, criterion: Criterion, after: int | None = None
-) -> StepChoices:
-    """Return a step as its choices are compared: for itself, or after every choice before.
-
-    ``choices``: with one open move, or two; ``after``: the candidate chosen for the move before,
-    where responses are (C_k,) of that choice. Result: the same, or over pairs with responses
-    (C_{k-1}, C_k), NaN where both would be one node; of one choice before (C_k,).
-    """
-    among = getattr(criterion, "among", Among.ALL)
-    move = choices.moves[-1]
-    if among is Among.ALL or len(choices.moves) == 2 or (move - 1, move) not in schedule.steps_of:
-        return choices
-    before, now = (np.array(schedule.moves[k].candidates) for k in (move - 1, move))
-    same = before[:, None] == now if after is None else before[after] == now
-    responses = {name: np.where(same, np.nan, v) for name, v in choices.responses.items()}
-    return replace(choices, moves=(move - 1, move), responses=responses)
-
-
 def _spread_over_pairs(choices: StepChoices, criterion: Criterion) -> Criterion:
-    """Return the criterion of a step from `compared`: by rows if one move was spread over pairs."""
+    """Return the criterion of a step as it is faced: by rows if one move was spread over pairs."""
     if len(choices.moves) == len(choices.step.moves) or not isinstance(criterion, RankSum):
         return criterion
     return replace(criterion, ranked=Ranked.CONDITIONAL)
@@ -224,11 +205,27 @@ class Layers(Shown):
         seconds = 0.0
         for steps in self.evaluation.levels():
             start = time.perf_counter()
-            for choices in steps:
-                faced = compared(choices, self.schedule, self.criterion)
+            for faced in map(self.faced, steps):
                 joined.add(faced.moves, self.step_costs(faced))
             seconds += time.perf_counter() - start
         return joined, seconds
+
+    def faced(self, choices: StepChoices, before: int | None = None) -> StepChoices:
+        """Return a step as its choices are compared: for itself, or after every choice before.
+
+        ``choices``: with one open move, or two; ``before``: the candidate chosen for the move
+        before, where responses are (C_k,) of that choice. Result: the same, or over pairs with
+        responses (C_{k-1}, C_k), NaN where both would be one node; of one choice before (C_k,).
+        """
+        moves, move = self.schedule.moves, choices.moves[-1]
+        among_all = getattr(self.criterion, "among", Among.ALL) is Among.ALL
+        overlaps = (move - 1, move) in self.schedule.steps_of
+        if among_all or len(choices.moves) == 2 or not overlaps:
+            return choices
+        first, now = (np.array(moves[k].candidates) for k in (move - 1, move))
+        same = first[:, None] == now if before is None else first[before] == now
+        responses = {name: np.where(same, np.nan, v) for name, v in choices.responses.items()}
+        return replace(choices, moves=(move - 1, move), responses=responses)
 
     def seconds(self, aim: Aim) -> Mapping[str, float]:
         """Return what computing the costs of an aim took.
@@ -248,7 +245,7 @@ class Layers(Shown):
         """
         out = np.zeros(len(self.schedule.moves[move].candidates))
         for choices in self.window_choices(move, before):
-            faced = compared(choices, self.schedule, self.criterion, before)
+            faced = self.faced(choices, before)
             if len(faced.moves) == 2:
                 out = out + self.step_costs(faced)
         return np.where(possible_after(self.schedule, move, before), out, np.inf)

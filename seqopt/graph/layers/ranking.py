@@ -12,8 +12,9 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Bools, Floats
-from seqopt.graph.layers.costs import TINY, LayeredCosts, least_to_go
-from seqopt.graph.layers.layers import Layers, compared
+from seqopt.graph.layers._arcs import least_to_go
+from seqopt.graph.layers.costs import TINY, LayeredCosts
+from seqopt.graph.layers.layers import Layers
 from seqopt.problem.criteria import Ranked, RankSum, WeightedSum, WorstRatio
 from seqopt.problem.requirements import Criterion
 from seqopt.responses._choices import StepChoices
@@ -129,8 +130,7 @@ def move_costs(problem: Layers, move: int, before: int, without: int | None = No
     """
     total = np.zeros(len(problem.schedule.moves[move].candidates))
     for choices in problem.window_choices(move, before):
-        faced = compared(choices, problem.schedule, problem.criterion, before)
-        total += problem.step_costs(_without(faced, without))
+        total += problem.step_costs(_without(problem.faced(choices, before), without))
     if without is not None:
         total[without] = np.inf
     return total

@@ -18,17 +18,12 @@ from scipy.optimize import linprog
 
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
-from seqopt.graph.layers.costs import (
-    TINY,
-    Budget,
-    LayeredCosts,
-    least_path,
-    least_to_go,
-    where_allowed,
-)
+from seqopt.graph.layers._arcs import least_path, least_to_go, where_allowed
+from seqopt.graph.layers.costs import TINY, Budget, LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.formulation import End, Selection, Watch
-from seqopt.plan.judge.certificate import TOLERANCE, least_sum, too_small
+from seqopt.plan.judge._budget_proof import too_small
+from seqopt.plan.judge.certificate import TOLERANCE, least_sum
 from seqopt.problem.problem import Aim
 
 ACCURACY = 1e-7  # how far a reported optimum may lie above the true one, relative to the larger of

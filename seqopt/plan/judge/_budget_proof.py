@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.graph.layers.costs import TINY
+from seqopt.errors import InfeasibleError
+from seqopt.graph.layers.costs import TINY, Budget
 from seqopt.graph.layers.interface import PlacementProblem
 
 CLIMBS = 80  # prices that are tried
@@ -63,6 +64,14 @@ class _Parts:
     def of(self, rows: Ints | Bools) -> _Parts:
         """Return some of them."""
         return _Parts(*(getattr(self, name)[rows] for name in self.__dataclass_fields__))
+
+
+def too_small(budget: Budget, least: float) -> InfeasibleError:
+    """Return the error that says that every choice takes more of a budget than there is."""
+    return InfeasibleError(
+        f"no choice is within all budgets: every choice uses at least {least:.6g} of "
+        f"{budget.name!r}, more than {budget.bound:.6g}; raise that bound"
+    )
 
 
 def least_within(

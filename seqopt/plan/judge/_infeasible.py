@@ -13,14 +13,15 @@ import numpy as np
 
 from seqopt.errors import InfeasibleError, SeqoptError, SolverError
 from seqopt.graph._explore import Explorer
-from seqopt.graph.layers.costs import Budget, LayeredCosts, array_by_array, where_allowed
+from seqopt.graph.layers._arcs import array_by_array, where_allowed
+from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.paths import distances, least_peak
 from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import States
-from seqopt.plan.judge._budget_proof import least_within
+from seqopt.plan.judge._budget_proof import least_within, too_small
 from seqopt.plan.judge._proof import Proof
-from seqopt.plan.judge.certificate import least_sum, too_small
+from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.search._margin_search import WORST, bisected, with_margin
 from seqopt.problem.problem import STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing

@@ -9,9 +9,10 @@ from itertools import chain
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue
-from seqopt.errors import FileError, InfeasibleError, SolverError
+from seqopt.errors import FileError, SolverError
+from seqopt.graph.layers._arcs import array_by_array
 from seqopt.graph.layers._partial_costs import PartialCosts, least_possible
-from seqopt.graph.layers.costs import TINY, Budget, LayeredCosts, array_by_array
+from seqopt.graph.layers.costs import TINY, LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.scenarios import ScenarioLayers
@@ -234,14 +235,6 @@ def least_sum(costs: LayeredCosts) -> float:
     for single, shared in zip(costs.single, costs.shared, strict=True):
         reached = (reached[:, None] + shared).min(axis=0) + single
     return float(reached.min())
-
-
-def too_small(budget: Budget, least: float) -> InfeasibleError:
-    """Return the error that says that every choice takes more of a budget than there is."""
-    return InfeasibleError(
-        f"no choice is within all budgets: every choice uses at least {least:.6g} of "
-        f"{budget.name!r}, more than {budget.bound:.6g}; raise that bound"
-    )
 
 
 def least_peak(costs: LayeredCosts) -> float:

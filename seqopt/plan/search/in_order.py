@@ -10,6 +10,7 @@ import math
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from numbers import Real
 
 import numpy as np
@@ -18,7 +19,7 @@ from seqopt.arrays import Bools, Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.costs import TINY, Joined, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
-from seqopt.graph.layers.layers import Layers, compared
+from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.ranking import on_a_least_path
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.problem.problem import Aim
@@ -65,10 +66,8 @@ def solve_in_order(goals: Sequence[tuple[PlacementProblem, Aim]]) -> InOrder:
     choice: list[int] = []
     for mask in masks:  # pairs without a way on are left out of every mask
         choice.append(int(np.argmax(mask[choice[-1] if choice else 0])))
-    values = tuple(
-        aim.value_of(costs, choice) for costs, (_, aim) in zip(layers, goals, strict=True)
-    )
-    return InOrder(tuple(choice), values)
+    pairs = zip(layers, goals, strict=True)
+    return InOrder(tuple(choice), tuple(aim.value_of(costs, choice) for costs, (_, aim) in pairs))
 
 
 def _require_same(
@@ -86,11 +85,8 @@ def _require_same(
 
 def _allowed(layers: Sequence[LayeredCosts]) -> list[Bools]:
     """Return the pairs that all problems allow and that lie on a path from first to last move."""
-    every = (zip(costs.shared, costs.single, strict=True) for costs in layers)
-    shut = [
-        np.where(np.all([np.isfinite(a + b) for a, b in parts], axis=0), 0.0, np.inf)
-        for parts in zip(*every, strict=True)
-    ]
+    arcs = zip(*(costs.arcs() for costs in layers), strict=True)
+    shut = [np.where(np.isfinite(each).all(axis=0), 0.0, np.inf) for each in arcs]
     LayeredCosts(tuple(np.zeros(len(s)) for s in layers[0].single), tuple(shut)).continuable()
     return on_a_least_path(shut)
 
@@ -140,7 +136,8 @@ def least_quantile(problem: Layers, share: float = 0.1) -> StepQuantile:
     if problem.budgets:
         raise ProblemError("quantiles over steps take no budgets; leave them out")
     problem.sums.continuable()
-    steps = _step_costs(problem)
+    every = chain.from_iterable(problem.evaluation.levels())
+    steps = [(each.moves, problem.step_costs(each)) for each in map(problem.faced, every)]
     sizes = problem.sums.sizes
     most = math.floor(share * len(steps) + 1e-9)
     levels = np.unique(np.concatenate([costs[np.isfinite(costs)] for _, costs in steps]))
@@ -149,17 +146,9 @@ def least_quantile(problem: Layers, share: float = 0.1) -> StepQuantile:
         return least_sum(_above(steps, sizes, level)) <= most
 
     level = float(levels[bisect_left(levels, x=True, hi=len(levels) - 1, key=kept)])
-    above = _above(steps, sizes, level)
-    goals = [(CostProblem(above), Aim.SUM), (CostProblem(problem.sums), Aim.SUM)]
-    found = solve_in_order(goals)
+    layers = (_above(steps, sizes, level), problem.sums)
+    found = solve_in_order([(CostProblem(costs), Aim.SUM) for costs in layers])
     return StepQuantile(found.choice, level, round(found.values[0]), len(steps))
-
-
-def _step_costs(problem: Layers) -> list[tuple[tuple[int, ...], Floats]]:
-    """Return the costs of every open step's choices, with the moves that are open in it."""
-    levels, criterion = problem.evaluation.levels(), problem.criterion
-    faced = (compared(each, problem.schedule, criterion) for steps in levels for each in steps)
-    return [(each.moves, problem.step_costs(each)) for each in faced]
 
 
 def _above(steps: StepCosts, sizes: Sequence[int], level: float) -> LayeredCosts:
