@@ -66,18 +66,15 @@ def within_budgets(graph: Graph, caps: Sequence[float]) -> Within:
             found = _least_sum(graph, graph.amounts[:, goal], limited)
             bound, price, way = found.bound, found.prices, _path(graph, found.moves)
         best = _better(graph, goal, way, best)
-        if best is None:
-            raise InfeasibleError("no path is within all budgets")
+        taken = _taken(graph, best)[goal]
         if graph.peaks[goal]:
-            graph = graph.only(graph.amounts[:, goal] <= tied(_taken(graph, best)[goal]))
+            graph = graph.only(graph.amounts[:, goal] <= tied(taken))
         else:
-            limited.append((goal, _taken(graph, best)[goal]))
+            limited.append((goal, taken))
         bounds.append(bound)
         prices.append(tuple(price.tolist()))
     short = _path(graph, _least_sum(graph, np.ones(len(graph.source)), limited).moves)
-    best = min(filter(None, (short, best)), key=lambda path: len(path.states), default=None)
-    if best is None:
-        raise InfeasibleError("no path is within all budgets")
+    best = _better(graph, None, short, best)
     values = _taken(graph, best)
     least = [min(b, v) for b, v in zip(bounds, values, strict=False)]
     return Within(best.states, values, (*least, *values[goals:]), tuple(prices))
@@ -95,10 +92,16 @@ def _taken(graph: Graph, path: _Path) -> tuple[float, ...]:
     return tuple(np.where(graph.peaks, worst, total).tolist())
 
 
-def _better(graph: Graph, goal: int, first: _Path | None, other: _Path | None) -> _Path | None:
-    """Return the path that takes less; the first one of two alike."""
-    paths = filter(None, (first, other))
-    return min(paths, key=lambda path: _taken(graph, path)[goal], default=None)
+def _better(graph: Graph, goal: int | None, first: _Path | None, other: _Path | None) -> _Path:
+    """Return the path that takes less of a goal, or moves; the first one of two alike."""
+
+    def taken(path: _Path) -> float:
+        return len(path.states) if goal is None else _taken(graph, path)[goal]
+
+    paths = [path for path in (first, other) if path is not None]
+    if not paths:
+        raise InfeasibleError("no path is within all budgets")
+    return min(paths, key=taken)
 
 
 def _least_worst(
@@ -152,7 +155,7 @@ def _least_sum(graph: Graph, costs: Floats, limited: Sequence[tuple[int, float]]
 
 def _next_prices(planes: Sequence[tuple[float, Floats]], caps: Floats) -> tuple[Floats, float]:
     """Return the prices under which the cheapest of the paths met is dearest, and what it takes."""
-    costs, over = np.array([c for c, _ in planes]), np.array([o for _, o in planes])
+    costs, over = map(np.array, zip(*planes, strict=True))
     size = np.maximum(np.abs(caps), np.abs(over).max(axis=0, initial=0.0))
     size[size == 0] = 1.0
     largest = DEAREST * (np.abs(costs).max(initial=0.0) or 1.0)
@@ -174,11 +177,10 @@ def _cheapest(graph: Graph, costs: Floats) -> Ints | None:
         return None
     state, moves = int(ends[np.argmin(least[ends])]), list[int]()
     while state != 0:
-        source = int(before[state])
-        first, last = np.searchsorted(graph.source, [source, source + 1])
+        first, last = np.searchsorted(graph.source, before[state] + np.arange(2))
         own = first + np.flatnonzero(graph.target[first:last] == state)
         moves.append(int(own[np.argmin(costs[own])]))
-        state = source
+        state = int(before[state])
     return np.array(moves[::-1], dtype=np.int64)
 
 
@@ -216,7 +218,7 @@ def budget_bounds(
 
 def is_beyond(graph: Graph, caps: Sequence[float]) -> bool:
     """Return whether potentials prove that every path exceeds one of the caps on last columns."""
-    for column, cap in zip(range(-len(caps), 0), caps, strict=True):
-        if least_sum(graph, graph.amounts[:, column]) > tied(cap):
-            return True
+    columns = graph.amounts[:, -len(caps) :].T
+    if any(least_sum(graph, costs) > tied(c) for costs, c in zip(columns, caps, strict=True)):
+        return True
     return not np.isfinite(distances(graph, np.zeros(len(graph.source)))[graph.ends]).any()

@@ -122,25 +122,6 @@ def _tasks_of(problem: Layers, scenes: Sequence[Scene]) -> tuple[_ScenarioTask, 
     )
 
 
-def _scenario_costs(
-    tasks: Sequence[_ScenarioTask], resources: Resources
-) -> tuple[tuple[ScenarioCosts, ...], float]:
-    """Return the costs in every scenario, and what they took.
-
-    ``resources``: a worker takes one scenario after the other. Results: ``seconds``: from the first
-    to the last, s. Raises `InfeasibleError` if a step without an open grip exceeds a limit in a
-    scenario; `MechanismError`, `SolverError`, `WorkerError` as engines and workers do, the scenario
-    named.
-    """
-    start = time.perf_counter()
-    progress = Progress("scenarios", len(tasks), resources.progress)
-    with hire(resources.executor, resources.workers) as crew:
-        _require_sendable(tasks, crew)
-        with closing(map_ordered(_costs, tasks, crew, done=lambda *_: progress.add(1))) as found:
-            costs = tuple(found)
-    return costs, time.perf_counter() - start
-
-
 def _costs(task: _ScenarioTask) -> ScenarioCosts:
     problem = task.problem()
     evaluation = problem.evaluation
@@ -285,8 +266,20 @@ class ScenarioLayers(Shown):
 
     @cached_property
     def _found(self) -> tuple[tuple[ScenarioCosts, ...], float]:
-        resources = self.nominal.evaluation.resources
-        return _scenario_costs(_tasks_of(self.nominal, self.scenes), resources)
+        """The costs in every scenario, and what they took from the first to the last, s.
+
+        A worker takes one scenario after the other. Raises `InfeasibleError` if a step without an
+        open grip exceeds a limit in a scenario; `MechanismError`, `SolverError`, `WorkerError` as
+        engines and workers do, the scenario named.
+        """
+        start, resources = time.perf_counter(), self.nominal.evaluation.resources
+        tasks = _tasks_of(self.nominal, self.scenes)
+        progress = Progress("scenarios", len(tasks), resources.progress)
+        with hire(resources.executor, resources.workers) as crew:
+            _require_sendable(tasks, crew)
+            done = map_ordered(_costs, tasks, crew, done=lambda *_: progress.add(1))
+            with closing(done) as found:
+                return tuple(found), time.perf_counter() - start
 
     @property
     def from_cache(self) -> Iterator[Layers]:

@@ -100,14 +100,13 @@ def worst_values(plan: Plan, unseen: Scenarios) -> dict[str, float]:
     Result: by goal; margins are left out.
     """
     graph = plan.states
-    order = graph.network.scene.build_order
-    scenes = [in_order(scene, order) for scene in unseen.scenes]
-    judged = replace(graph, scenarios=(), limits=(), standing=None, settled=(), budgets=())
-    judged = replace(judged, over=WORST_PEAK)
     goals = tuple(goal for goal in graph.goals if not goal.of_margins)
     if not goals:
         return {}
-    judged = over_scenarios(replace(judged, goals=goals), scenes, graph.over)
+    scenes = [in_order(scene, graph.network.scene.build_order) for scene in unseen.scenes]
+    free = replace(graph, limits=(), standing=None, settled=(), budgets=())
+    alone = replace(free, goals=goals, scenarios=(), over=WORST_PEAK)
+    judged = over_scenarios(alone, scenes, graph.over)
     values = plan_values(judged, plan.steps)
     return dict(zip(judged.names, values, strict=True))
 
@@ -118,7 +117,7 @@ def _row(
     """Return what three plans cost in a scenario."""
     aim = problem.aim.aim
     try:
-        best = best_choice(CostProblem(costs.sums if aim is Aim.SUM else costs.peaks), aim).choice
+        best = best_choice(CostProblem(aim.costs(costs)), aim).choice
     except InfeasibleError:
         best = None
     out: dict[str, float] = {}

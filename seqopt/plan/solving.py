@@ -312,7 +312,12 @@ def _solved(problem: Any, formulation: Formulation | str | None, run: Run) -> Pl
         return SOLVE[on](problem, found, run)
     found = as_formulation(formulation or usual(problem), *_able(problem))
     on = natural(problem) if natural(problem) in found.also else found.on
-    _require_goal(problem, found)
+    if found.aim is not None and problem.goals not in ((), (AIMS[found.aim],)):
+        asked = ", ".join(map(str, problem.goals))
+        raise ProblemError(
+            f"aim {asked}: {found.name} minimizes the {found.aim.value} of costs; "
+            "take another formulation"
+        )
     return replace(SOLVE[on](graph_of(problem, on), found, run), problem=problem)
 
 
@@ -323,16 +328,6 @@ def _able(problem: Problem) -> tuple[On, ...]:
         return (On.LAYERS, On.STATES)
     of_candidates = not isinstance(problem.moves, FreeRules) and len(problem.goals) <= 1
     return (first, On.LAYERS) if first is On.STATES and of_candidates else (first,)
-
-
-def _require_goal(problem: Problem, formulation: Formulation) -> None:
-    """Raise an error if a formulation of candidates minimizes something else than is asked."""
-    if formulation.aim is not None and problem.goals not in ((), (AIMS[formulation.aim],)):
-        asked = ", ".join(map(str, problem.goals))
-        raise ProblemError(
-            f"aim {asked}: {formulation.name} minimizes the {formulation.aim.value} of costs; "
-            "take another formulation"
-        )
 
 
 def _of_graph(problem: object, formulation: Formulation | str | None) -> Formulation:

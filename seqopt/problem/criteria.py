@@ -19,7 +19,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, Terse
 from seqopt.errors import ProblemError, message_of
-from seqopt.problem.requirements import NEVER, ROUNDED, ChoiceResponses, SceneFacts
+from seqopt.problem.requirements import NEVER, ROUNDED, SCALED, ChoiceResponses, SceneFacts
 from seqopt.responses.quantities import robot_response
 from seqopt.scene._checks import short
 
@@ -136,8 +136,8 @@ def _spell_out(terms: tuple[_Term, ...], robots: Sequence[str]) -> tuple[_Term, 
         raise ProblemError("a criterion of no response; name at least one, as T_max")
     out: list[_Term] = []
     for name, *numbers in terms:
-        for number in numbers:
-            if number is not None and not (isinstance(number, Real) and 0 < float(number) < np.inf):
+        for number in (each for each in numbers if each is not None):
+            if not (isinstance(number, Real) and 0 < float(number) < np.inf):
                 raise ProblemError(
                     f"criterion: {name} has the weight, scale or rounding "
                     f"{short(number)}; give a positive number"
@@ -191,17 +191,13 @@ class RankSum(Terse):
     def for_scene(self, facts: SceneFacts) -> RankSum:
         """Return the criterion with everything that it takes from a scene filled in."""
         crown = facts.crown + self.delay if self.crown is None else self.crown
+        crown = NEVER if self.before == self.after else crown
         resolution = self.resolution
         if resolution is None:
             resolution = tuple((name, share * facts.units.of(name)) for name, share in ROUNDED)
-        return replace(
-            self,
-            before=_spell_out(self.before, facts.robots),
-            after=_spell_out(self.after, facts.robots),
-            crown=NEVER if self.before == self.after else crown,
-            delay=0,
-            resolution=_spell_out(resolution, ()),
-        )
+        before, after = (_spell_out(each, facts.robots) for each in (self.before, self.after))
+        posed = replace(self, before=before, after=after, crown=crown, delay=0)
+        return replace(posed, resolution=_spell_out(resolution, ()))
 
     def costs(self, responses: ChoiceResponses, bricks: int, choices: int) -> Floats:
         """Return the weighted mean of the ranks, NaN where a choice is impossible."""
@@ -282,7 +278,6 @@ class WorstRatio(Terse):
         return np.asarray(np.max(parts, axis=0))
 
 
-SCALED = ("F_largest", "M_sup", "T_max", "D_max")
 OVER_METHODS = WeightedSum("weighted", tuple((name, 1.0, None) for name in SCALED))
 """The sum of responses over what the scene's fixed methods reach."""
 WORST_OVER_METHODS = WorstRatio("worst-ratio", tuple((name, None) for name in SCALED))

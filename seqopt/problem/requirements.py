@@ -22,12 +22,12 @@ from seqopt.responses.table import analyze, force_column
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import METHODS
 
 LEVEL = 1e-9  # heights this close, over the height of the structure, are equal
 NEVER = math.inf  # the brick count of a crown that is never reached
 OWN = " over payload, weight and size"  # what it is named after where no fixed method gives scales
+SCALED = ("F_largest", "M_sup", "T_max", "D_max")  # responses to which fixed methods give scales
 ROUNDED = (
     ("F", 0.0278513762761887),
     ("T", 0.0278513762761887),
@@ -135,17 +135,13 @@ class SceneFacts:
     @cached_property
     def _reached(self) -> list[dict[str, float]]:
         """The largest responses of every fixed method that can build the scene."""
-        found = []
+        network, found = self.engine.network, []
         for method in METHODS.values():
             with suppress(StepError, MechanismError):
-                found.append(self._largest(method(self.engine.network)))
+                table = analyze(self.engine, method(network))
+                along = ((name, _response_along(network.scene, table, name)) for name in SCALED)
+                found.append({name: float(np.nanmax(values)) for name, values in along})
         return found
-
-    def _largest(self, steps: tuple[Step, ...]) -> dict[str, float]:
-        """Return the largest responses of a method's steps, SI units."""
-        scene, table = self.engine.network.scene, analyze(self.engine, steps)
-        names = ("F_largest", "T_max", "M_sup", "D_max")
-        return {name: float(np.nanmax(_response_along(scene, table, name))) for name in names}
 
 
 ChoiceResponses = Mapping[str, Floats]

@@ -218,17 +218,10 @@ class Joined:
             before = np.zeros(1) if self._join is np.add else costs
         self._found[moves] = self._join(before, costs)
 
-    def singles(self) -> tuple[Floats, ...]:
-        """Return the costs of each move's candidates where it alone is open.
-
-        Result (tuple of (C_k,) float): nothing where it never is, or no more than any cost.
-        """
-        return tuple(self.single(k) for k in range(len(self._sizes)))
-
     def single(self, move: int) -> Floats:
         """Return the costs of a move's candidates where it alone is open.
 
-        Result (C_k,).
+        Result (C_k,): nothing where it never is, or no more than any cost.
         """
         return self._of((move,), (self._sizes[move],))
 
@@ -239,7 +232,7 @@ class Joined:
         """
         pairs = zip([1, *self._sizes[:-1]], self._sizes, strict=True)
         shared = tuple(self._of((k - 1, k), pair) for k, pair in enumerate(pairs))
-        return LayeredCosts(self.singles(), shared)
+        return LayeredCosts(tuple(map(self.single, range(len(self._sizes)))), shared)
 
     def _of(self, moves: tuple[int, ...], shape: tuple[int, ...]) -> Floats:
         if moves in self._found:

@@ -38,13 +38,6 @@ from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Grips, Step
 
 
-def _spread_over_pairs(choices: StepChoices, criterion: Criterion) -> Criterion:
-    """Return the criterion of a step as it is faced: by rows if one move was spread over pairs."""
-    if len(choices.moves) == len(choices.step.moves) or not isinstance(criterion, RankSum):
-        return criterion
-    return replace(criterion, ranked=Ranked.CONDITIONAL)
-
-
 def window(
     schedule: Schedule, move: int, nodes: Sequence[int] | Mapping[int, int], *, alone: bool = False
 ) -> Schedule:
@@ -185,21 +178,14 @@ class Layers(Shown):
         return self._peaks[0]
 
     @cached_property
-    def singles(self) -> tuple[Floats, ...]:
-        """The sums of costs in the steps in which one move alone is open, by move."""
-        return self._joined(np.add)[0].singles()
-
-    @cached_property
     def _sums(self) -> tuple[LayeredCosts, float]:
-        joined, seconds = self._joined(np.add)
-        return joined.layered(), seconds
+        return self._joined(np.add)
 
     @cached_property
     def _peaks(self) -> tuple[LayeredCosts, float]:
-        joined, seconds = self._joined(np.maximum)
-        return joined.layered(), seconds
+        return self._joined(np.maximum)
 
-    def _joined(self, join: np.ufunc) -> tuple[Joined, float]:
+    def _joined(self, join: np.ufunc) -> tuple[LayeredCosts, float]:
         """Return the costs of all choices, steps of the same moves joined, and the seconds."""
         joined = Joined([len(move.candidates) for move in self.schedule.moves], join)
         seconds = 0.0
@@ -208,7 +194,7 @@ class Layers(Shown):
             for faced in map(self.faced, steps):
                 joined.add(faced.moves, self.step_costs(faced))
             seconds += time.perf_counter() - start
-        return joined, seconds
+        return joined.layered(), seconds
 
     def faced(self, choices: StepChoices, before: int | None = None) -> StepChoices:
         """Return a step as its choices are compared: for itself, or after every choice before.
@@ -276,8 +262,10 @@ class Layers(Shown):
 
     def step_costs(self, choices: StepChoices) -> Floats:
         """Return the costs of a step's choices, (C,) or (C, D), infinite where not allowed."""
-        move = self.schedule.moves[choices.moves[-1]]
-        criterion = _spread_over_pairs(choices, self.criterion)
+        move, criterion = self.schedule.moves[choices.moves[-1]], self.criterion
+        spread = len(choices.moves) > len(choices.step.moves)  # over pairs, to be ranked by rows
+        if spread and isinstance(criterion, RankSum):
+            criterion = replace(criterion, ranked=Ranked.CONDITIONAL)
         costs = criterion.costs(choices.responses, move.bricks, len(move.candidates))
         costs = np.where(np.isfinite(costs), costs, np.inf)
         for limit in self.limits:

@@ -61,12 +61,10 @@ class Finding:
         return left / max(abs(self.objective), abs(self.bound)) if left else 0.0
 
     def __str__(self) -> str:
-        said = [f"{self.seconds:.2f} s"]
-        said += [f"objective {self.objective:.6g}"] if math.isfinite(self.objective) else []
-        said += [f"bound {self.bound:.6g}"] if math.isfinite(self.bound) else []
-        if len(said) == 3:
-            said.append(f"gap {100 * self.gap:.3g} %")
-        return ", ".join(said)
+        known = {"objective": self.objective, "bound": self.bound}
+        said = [f"{name} {value:.6g}" for name, value in known.items() if math.isfinite(value)]
+        said += [f"gap {100 * self.gap:.3g} %"] if len(said) == 2 else []
+        return ", ".join([f"{self.seconds:.2f} s", *said])
 
 
 class Watch:
@@ -86,11 +84,10 @@ class Watch:
     def __init__(
         self, time_limit: float = math.inf, progress: Callable[[Finding], object] | None = None
     ) -> None:
-        self._start = time.perf_counter()
-        self._limit = time_limit
+        self._start, self._limit = time.perf_counter(), time_limit
         self._progress = progress
         self._trace: list[Finding] = []
-        self._interrupted = False
+        self.interrupted = False  # whether somebody asked for an end
 
     @property
     def seconds(self) -> float:
@@ -100,21 +97,16 @@ class Watch:
     @property
     def left(self) -> float:
         """How much time is left, s; zero where it is over."""
-        return 0.0 if self._interrupted else max(0.0, self._limit - self.seconds)
+        return 0.0 if self.interrupted else max(0.0, self._limit - self.seconds)
 
     @property
     def over(self) -> bool:
         """Whether the time limit is reached, or somebody asked for an end."""
-        return self._interrupted or self.seconds >= self._limit
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether somebody asked for an end."""
-        return self._interrupted
+        return self.interrupted or self.seconds >= self._limit
 
     def interrupt(self) -> None:
         """Ask for an end: time is over from now on."""
-        self._interrupted = True
+        self.interrupted = True
 
     @property
     def trace(self) -> tuple[Finding, ...]:
@@ -260,17 +252,14 @@ class Formulation:
     also: tuple[On, ...] = ()
 
     def __repr__(self) -> str:
-        what = f"{self.kind.value}, on {self.on.value}"
-        if self.aim is not None:
-            what = f"{self.kind.value}, least {LEAST[self.aim]} of the costs"
-        return f"<Formulation {self.name}: {self.summary} ({what})>"
+        what = f"least {LEAST[self.aim]} of the costs" if self.aim else f"on {self.on.value}"
+        return f"<Formulation {self.name}: {self.summary} ({self.kind.value}, {what})>"
 
     @property
     def window_options(self) -> dict[str, int | str] | None:
         """Options with which it looks at one window after the other; None if it never does."""
-        if self.windowed is None:
-            return {} if self.reads is Reads.WINDOW else None
-        return dict(self.windowed)
+        never = self.windowed is None and self.reads is not Reads.WINDOW
+        return None if never else dict(self.windowed or ())
 
     @property
     def options(self) -> dict[str, Any]:
@@ -359,11 +348,10 @@ def find_formulation(name: str) -> Formulation:
     ``name``: one of `formulation_names`, or of an exhibit. Raises `ProblemError` if there is none
     of that name; the message lists those there are.
     """
-    found = plugins(EXHIBITS) | plugins(GROUP)
+    found, known = plugins(EXHIBITS) | plugins(GROUP), formulation_names()
     if name not in found:
-        known = ", ".join(formulation_names())
-        hint = did_you_mean(name, formulation_names())
-        raise ProblemError(f"formulation {name!r} does not exist{hint}; give one of {known}")
+        why = f"does not exist{did_you_mean(name, known)}"
+        raise ProblemError(f"formulation {name!r} {why}; give one of {', '.join(known)}")
     return _load(found[name])
 
 

@@ -265,11 +265,6 @@ class PricedPaths:
     units: Floats
     names: tuple[str, ...]
 
-    @property
-    def loosest(self) -> float:
-        """More than any choice costs, scaled."""
-        return sum(float(arc[np.isfinite(arc)].max()) for arc in self.arcs)
-
     def path(self, choice: Sequence[int]) -> Path:
         """Return a choice with what it costs and takes.
 
@@ -381,6 +376,7 @@ def best_prices(paths: PricedPaths, watch: Watch) -> Priced:
     and no mixture of choices, keeps the budgets; `SolverError` if the highest point of the roof is
     not found.
     """
+    loosest = sum(float(arc[np.isfinite(arc)].max()) for arc in paths.arcs)  # no choice costs more
     ask, reach = np.zeros(len(paths.caps)), 1.0
     best, bound, found = ask, -np.inf, {}
     for step in range(STEPS):
@@ -390,7 +386,7 @@ def best_prices(paths: PricedPaths, watch: Watch) -> Priced:
             best, bound = ask, value
         told = path.cost * paths.scale if path.within else np.inf
         watch.tell(told, bound * paths.scale)
-        if bound > paths.loosest:
+        if bound > loosest:
             raise InfeasibleError("no choice is within all budgets; raise a bound")
         if watch.over or not len(ask):
             break

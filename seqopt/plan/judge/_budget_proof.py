@@ -36,7 +36,6 @@ class _Case:
     arcs: list[Floats]
     takes: list[Floats]  # (B, C_{k-1}, C_k), over what there is
     caps: Floats
-    sizes: Floats  # by which amounts are divided
     value: float
     scale: float
 
@@ -95,20 +94,23 @@ def _case(
     problem: PlacementProblem, value: float, claimed: Mapping[str, float], scale: float
 ) -> tuple[_Case, Floats]:
     """Return what is judged, and the claimed prices in its units."""
-    costs = problem.sums
     budgets = [budget for budget in problem.budgets if np.isfinite(budget.bound)]
-    arcs = [costs.shared[k] + costs.single[k] for k in range(len(costs.single))]
-    sizes, takes = [], []
-    for budget in budgets:
-        most = max(float(np.abs(part).max()) for part in (*budget.single, *budget.shared))
-        sizes.append(max(abs(budget.bound), most, TINY))
+    sizes = np.array([_size(budget) for budget in budgets])
+    arcs, amounts = problem.sums.arcs(), [budget.amounts.arcs() for budget in budgets]
+    takes = []
     for k, arc in enumerate(arcs):
-        parts = [(b.shared[k] + b.single[k]) / s for b, s in zip(budgets, sizes, strict=True)]
+        parts = [each[k] / size for each, size in zip(amounts, sizes, strict=True)]
         takes.append(np.array(parts).reshape(len(parts), *arc.shape))
-    caps = np.array([b.bound / s for b, s in zip(budgets, sizes, strict=True)]) + SLACK
-    prices = np.array([claimed.get(b.name, 0.0) * s for b, s in zip(budgets, sizes, strict=True)])
+    caps = np.array([budget.bound for budget in budgets]) / sizes + SLACK
+    prices = np.array([claimed.get(budget.name, 0.0) for budget in budgets]) * sizes
     usable = np.where(np.isfinite(prices), np.maximum(prices, 0.0), 0.0)
-    return _Case(arcs, takes, caps, np.array(sizes), value, scale), usable
+    return _Case(arcs, takes, caps, value, scale), usable
+
+
+def _size(budget: Budget) -> float:
+    """Return by what the amounts of a budget are divided: its bound, or the largest of them."""
+    parts = (*budget.single, *budget.shared)
+    return max(abs(budget.bound), TINY, *(float(np.abs(part).max()) for part in parts))
 
 
 def _climbed(case: _Case, prices: Floats) -> tuple[Floats, float]:
@@ -142,10 +144,9 @@ def _least(case: _Case, prices: Floats) -> tuple[float, Floats]:
     rounding = EPS * (len(came) + 1) ** 2 * prices @ (1 + np.abs(case.caps))
     least = float(reached[at] - prices @ case.caps - rounding)
     over = -case.caps.copy()
-    for k in range(len(came) - 1, -1, -1):
-        before = int(came[k][at])
-        over += case.takes[k][:, before, at]
-        at = before
+    for takes, best in zip(reversed(case.takes), reversed(came), strict=True):
+        over += takes[:, best[at], at]
+        at = int(best[at])
     return least, over
 
 

@@ -52,7 +52,11 @@ def bisected(name: str, exists: Callable[[float], bool]) -> tuple[float, float]:
     """
     if name != "tilt" and exists(0.0):
         return 0.0, 0.0
-    low, high = _around(exists, FIRST[name], WORST[name])
+    low, high = 0.0, FIRST[name]
+    while not exists(high):
+        if high >= WORST[name]:
+            raise InfeasibleError("no plan of the free schedule stands, whatever the margin")
+        low, high = high, min(WORST[name], 4 * high)
     while high - low > 0.6 * slack(name, high):  # the rest is for sets that stay open
         middle = (low + high) / 2
         if name == "bond":
@@ -68,13 +72,3 @@ def with_margin(problem: States, name: str, value: float) -> States:
     """
     demand = (problem.standing or Standing()).demanding(name, value)
     return replace(problem, settled=(*problem.settled, demand))
-
-
-def _around(exists: Callable[[float], bool], first: float, worst: float) -> tuple[float, float]:
-    """Return a value with which no plan exists, and a larger one with which some does."""
-    low, high = 0.0, first
-    while not exists(high):
-        if high >= worst:
-            raise InfeasibleError("no plan of the free schedule stands, whatever the margin")
-        low, high = high, min(worst, 4 * high)
-    return low, high

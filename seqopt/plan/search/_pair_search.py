@@ -62,8 +62,8 @@ class PairSearch:
     def objective(self) -> float:
         """What the steps cost that the choice meets."""
         aim = self.costs.aim
-        parts = [(aim.costs(problem).single, choice) for problem, choice in self.along.met]
-        met = [own[now] for part in parts for own, now in zip(*part, strict=True)]
+        parts = [zip(aim.costs(part).single, some, strict=True) for part, some in self.along.met]
+        met = [own[now] for part in parts for own, now in part]
         return float(sum(met) if aim is Aim.SUM else max(met))
 
 
@@ -93,13 +93,11 @@ def _best_known(costs: PartialCosts, formulation: Formulation, watch: Watch) -> 
     known, candidates = costs.known()
     found = select(formulation, CostProblem(known))
     choice = tuple(left[index] for left, index in zip(candidates, found.choice, strict=True))
-    end = End.DONE
-    if not _proven(costs):
-        end = End.INTERRUPTED if watch.interrupted else End.STOPPED
+    early = End.INTERRUPTED if watch.interrupted else End.STOPPED
+    end = End.DONE if _proven(costs) else early
     watch.tell(found.objective, costs.bound)
-    return replace(
-        found, choice=choice, bound=min(found.objective, costs.bound), end=end, trace=watch.trace
-    )
+    bound = min(found.objective, costs.bound)
+    return replace(found, choice=choice, bound=bound, end=end, trace=watch.trace)
 
 
 def _proven(costs: PartialCosts) -> bool:
@@ -114,12 +112,11 @@ def _floor(problem: Layers, formulation: Formulation) -> float:
         raise ProblemError(f"{formulation.name}: the lazy search proves; give an exact formulation")
     if problem.budgets:
         raise ProblemError("the lazy search takes no budgets; leave them out, or solve all pairs")
-    criterion = problem.criterion
-    floor = floor_of(criterion)
+    floor = floor_of(problem.criterion)
     if floor is None:
         raise ProblemError(
-            f"criterion {criterion.name}: nothing is known of a pair before all are solved; rank "
-            "given the choice before, take sums of responses, or state the least cost"
+            f"criterion {problem.criterion.name}: nothing is known of a pair before all are "
+            "solved; rank given the choice before, take sums of responses, or state the least cost"
         )
     return floor
 
@@ -135,15 +132,12 @@ class _Pairs:
         try:
             first = search_windows(problem)
         except SolverError:  # move by move it is a dead end; other choices may lead on
-            self._alone = alone_steps(problem)
-            self.models = self._alone.evaluation.models
-        else:
-            self._alone = first.alone
-            self.models = sum(part.evaluation.models for part in (first.alone, *first.shared))
-            for k in range(1, len(sizes)):
-                before = first.choice[k - 1]
-                row = self._allowed(k, before, aim.costs(first.shared[k]).single[0])
-                rows[k].setdefault(before, row)
+            first = WindowSearch(alone_steps(problem), (), ())
+        self._alone = first.alone
+        self.models = sum(part.evaluation.models for part in first.explored)
+        for k, before in enumerate(first.choice[:-1], start=1):
+            row = self._allowed(k, before, aim.costs(first.shared[k]).single[0])
+            rows[k].setdefault(before, row)
         self.costs = PartialCosts(aim.costs(self._alone).single, tuple(rows), floor, aim)
 
     def _free(self, move: int, sizes: Sequence[int]) -> dict[int, Floats]:
@@ -217,10 +211,10 @@ class _Pairs:
 
     def _wanted(self, move: int, before: int) -> Ints:
         """Return the candidates of a move that are looked at after one of the move before."""
+        if not self._each:  # what one costs depends on the others
+            return np.arange(len(self._schedule.moves[move].candidates))
         possible = possible_after(self._schedule, move, before)
-        if self._each:
-            return np.flatnonzero(possible & self.costs.worth_a_look(move, before))
-        return np.arange(len(possible))  # what one costs depends on the others
+        return np.flatnonzero(possible & self.costs.worth_a_look(move, before))
 
     def along(self, choice: tuple[int, ...]) -> WindowSearch:
         """Return the steps that a choice meets, as a search move by move would have."""

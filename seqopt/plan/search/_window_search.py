@@ -51,7 +51,7 @@ class WindowSearch(Terse):
 
     def costs(self, move: int) -> Floats:
         """Return what the candidates of a move cost after the choices before it, (C_k,)."""
-        return np.asarray(self.alone.singles[move] + self.shared[move].singles[0])
+        return np.asarray(self.alone.sums.single[move] + self.shared[move].sums.single[0])
 
 
 def search_windows(problem: Layers, watch: Watch | None = None) -> WindowSearch:
@@ -101,7 +101,9 @@ class _Walk:
         while len(self.choice) < len(self._schedule.moves):
             k = len(self.choice)
             if len(self.shared) == k and self._last((k - 1, k)) <= known:
-                self._ask(k)
+                nodes = {k - 1: self._node(k - 1)} if k else {}
+                self.shared.append(shared_steps(self._problem, k, nodes))
+                _ = self.shared[-1].sums  # looked at now
             if len(self.shared) == k or self._last((k,)) > known:
                 return
             self._choose(k)
@@ -110,17 +112,12 @@ class _Walk:
         """Return the largest brick count of steps in which given moves are open."""
         return max((step.bricks for step in self._schedule.steps_of.get(moves, ())), default=0)
 
-    def _ask(self, k: int) -> None:
-        """Look at the steps that a move shares with the one before, whose choice is made."""
-        self.shared.append(shared_steps(self._problem, k, {k - 1: self._node(k - 1)} if k else {}))
-        _ = self.shared[-1].singles
-
     def _node(self, k: int) -> int:
         return self._schedule.moves[k].candidates[self.choice[k]]
 
     def _choose(self, k: int) -> None:
         move = self._schedule.moves[k]
-        costs = self._own.single(k) + self.shared[k].singles[0]
+        costs = self._own.single(k) + self.shared[k].sums.single[0]
         if k:
             costs = np.where(possible_after(self._schedule, k, self.choice[-1]), costs, np.inf)
         if not np.isfinite(costs).any():
@@ -132,9 +129,11 @@ class _Walk:
 
     def so_far(self) -> str:
         """Return what is chosen, in a few words."""
+        if not self.choice:
+            return "no move was chosen yet"
         chosen = " ".join(str(self._node(k)) for k in range(len(self.choice)))
         moves = f"{len(self.choice)} of {len(self._schedule.moves)} moves"
-        return f"{moves} were chosen, at nodes {chosen}" if chosen else "no move was chosen yet"
+        return f"{moves} were chosen, at nodes {chosen}"
 
 
 def alone_steps(problem: Layers) -> Layers:
