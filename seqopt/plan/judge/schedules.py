@@ -227,7 +227,8 @@ def _travel_of(problem: States, steps: Sequence[Step]) -> float:
     scene, total = problem.network.scene, 0.0
     for nodes in zip(*(step.grips for step in steps), strict=True):  # robot by robot
         held = [scene.node_position(node) for node in nodes if node is not None]
-        total += sum(float(np.linalg.norm(np.subtract(*ends))) for ends in pairwise(held))
+        for ends in pairwise(held):
+            total += float(np.linalg.norm(np.subtract(*ends)))
     return total
 
 
