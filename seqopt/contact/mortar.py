@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from seqopt.errors import SceneError, did_you_mean
+from seqopt.scene._checks import check, not_negative, short
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,10 +38,8 @@ class Mortar:
     cohesion: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("friction", "tensile_strength", "cohesion"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise SceneError(f"mortar: {name} is {value}; give a number that is not negative")
+        check(self, "mortar", friction=not_negative)
+        check(self, "mortar", tensile_strength=not_negative, cohesion=not_negative)
 
 
 _FRICTION = math.tan(math.radians(25.0))
@@ -71,6 +70,8 @@ def bond_mortar(strength: float, friction: float = _FRICTION) -> Mortar:
     >>> bond_mortar(3e3, friction=0.5)
     Mortar(friction=0.5, tensile_strength=3000.0, cohesion=4500.0)
     """
+    strength = not_negative("mortar: tensile_strength", strength)
+    friction = not_negative("mortar: friction", friction)
     return Mortar(friction=friction, tensile_strength=strength, cohesion=strength * (1 + friction))
 
 
@@ -78,15 +79,15 @@ def find_mortar(mortar: Mortar | str) -> Mortar:
     """Return a mortar: itself, by a name of `MORTARS`, or as ``bond=STRENGTH``, in Pa."""
     if isinstance(mortar, Mortar):
         return mortar
-    if mortar in MORTARS:
-        return MORTARS[mortar]
-    known = ", ".join(MORTARS)
-    name, _, strength = mortar.partition("=")
+    if str(mortar) in MORTARS:
+        return MORTARS[str(mortar)]
+    name, _, strength = str(mortar).partition("=")
     try:
         pascal = float(strength if name == "bond" else "")
     except ValueError:
         hint = did_you_mean(name, (*MORTARS, "bond"))
         raise SceneError(
-            f"mortar {mortar!r}{hint}: give a Mortar, or one of {known}, or bond=STRENGTH (Pa)"
+            f"mortar {short(mortar)}{hint}: give a Mortar, or one of {', '.join(MORTARS)}, "
+            "or bond=STRENGTH (Pa)"
         ) from None
     return bond_mortar(pascal)

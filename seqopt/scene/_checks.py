@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import math
 import operator
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from typing import TypeVar
+from functools import partial
+from typing import Any, TypeVar
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
@@ -28,6 +29,31 @@ def settle(value: object, **content: object) -> None:
     """Set fields of a frozen value; its dictionary, if asked for, would slow every later access."""
     for name, part in content.items():
         object.__setattr__(value, name, part)
+
+
+def check(value: object, where: str, **checks: Callable[[str, Any], object]) -> None:
+    """Set fields of a frozen value to what checks return, which are told what the field is."""
+    for name, checked in checks.items():
+        settle(value, **{name: checked(f"{where}: {name}", getattr(value, name))})
+
+
+def unless_none(checked: Callable[[str, Any], object]) -> Callable[[str, Any], object]:
+    """Return a check of a value that may be left out."""
+    return lambda where, value: None if value is None else checked(where, value)
+
+
+def one_of(where: str, value: str, known: Iterable[str]) -> str:
+    """Return a word that is among those that are known."""
+    if not isinstance(value, str) or value not in known:
+        raise SceneError(f"{where} is {short(value)}; give one of {', '.join(known)}")
+    return value
+
+
+def kind_of(where: str, value: object, kind: type[_Part]) -> _Part:
+    """Return a value of a class."""
+    if not isinstance(value, kind):
+        raise SceneError(f"{where} is {short(value)}; give a {kind.__name__}")
+    return value
 
 
 def printable(where: str, value: str) -> str:
@@ -96,10 +122,8 @@ def vector(where: str, values: Iterable[float], at_least: float = -math.inf) -> 
 
 def sizes(where: str, values: Iterable[float]) -> Vector:
     """Return three positive lengths, m."""
-    found = vector(where, values)
-    for length in found:
-        positive(where, length, "m")
-    return found
+    x, y, z = (length(where, side) for side in vector(where, values))
+    return x, y, z
 
 
 def as_float(value: object) -> float:
@@ -110,20 +134,23 @@ def as_float(value: object) -> float:
         return math.inf
 
 
+def finite(
+    where: str, value: float, least: float = -math.inf, wanted: str = "a finite number"
+) -> float:
+    """Return a finite float, at least ``least``. ``wanted``: what messages ask for."""
+    number = as_float(value)
+    if not math.isfinite(number) or number < least:
+        raise SceneError(f"{where} is {short(value)}; give {wanted}")
+    return number
+
+
 def positive(where: str, value: float, unit: str) -> float:
     """Return a positive finite float."""
-    number = as_float(value)
-    if not 0 < number < math.inf:
-        raise SceneError(f"{where} is {short(value)}; give a positive number of {unit}")
-    return number
+    return finite(where, value, math.ulp(0.0), f"a positive number of {unit}")
 
 
-def finite(where: str, value: float) -> float:
-    """Return a finite float."""
-    number = as_float(value)
-    if not math.isfinite(number):
-        raise SceneError(f"{where} is {short(value)}; give a finite number")
-    return number
+not_negative = partial(finite, least=0.0, wanted="a number that is not negative")
+length, density = partial(positive, unit="m"), partial(positive, unit="kg/m³")
 
 
 @contextmanager

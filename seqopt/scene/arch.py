@@ -6,13 +6,14 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.scene._checks import short
+from seqopt.scene._checks import check, density, finite, short, sizes, unless_none, vector
 from seqopt.scene.boxes import as_vector, spring_fields
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot, Side
 from seqopt.scene.scene import Scene
@@ -86,8 +87,12 @@ class ArchShape(Terse):
         return self.gap if self.gap > THICKEST * min(self.dimensions) else None
 
     def __post_init__(self) -> None:
-        for name in ("pitch", "roll", "yaw", "offset"):
-            _check_numbers(name, getattr(self, name))
+        some = unless_none(_numbers)
+        check(self, "arch", pitch=_numbers, roll=some, yaw=some, offset=some, pattern=letters)
+        check(self, "arch", gap=finite, overhang=finite, stub=finite)
+        check(self, "arch", dimensions=sizes, density=density)
+        stiff = partial(vector, at_least=0.0)
+        check(self, "arch", translational_stiffness=stiff, rotational_stiffness=stiff)
         count = len(self.pitch)
         if not count:
             raise SceneError("arch: pitch is empty; give one angle per brick")
@@ -107,8 +112,6 @@ class ArchShape(Terse):
                     SceneWarning,
                     stacklevel=3,
                 )
-        if not self.pattern or set(self.pattern) - set(LETTERS):
-            raise SceneError(f"arch: pattern is {self.pattern!r}; give letters of {LETTERS}")
 
 
 def arch_scene(
@@ -179,13 +182,21 @@ def _robots_beside(shape: ArchShape) -> tuple[Robot, ...]:
     )
 
 
-def _check_numbers(name: str, values: Sequence[float] | None) -> None:
+def _numbers(where: str, values: Sequence[float]) -> Sequence[float]:
     try:
-        flat = values is None or np.asarray(values, dtype=float).ndim == 1
+        flat = np.asarray(values, dtype=float)
     except (TypeError, ValueError, OverflowError):
-        flat = False
-    if not flat:
-        raise SceneError(f"arch: {name} is {short(values)}; give a number per brick")
+        flat = np.empty(())
+    if flat.ndim != 1 or not np.isfinite(flat).all():
+        raise SceneError(f"{where} is {short(values)}; give a number per brick")
+    return values
+
+
+def letters(where: str, pattern: str) -> str:
+    """Return a pattern that is made of `LETTERS`."""
+    if not isinstance(pattern, str) or not pattern or {*pattern} - {*LETTERS}:
+        raise SceneError(f"{where} is {short(pattern)}; give letters of {', '.join(LETTERS)}")
+    return pattern
 
 
 def _pattern(shape: ArchShape) -> str:

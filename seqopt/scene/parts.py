@@ -9,18 +9,24 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import (
+    check,
+    density,
+    kind_of,
+    length,
     positive,
     printable,
     rows,
     settle,
     short,
     sizes,
+    unless_none,
     vector,
     whole,
     wholes,
@@ -36,12 +42,13 @@ def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-def _unit_axes(where: str, first: Vector, second: Vector) -> tuple[Vector, Vector]:
-    """Return two unit vectors at right angles."""
-    a, b = vector(where, first), vector(where, second)
+def _unit_axes(value: object, where: str, first: str, second: str) -> None:
+    """Require two fields that are unit vectors at right angles."""
+    where = f"{where}: {first} and {second}"
+    a, b = (vector(where, getattr(value, name)) for name in (first, second))
     if max(abs(_dot(a, a) - 1), abs(_dot(b, b) - 1), abs(_dot(a, b))) > _UNIT:
         raise SceneError(f"{where} are {list(a)} and {list(b)}; give perpendicular unit vectors")
-    return a, b
+    settle(value, **{first: a, second: b})
 
 
 def _two_points(where: str, given: Iterable[Iterable[float]]) -> tuple[Vector, Vector]:
@@ -95,11 +102,7 @@ class Side:
     point: Vector
 
     def __post_init__(self) -> None:
-        settle(
-            self,
-            toward=vector("reach: toward", self.toward),
-            point=vector("reach: point", self.point),
-        )
+        check(self, "reach", toward=vector, point=vector)
         if abs(_dot(self.toward, self.toward) - 1) > _UNIT:
             raise SceneError(f"reach: toward is {list(self.toward)}; give a unit vector")
 
@@ -135,8 +138,7 @@ class Sphere:
     radius: float
 
     def __post_init__(self) -> None:
-        center = vector("reach: center", self.center)
-        settle(self, center=center, radius=positive("reach: radius", self.radius, "m"))
+        check(self, "reach", center=vector, radius=length)
 
     def covers(self, point: Vector) -> bool:
         """Return whether a point is within reach."""
@@ -203,21 +205,9 @@ class Brick(Terse):
     def __post_init__(self) -> None:
         settle(self, name=whole("brick: its name", self.name))
         where = f"brick {self.name}"
-        settle(
-            self,
-            position=vector(f"{where}: position", self.position),
-            dimensions=sizes(f"{where}: dimensions", self.dimensions),
-        )
-        name = f"{where}: length_axis and width_axis"
-        length, width = _unit_axes(name, self.length_axis, self.width_axis)
-        settle(
-            self,
-            length_axis=length,
-            width_axis=width,
-            density=positive(f"{where}: density", self.density, "kg/m³"),
-            nodes=wholes(f"{where}: nodes", self.nodes),
-            placing_node=whole(f"{where}: placing_node", self.placing_node),
-        )
+        check(self, where, position=vector, dimensions=sizes)
+        _unit_axes(self, where, "length_axis", "width_axis")
+        check(self, where, density=density, nodes=wholes, placing_node=whole)
         if len(set(self.nodes)) != 2 or len(self.nodes) != 2:
             raise SceneError(f"{where}: nodes are {list(self.nodes)}; give two different numbers")
         if self.placing_node not in self.nodes:
@@ -225,16 +215,12 @@ class Brick(Terse):
                 f"{where}: placing_node is {self.placing_node}; "
                 f"give one of its nodes {list(self.nodes)}"
             )
-        if self.node_offsets is not None:
-            offsets = _two_points(f"{where}: node_offsets", self.node_offsets)
-            settle(self, node_offsets=offsets)
+        check(self, where, node_offsets=unless_none(_two_points))
         if self.shape is not None:
-            self._check_shape(where, self.shape)
+            self._check_shape(where, kind_of(f"{where}: shape", self.shape, Polyhedron))
 
-    def _check_shape(self, where: str, shape: object) -> None:
+    def _check_shape(self, where: str, shape: Polyhedron) -> None:
         """Require a shape about the centroid that extends as far as the dimensions say."""
-        if not isinstance(shape, Polyhedron):
-            raise SceneError(f"{where}: shape is {short(shape)}; give a Polyhedron")
         slack = _SAME_PLACE * max(self.dimensions)
         off = math.hypot(*shape.centroid.tolist())
         if not off <= slack:
@@ -267,12 +253,12 @@ class Brick(Terse):
 
     def node_position(self, node: int) -> Vector:
         """Return where one of the brick's inner nodes lies. ``node``: one of ``nodes``."""
+        away, share = self.length_axis, 0.25 * self.dimensions[0]
         if self.node_offsets is not None:
-            away = self.node_offsets[self.nodes.index(node)]
-            x, y, z = (p + d for p, d in zip(self.position, away, strict=True))
-            return x, y, z
-        step = (-0.25 if node == self.nodes[0] else 0.25) * self.dimensions[0]
-        x, y, z = (p + step * a for p, a in zip(self.position, self.length_axis, strict=True))
+            away, share = self.node_offsets[self.nodes.index(node)], 1.0
+        elif node == self.nodes[0]:
+            share = -share
+        x, y, z = (p + share * d for p, d in zip(self.position, away, strict=True))
         return x, y, z
 
 
@@ -296,24 +282,11 @@ class Spring(Terse):
     face: tuple[tuple[float, float], ...] | None = None
 
     def _check(self, where: str) -> None:
-        position = vector(f"{where}: position", self.position)
-        along, across = _unit_axes(f"{where}: along and across", self.along, self.across)
-        settle(
-            self,
-            position=position,
-            along=along,
-            across=across,
-            translational_stiffness=vector(
-                f"{where}: translational_stiffness", self.translational_stiffness, 0.0
-            ),
-            rotational_stiffness=vector(
-                f"{where}: rotational_stiffness", self.rotational_stiffness, 0.0
-            ),
-        )
-        if self.thickness is not None:
-            settle(self, thickness=positive(f"{where}: thickness", self.thickness, "m"))
-        if self.face is not None:
-            settle(self, face=_convex_polygon(f"{where}: face", self.face))
+        check(self, where, position=vector)
+        _unit_axes(self, where, "along", "across")
+        stiff = partial(vector, at_least=0.0)
+        check(self, where, translational_stiffness=stiff, rotational_stiffness=stiff)
+        check(self, where, thickness=unless_none(length), face=unless_none(_convex_polygon))
 
     @property
     def corners(self) -> tuple[Vector, ...] | None:
@@ -343,7 +316,7 @@ class Joint(Spring):
     bricks: tuple[int, int]
 
     def __post_init__(self) -> None:
-        settle(self, bricks=wholes("joint: bricks", self.bricks))
+        check(self, "joint", bricks=wholes)
         if len(set(self.bricks)) != 2 or len(self.bricks) != 2:
             raise SceneError(f"{self.label}: name two different bricks")
         self._check(self.label)
@@ -383,12 +356,11 @@ class Ground(Spring):
     closes_with: int | None = None
 
     def __post_init__(self) -> None:
-        settle(self, brick=whole("ground end: brick", self.brick))
+        check(self, "ground end", brick=whole)
         where = self.label
-        if self.closes_with is not None:
-            settle(self, closes_with=whole(f"{where}: closes_with", self.closes_with))
+        check(self, where, closes_with=unless_none(whole))
         self._check(where)
-        settle(self, anchor=vector(f"{where}: anchor", self.anchor))
+        check(self, where, anchor=vector)
         if self.anchor == self.position:
             raise SceneError(f"{where}: anchor and position are one point; give the stub a length")
 
@@ -435,8 +407,5 @@ class Robot:
 
     def __post_init__(self) -> None:
         printable("robot", self.name)
-        settle(
-            self,
-            reach=_as_reach(f"robot {self.name}: reach", self.reach),
-            payload=positive(f"robot {self.name}: payload", self.payload, "N"),
-        )
+        newtons = partial(positive, unit="N")
+        check(self, f"robot {self.name}", reach=_as_reach, payload=newtons)

@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 from seqopt.errors import SceneError
-from seqopt.scene._checks import LARGEST_NUMBER, positive, short, whole_between
+from seqopt.scene._checks import LARGEST_NUMBER, one_of, positive, rows, short, whole_between
 from seqopt.scene.boxes import as_vector, block_brick, spring_fields
 from seqopt.scene.imports._content import MOST_CORNERS, UNITS, UPS, Content, FileJoint, Given
 from seqopt.scene.imports._meshes import Repaired, repair_shape
 from seqopt.scene.imports.contacts import GROUND, Contacts, face_ground, face_joint, find_contacts
-from seqopt.scene.library.common import MASONRY, JointLaw, mobile_robots, touching_order
+from seqopt.scene.library.common import MASONRY, JointLaw, a_law, mobile_robots, touching_order
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import Polyhedron, plane_axes
@@ -81,21 +81,19 @@ def _check_size(content: Content) -> None:
 
 def _unit(content: Content, given: Given, said: list[str]) -> float:
     """Return the file's unit of length in m."""
-    if given.unit is not None and given.unit not in UNITS:
-        raise SceneError(f"unit is {short(given.unit)}; give one of {', '.join(UNITS)}")
     if content.unit is None and given.unit is None:
         raise SceneError(f"it does not say its unit of length; give one of {', '.join(UNITS)}")
-    if content.unit is not None and given.unit not in (None, content.unit):
-        raise SceneError(f"its lengths are known in {content.unit}; give no other unit")
+    unit = one_of("unit", content.unit if given.unit is None else given.unit, UNITS)
     if content.unit is None:
-        said.append(f"lengths are in {given.unit}, as given")
-    return UNITS[content.unit or given.unit or "m"]
+        said.append(f"lengths are in {unit}, as given")
+    elif unit != content.unit:
+        raise SceneError(f"its lengths are known in {content.unit}; give no other unit")
+    return UNITS[unit]
 
 
 def _up(given: Given, said: list[str]) -> str:
     """Return the axis of the file that points up."""
-    if given.up not in UPS:
-        raise SceneError(f"up is {short(given.up)}; give one of {', '.join(UPS)}")
+    one_of("up", given.up, UPS)
     if given.up == "y":
         said.append("y is up in the file, as given: (x, y, z) is (x, -z, y) here")
     return given.up
@@ -105,9 +103,9 @@ def _supports(content: Content, given: Given, said: list[str]) -> set[int]:
     """Return the places of the blocks that are the ground."""
     place = {block.key: i for i, block in enumerate(content.blocks)}
     marked = [block.key for block in content.blocks if block.support]
-    keys = marked if given.supports is None else [*given.supports]
+    keys = marked if given.supports is None else rows("supports", given.supports, "keys of blocks")
     for key in keys:
-        if key not in place:
+        if not isinstance(key, str) or key not in place:
             known = short(", ".join(place), 200)
             raise SceneError(f"there is no block {short(key)}; known are {known}")
     if keys:
@@ -153,7 +151,7 @@ def block_numbers(keys: Sequence[str]) -> list[int]:
 
 
 def _law(content: Content, given: Given, touching: Contacts, said: list[str]) -> JointLaw:
-    law = given.law or content.law or MASONRY
+    law = a_law("law", given.law or content.law or MASONRY)
     if touching.faces or any(joint.translational is None for joint in touching.joints):
         origin = "as given" if given.law else "of the file" if content.law else "by default"
         along, across, _ = law.translational

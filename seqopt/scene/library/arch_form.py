@@ -6,16 +6,27 @@ import csv
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib import resources
 
 import numpy as np
 
 from seqopt.arrays import Floats, Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import positive, settle, short, sizes, whole_between
-from seqopt.scene.arch import LETTERS, ArchShape, arch_scene
+from seqopt.scene._checks import (
+    check,
+    density,
+    length,
+    one_of,
+    positive,
+    short,
+    sizes,
+    unless_none,
+    whole_between,
+)
+from seqopt.scene.arch import ArchShape, arch_scene, letters
 from seqopt.scene.boxes import require_apart
-from seqopt.scene.library.common import MASONRY, JointLaw, few_enough, joint_width
+from seqopt.scene.library.common import MASONRY, JointLaw, a_law, few_enough, joint_width
 from seqopt.scene.parts import THICKEST, Robot
 from seqopt.scene.scene import Scene
 
@@ -85,11 +96,11 @@ def _chords(line: _Line, lengths: Floats) -> Floats | None:
     from scipy.optimize import brentq  # noqa: PLC0415  # slow to import, for arches only
 
     at, points = 0.0, [line(0.0)]
-    for length in lengths.tolist():
+    for link in lengths.tolist():
         here = points[-1]
-        if math.dist(line(1.0), here) < length:
+        if math.dist(line(1.0), here) < link:
             return None
-        at = float(brentq(lambda s: math.dist(line(s), here) - length, at, 1.0, xtol=1e-15))  # noqa: B023
+        at = float(brentq(lambda s: math.dist(line(s), here) - link, at, 1.0, xtol=1e-15))  # noqa: B023
         points.append(line(at))
     return np.array(points)
 
@@ -129,20 +140,10 @@ class ArchForm:
     law: JointLaw = MASONRY
 
     def __post_init__(self) -> None:
-        for name, unit in (("span", "m"), ("rise", "m"), ("density", "kg/m³")):
-            settle(self, **{name: positive(f"arch: {name}", getattr(self, name), unit)})
-        if self.curve not in _CURVES:
-            raise SceneError(
-                f"arch: curve is {short(self.curve)}; give one of {', '.join(_CURVES)}"
-            )
-        if self.bricks is not None:
-            settle(self, bricks=whole_between("arch: bricks", self.bricks, 2))
-        if not isinstance(self.pattern, str) or not self.pattern or {*self.pattern} - {*LETTERS}:
-            raise SceneError(
-                f"arch: pattern is {short(self.pattern)}; give letters of {', '.join(LETTERS)}"
-            )
-        dimensions = sizes("arch: dimensions", self.dimensions)
-        settle(self, dimensions=dimensions, gap=joint_width("arch: gap", self.gap))
+        check(self, "arch", span=length, rise=length, density=density)
+        check(self, "arch", curve=partial(one_of, known=_CURVES), pattern=letters)
+        check(self, "arch", bricks=unless_none(partial(whole_between, least=2)))
+        check(self, "arch", dimensions=sizes, gap=joint_width, law=a_law)
 
     @property
     def line(self) -> _Line:
@@ -182,14 +183,14 @@ def _arch(form: ArchForm, count: int, name: str, robots: Sequence[Robot] | None)
     """Return the scene of an arch with a number of bricks."""
     gap, points = _laid(form, form.line, count)
     step = np.diff(points, axis=0)
-    length, width, thickness = form.dimensions
+    long, width, thickness = form.dimensions
     shift, turn = form.law.over_rectangle(width, thickness)
     shape = ArchShape(
         pitch=np.arctan2(step[:, 1], step[:, 0]).tolist(),
         pattern=form.pattern,
         gap=gap,
-        overhang=0.25 * length,  # an inner node of a brick across lies on the line
-        stub=0.5 * length,
+        overhang=0.25 * long,  # an inner node of a brick across lies on the line
+        stub=0.5 * long,
         translational_stiffness=shift,
         rotational_stiffness=turn,
         dimensions=form.dimensions,

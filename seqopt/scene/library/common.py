@@ -5,11 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from heapq import heapify, heappop, heappush
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import MOST_BRICKS, positive, settle, vector
+from seqopt.scene._checks import (
+    MOST_BRICKS,
+    as_float,
+    check,
+    kind_of,
+    positive,
+    unless_none,
+    vector,
+)
+from seqopt.scene.arch import STANDARD_GRAVITY
 from seqopt.scene.parts import Brick, Robot
 
 
@@ -33,9 +43,8 @@ class JointLaw:
     rotational: Vector | None = None
 
     def __post_init__(self) -> None:
-        for name in ("translational", "rotational"):
-            if (values := getattr(self, name)) is not None:
-                settle(self, **{name: vector(f"joint law: {name}", values, at_least=0.0)})
+        stiff = partial(vector, at_least=0.0)
+        check(self, "joint law", translational=stiff, rotational=unless_none(stiff))
 
     def stiffness(self, area: float, moments: tuple[float, float]) -> tuple[Vector, Vector]:
         """Return the stiffness of a joint over a face, N/m and N m/rad.
@@ -58,12 +67,12 @@ class JointLaw:
 
 # of the domes that Bruun et al. built later
 MASONRY = JointLaw(translational=(1.5e9, 1.5e8, 1.5e8))
-_STANDARD_GRAVITY = 9.81  # m/s²
+a_law = partial(kind_of, kind=JointLaw)
 
 
 def mobile_robots(bricks: Sequence[Brick], count: int = 3) -> tuple[Robot, ...]:
     """Return robots that reach everything, each of which can bear all bricks."""
-    weight = _STANDARD_GRAVITY * math.fsum(brick.mass for brick in bricks)
+    weight = STANDARD_GRAVITY * math.fsum(brick.mass for brick in bricks)
     return tuple(Robot(name=f"rob{i}", payload=weight) for i in range(1, count + 1))
 
 
@@ -100,7 +109,7 @@ def few_enough(where: str, bricks: int) -> None:
 
 def joint_width(where: str, value: float) -> float:
     """Return the width of a joint, which may be none."""
-    return 0.0 if value == 0 else positive(where, value, "m, or 0")
+    return 0.0 if as_float(value) == 0 else positive(where, value, "m, or 0")
 
 
 REPEAT = 4  # rows and columns after which a herringbone repeats

@@ -5,19 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.scene._checks import positive, settle, short, whole_between
+from seqopt.scene._checks import check, density, length, one_of, whole_between
 from seqopt.scene.boxes import as_vector, require_apart
 from seqopt.scene.library._joints import ground_under, joints_between, shares
 from seqopt.scene.library.common import (
     MASONRY,
     REPEAT,
     JointLaw,
+    a_law,
     few_enough,
     joint_width,
     mobile_robots,
@@ -61,17 +63,12 @@ class DomeShape:
     law: JointLaw = MASONRY
 
     def __post_init__(self) -> None:
-        settle(
-            self,
-            courses=whole_between("dome: courses", self.courses, 1),
-            around=whole_between("dome: around", self.around, 3),
-        )
+        check(self, "dome", courses=partial(whole_between, least=1))
+        check(self, "dome", around=partial(whole_between, least=3))
         few_enough("dome", self.courses * self.around)
-        for name in ("span", "rise", "opening", "thickness"):
-            settle(self, **{name: positive(f"dome: {name}", getattr(self, name), "m")})
-        settle(self, gap=joint_width("dome: gap", self.gap))
-        if self.bond not in _BONDS:
-            raise SceneError(f"dome: bond is {short(self.bond)}; give one of {', '.join(_BONDS)}")
+        check(self, "dome", span=length, rise=length, opening=length, thickness=length)
+        check(self, "dome", gap=joint_width, bond=partial(one_of, known=_BONDS))
+        check(self, "dome", density=density, law=a_law)
         if self.bond == "herringbone" and 2 * self.around % REPEAT:
             raise SceneError(
                 f"dome: around is {self.around}; give an even number, so that herringbone closes"

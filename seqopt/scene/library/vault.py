@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.scene._checks import finite, positive, settle, whole_between
+from seqopt.scene._checks import check, finite, length, whole_between
 from seqopt.scene.boxes import as_vector, require_apart
 from seqopt.scene.library._joints import ground_under, joints_between
 from seqopt.scene.library.common import (
@@ -143,10 +143,8 @@ class VaultShape:
     drift: float = 1.3
 
     def __post_init__(self) -> None:
-        settle(self, bricks=whole_between("vault: bricks", self.bricks, 1))
-        positive("vault: spacing", self.spacing, "m")
-        for name in ("plan_angle", "skew", "widening", "drift"):
-            settle(self, **{name: finite(f"vault: {name}", getattr(self, name))})
+        check(self, "vault", bricks=partial(whole_between, least=1), spacing=length)
+        check(self, "vault", plan_angle=finite, skew=finite, widening=finite, drift=finite)
         if abs(self.plan_angle) > 0.25 * math.pi:
             raise SceneError(
                 f"vault: plan_angle is {self.plan_angle:g} rad; give at most 0.785, half a right "

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import finite, settle, sizes, whole_between
+from seqopt.scene._checks import check, density, finite, sizes, whole_between
 from seqopt.scene.library._joints import ground_under, joints_between
-from seqopt.scene.library.common import MASONRY, JointLaw, few_enough, joint_width, mobile_robots
+from seqopt.scene.library.common import (
+    MASONRY,
+    JointLaw,
+    a_law,
+    few_enough,
+    joint_width,
+    mobile_robots,
+)
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
 
@@ -42,17 +50,16 @@ class WallShape:
     law: JointLaw = MASONRY
 
     def __post_init__(self) -> None:
-        for name in ("columns", "courses"):
-            settle(self, **{name: whole_between(f"wall: {name}", getattr(self, name), 1)})
+        count = partial(whole_between, least=1)
+        check(self, "wall", columns=count, courses=count)
         few_enough("wall", self.columns * self.courses)
-        dimensions = sizes("wall: dimensions", self.dimensions)
-        settle(self, dimensions=dimensions, gap=joint_width("wall: gap", self.gap))
+        check(self, "wall", dimensions=sizes, gap=joint_width, density=density, law=a_law)
         if self.gap >= 0.5 * self.dimensions[0]:
             raise SceneError(
                 f"wall: gap is {self.gap:g} m, half a brick or more; give less than "
                 f"{0.5 * self.dimensions[0]:g}"
             )
-        settle(self, corbel=finite("wall: corbel", self.corbel))
+        check(self, "wall", corbel=finite)
         if abs(self.corbel) >= self.dimensions[1]:
             raise SceneError(
                 f"wall: corbel is {self.corbel:g} m, a brick's width or more, and courses would "

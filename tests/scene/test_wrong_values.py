@@ -1,0 +1,97 @@
+"""Values that no field can have: one line names the object, the field and what to give."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import pytest
+
+from seqopt.contact.mortar import Mortar, bond_mortar, find_mortar
+from seqopt.errors import SceneError
+from seqopt.scene.arch import ArchShape
+from seqopt.scene.imports import Given, import_scene
+from seqopt.scene.library import ArchForm, DomeShape, JointLaw, VaultShape, WallShape
+from seqopt.scene.parts import Robot, Side, Sphere
+from seqopt.scene.scene import Scene
+from seqopt.scene.shape import Polyhedron
+from tests.builders import six_bricks
+
+SCENE = six_bricks()
+CORNERS = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
+VALUES = {
+    "arch": ArchShape(pitch=(1.2, 0.0, -1.2), pattern="V"),
+    "arch form": ArchForm(span=2.0, rise=0.7),
+    "dome": DomeShape(courses=6, around=20),
+    "wall": WallShape(columns=3, courses=2),
+    "vault": VaultShape(bricks=100),
+    "joint law": JointLaw(translational=(1.0, 1.0, 1.0)),
+    "mortar": Mortar(friction=0.5),
+    "shape": Polyhedron(CORNERS, ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))),
+    "brick": SCENE.bricks[0],
+    "joint": SCENE.joints[0],
+    "ground end": SCENE.grounds[0],
+    "robot": Robot(name="left", payload=100.0),
+    "reach beside": Side(toward=(0.0, 1.0, 0.0), point=(0.0, 0.0, 0.0)),
+    "reach around": Sphere(center=(0.0, 0.0, 0.0), radius=1.0),
+    "scene": SCENE,
+}
+CASES = [(what, field.name) for what, value in VALUES.items() for field in fields(value)]
+OPEN = {("scene", "name"), ("scene", "provenance"), ("robot", "name"), ("arch", "closed")}
+EMPTY = {"joints", "robots", "blocked_nodes"}  # what a scene need not have
+ODD = ["x", "", [], {}, object(), {"x"}, float("nan"), -float("inf"), 10**400, [[1.0], 2.0], b"x"]
+
+
+@pytest.mark.parametrize(("what", "name"), [case for case in CASES if case not in OPEN])
+def test_one_line_says_what_is_wrong(what, name):
+    for odd in ODD:
+        if what == "scene" and name in EMPTY and isinstance(odd, str | list | dict) and not odd:
+            continue
+        with pytest.raises(SceneError, match=r"(; |: )(give|name|list|close|known)") as caught:
+            replace(VALUES[what], **{name: odd})
+        assert "\n" not in str(caught.value)
+        assert what.split()[0] in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: ArchShape(pitch=[1.0], pattern=3), "arch: pattern is 3; give letters of V, L, R"),
+        (lambda: ArchShape(pitch=None), "arch: pitch is None; give a number per brick"),
+        (lambda: ArchShape(pitch=[1.0], gap="x"), "arch: gap is 'x'; give a finite number"),
+        (lambda: ArchForm(span=2.0, rise=0.7, curve=[]), r"arch: curve is \[\]; give one of circ"),
+        (lambda: ArchForm(span=2.0, rise=0.7, law=3), "arch: law is 3; give a JointLaw"),
+        (lambda: WallShape(columns=2, courses=2, density="x"), "wall: density is 'x'; give a pos"),
+        (lambda: Mortar(friction="x"), "mortar: friction is 'x'; give a number that is not neg"),
+        (lambda: bond_mortar("x"), "mortar: tensile_strength is 'x'; give a number"),
+        (lambda: find_mortar(3), "mortar 3: give a Mortar, or one of epoxy, dry, or bond="),
+        (lambda: find_mortar([]), r"mortar \[\]: give a Mortar"),
+    ],
+)
+def test_the_field_is_named(make, said):
+    with pytest.raises(SceneError, match=said):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"unit": []}, r"two: unit is \[\]; give one of m, cm"),
+        ({"up": []}, r"two: up is \[\]; give one of z, y"),
+        ({"supports": 3}, "two: supports is 3; give keys of blocks"),
+        ({"supports": [[]]}, r"two: there is no block \[\]; known are '1, 2'"),
+        ({"law": 3}, "two: law is 3; give a JointLaw"),
+        ({"gap": "x"}, "two: gap is 'x'; give a positive number of m"),
+        ({"robots": "x"}, "two: robots is 'x'; give a whole number"),
+        ({"name": 3}, "scene: its name is 3; give text"),
+    ],
+)
+def test_what_is_given_beside_a_file_is_named(tmp_path, given, said):
+    path = tmp_path / "two.csv"
+    path.write_text("x,y,z,length,width,height\n0,0,1,2,1,2\n0,0,2.5,2,1,1\n", "utf-8")
+    with pytest.raises(SceneError, match=said):
+        import_scene(path, given=Given(**{"unit": "m", "density": 2000.0, **given}))
+
+
+def test_a_scene_of_no_parts_is_none():
+    with pytest.raises(SceneError, match="bricks: give each as Brick"):
+        Scene(name="x", bricks=3, joints=(), grounds=(), build_order=(), robots=())
