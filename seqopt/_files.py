@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import stat
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import pandas as pd
@@ -35,12 +36,15 @@ def plain(text: str) -> str:
 
 def _harmless_table(table: pd.DataFrame) -> pd.DataFrame:
     """Return a table whose columns and texts are `harmless`; numbers stay as they are."""
-    texts = [k for k, kind in enumerate(table.dtypes) if not pd.api.types.is_numeric_dtype(kind)]
-    columns = [table.iloc[:, k] for k in range(table.shape[1])]
-    for k in texts:
-        columns[k] = columns[k].map(lambda v: harmless(v) if isinstance(v, str) else v)
-    out = pd.concat(columns, axis=1) if columns else table
-    return out.rename(columns=lambda name: harmless(name) if isinstance(name, str) else name)
+
+    def safe(value: object) -> object:
+        return harmless(value) if isinstance(value, str) else value
+
+    columns = [column for _, column in table.items()]
+    for k, column in enumerate(columns):
+        if not pd.api.types.is_numeric_dtype(column.dtype):
+            columns[k] = column.map(safe)
+    return (pd.concat(columns, axis=1) if columns else table).rename(columns=safe)
 
 
 _LARGEST_INPUT = 64_000_000  # bytes; a scene of 100,000 bricks has 40 million
@@ -52,32 +56,26 @@ def read_text(path: Path) -> str:
 
     Raises `FileError` if it cannot be read, is a pipe or device, is too large, or is not UTF-8.
     """
-    try:
+    with _told("read", path):
         return read_bytes(path).decode("utf-8-sig")  # spreadsheets start text with a mark
-    except UnicodeError as error:
-        raise FileError(f"cannot read {path}: {_reason(error)}; name a readable file") from error
 
 
 def read_bytes(path: Path) -> bytes:
     """Return the content of a file; as `read_text`."""
-    try:
+    with _told("read", path):
         if not stat.S_ISREG(Path(path).stat().st_mode):  # a pipe would be waited for
             raise FileError(f"cannot read {path}: it is not a regular file; name one")
         with Path(path).open("rb") as stream:
             content = stream.read(_LARGEST_INPUT + 1)
-        if len(content) > _LARGEST_INPUT:
-            most = _LARGEST_INPUT / 1e6
-            raise FileError(f"cannot read {path}: it has more than {most:g} MB; name a smaller one")
-        return content
-    except (OSError, ValueError) as error:
-        if isinstance(error, FileError):
-            raise
-        raise FileError(f"cannot read {path}: {_reason(error)}; name a readable file") from error
+    if len(content) > _LARGEST_INPUT:
+        most = _LARGEST_INPUT / 1e6
+        raise FileError(f"cannot read {path}: it has more than {most:g} MB; name a smaller one")
+    return content
 
 
 def write_text(path: Path, text: str) -> None:
     """Write a UTF-8 file; else as `write_bytes`."""
-    _write(path, text)
+    write_bytes(path, text)
 
 
 def csv_text(table: pd.DataFrame) -> str:
@@ -91,13 +89,14 @@ def write_csv(path: Path, table: pd.DataFrame) -> None:
     write_text(path, csv_text(table))
 
 
-def write_bytes(path: Path, content: bytes) -> None:
+def write_bytes(path: Path, content: bytes | str) -> None:
     """Write a file whole: it appears under its name only once complete.
 
     A link is followed to its target; a file that is there keeps its mode. Raises `FileError` if it
     cannot be written, or what is there is no regular file: a device, say.
     """
-    _write(path, content)
+    with _told("write", path):
+        _put_all([(path, content)])
 
 
 def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
@@ -107,7 +106,7 @@ def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
     files are complete beside their places before the first is put in its place. Raises `FileError`.
     """
     target = Path(os.path.realpath(folder))
-    try:
+    with _told("write", folder):
         if target.exists():
             _put_all([(target / name, content) for name, content in files.items()])
             return
@@ -117,8 +116,6 @@ def write_folder(folder: Path, files: Mapping[str, bytes | str]) -> None:
             whole.mkdir()  # as open as any new folder; the one around it is private
             _put_all([(whole / name, content) for name, content in files.items()])
             whole.rename(target)
-    except (OSError, ValueError) as error:
-        raise _unwritable(folder, error) from error
 
 
 def require_apart(outputs: Sequence[Path], inputs: Sequence[Path] = ()) -> None:
@@ -150,11 +147,16 @@ def make_folder(path: Path) -> None:
         raise FileError(f"cannot make folder {path}: {error.strerror}; name another") from error
 
 
-def _write(path: Path, content: bytes | str) -> None:
+@contextmanager
+def _told(verb: str, path: Path) -> Iterator[None]:
+    """Say in a `FileError` why a file cannot be read or written. ``verb``: read or write."""
     try:
-        _put_all([(path, content)])
+        yield
+    except FileError:
+        raise
     except (OSError, ValueError) as error:
-        raise _unwritable(path, error) from error
+        wanted = {"read": "readable", "write": "writable"}[verb]
+        raise FileError(f"cannot {verb} {path}: {_reason(error)}; name a {wanted} file") from error
 
 
 def _stage(path: Path, content: bytes | str) -> tuple[Path, Path]:
@@ -198,12 +200,6 @@ def _is_same(path: Path, other: Path) -> bool:
         return path.samefile(other)
     except OSError:  # one of them is not there
         return os.path.realpath(path) == os.path.realpath(other)
-
-
-def _unwritable(path: Path, error: Exception) -> FileError:
-    if isinstance(error, FileError):
-        return error
-    return FileError(f"cannot write {path}: {_reason(error)}; name a writable file")
 
 
 def _reason(error: Exception) -> str:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frozen, skew
+from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frames, frozen, skew, units
 from seqopt.errors import SceneError
 from seqopt.network._mechanics import spread
 from seqopt.network.network import GROUND
@@ -59,7 +59,8 @@ class Assembly(FrozenValue):
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("centroid", "weight", "normal", "corner", "grip_position", "payload"):
-            if not np.isfinite(getattr(self, name)).all():
+            values = getattr(self, name)
+            if not isinstance(values, np.ndarray) or not np.isfinite(values).all():
                 raise SceneError(f"assembly: {name} holds a number that is not finite")
         blocks = len(self.centroid)
         if not blocks:
@@ -114,8 +115,7 @@ class Assembly(FrozenValue):
     def axes(self) -> Floats:
         """Normal and two tangents of every contact, (C, 3, 3), rows are unit vectors."""
         first = np.cross(self.normal, np.eye(3)[np.abs(self.normal).argmin(axis=1)])
-        first /= np.linalg.norm(first, axis=1, keepdims=True)
-        return frozen(np.stack([self.normal, first, np.cross(self.normal, first)], axis=1))
+        return frozen(frames(self.normal, units(first)))
 
     @cached_property
     def scales(self) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Floats, Ints, frames
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network, PartKind, Springs
 from seqopt.scene.parts import Brick, Ground, Joint
@@ -176,7 +176,7 @@ def _axes(springs: _Springs, index_of: dict[int, int]) -> Floats:
         if isinstance(spring, Joint) and spring.face is not None:
             first, second = (index_of[name] for name in spring.bricks)
             along[i] *= 1.0 if first < second else -1.0
-    return np.stack([along, across, np.cross(along, across)], axis=1)
+    return frames(along, across)
 
 
 def _support(scene: Scene, index_of: dict[int, int], springs: _Springs) -> Ints:

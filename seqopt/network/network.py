@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from seqopt._showing import Shown, display
-from seqopt.arrays import Floats, FrozenValue, Ints, frozen
+from seqopt.arrays import Floats, FrozenValue, Ints, frozen, units
 from seqopt.errors import SceneError
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
@@ -189,7 +189,7 @@ class Network(Shown, FrozenValue):
     def edge_axis(self) -> Floats:
         """Unit vectors along the edges, (E, 3)."""
         step = np.diff(self.node_position[self.edge_nodes], axis=1)[:, 0]
-        return frozen(np.asarray(step / np.linalg.norm(step, axis=1, keepdims=True)))
+        return frozen(units(step))
 
     @cached_property
     def index_of_node(self) -> dict[int, int]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from seqopt.arrays import Floats, FrozenValue, Ints, Vector
+from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frames
 from seqopt.errors import SceneError
 from seqopt.scene._checks import rows, short, vector, whole
 from seqopt.scene.parts import Brick
@@ -116,7 +116,7 @@ def boxes(bricks: Sequence[Brick]) -> Boxes:
     width = np.array([brick.width_axis for brick in bricks]).reshape(-1, 3)
     return Boxes(
         place=np.array([brick.position for brick in bricks]).reshape(-1, 3),
-        frame=np.stack([length, width, np.cross(length, width)], axis=1),
+        frame=frames(length, width),
         half=0.5 * np.array([brick.dimensions for brick in bricks]).reshape(-1, 3),
     )
 

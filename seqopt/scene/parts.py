@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from seqopt.arrays import Floats, Terse, Vector
+from seqopt.arrays import Floats, Terse, Vector, frames
 from seqopt.errors import SceneError
 from seqopt.scene._checks import (
     check,
@@ -238,8 +238,7 @@ class Brick(Terse):
     @property
     def frame(self) -> Floats:
         """Unit vectors along length, width and thickness, (3, 3), as rows."""
-        length, width = np.array(self.length_axis), np.array(self.width_axis)
-        return np.stack([length, width, np.cross(length, width)])
+        return frames(np.array(self.length_axis), np.array(self.width_axis))
 
     @property
     def volume(self) -> float:

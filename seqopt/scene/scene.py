@@ -6,13 +6,13 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, TypeVar
 
 from seqopt._showing import Shown, display
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import printable, settle, short, vector, wholes
+from seqopt.scene._checks import check, printable, short, vector, wholes
 from seqopt.scene.parts import Brick, Ground, Joint, Reach, Robot
 
 if TYPE_CHECKING:
@@ -139,15 +139,9 @@ class Scene(Shown):
     provenance: str = ""
 
     def __post_init__(self) -> None:
-        for name, kind in _KINDS.items():
-            settle(self, **{name: _parts(f"scene: {name}", getattr(self, name), kind)})
+        check(self, "scene", **{name: partial(_parts, kind=kind) for name, kind in _KINDS.items()})
         where = f"scene {printable('scene', self.name)}"
-        settle(
-            self,
-            build_order=wholes(f"{where}: build_order", self.build_order),
-            blocked_nodes=wholes(f"{where}: blocked_nodes", self.blocked_nodes),
-            gravity=vector(f"{where}: gravity", self.gravity),
-        )
+        check(self, where, build_order=wholes, blocked_nodes=wholes, gravity=vector)
         if not self.bricks:
             raise SceneError(f"{where}: it has no bricks; give at least one")
         if not self.grounds:

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frozen
+from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frames, frozen
 from seqopt.errors import SceneError
 from seqopt.scene._checks import rows, settle, short, vector, wholes
 
@@ -159,8 +159,7 @@ def normal_of(corners: Floats) -> Floats:
 def plane_axes(normal: Floats) -> Floats:
     """Return a right-handed frame (3, 3) whose first row is a unit normal."""
     side = np.cross(normal, np.eye(3)[int(np.abs(normal).argmin())])
-    side /= np.linalg.norm(side)
-    return np.stack([normal, side, np.cross(normal, side)])
+    return frames(normal, side / np.linalg.norm(side))
 
 
 def bend(corners: Floats) -> float:

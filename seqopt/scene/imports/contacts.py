@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.arrays import Floats, FrozenValue, Ints, units
 from seqopt.errors import FileError, SceneError
 from seqopt.scene._checks import positive, short
 from seqopt.scene.boxes import as_vector, spring_fields
@@ -169,9 +169,8 @@ def _found(shapes: Sequence[_Shape], gap: float, course: Progress) -> Iterator[_
 
 def _facets(shape: _Shape) -> _Facets:
     corners = tuple(shape.points[list(face)] for face in shape.faces)
-    normals = np.array([normal_of(face) for face in corners])
-    size = np.linalg.norm(normals, axis=1, keepdims=True)
-    return _Facets(corners, normals / size, np.array([face.mean(axis=0) for face in corners]))
+    normals = units(np.array([normal_of(face) for face in corners]))
+    return _Facets(corners, normals, np.array([face.mean(axis=0) for face in corners]))
 
 
 def _near(shapes: Sequence[_Shape], gap: float) -> Iterator[tuple[int, int]]:

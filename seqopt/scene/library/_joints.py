@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.arrays import Floats, FrozenValue, Ints, units
 from seqopt.errors import SceneError
 from seqopt.scene.boxes import Boxes, as_vector, boxes, spring_fields
 from seqopt.scene.library.common import JointLaw
@@ -51,8 +51,7 @@ def contact_areas(first: Floats, second: Floats) -> _ContactAreas:
 def _inside(polygon: Floats, other: Floats, slack: float) -> tuple[Floats, Floats]:
     """Return where the part of each edge in another polygon starts and ends, each (P, m, 2)."""
     start, step = polygon, np.roll(polygon, -1, axis=1) - polygon
-    side = np.roll(other, -1, axis=1) - other
-    side = side / np.linalg.norm(side, axis=2, keepdims=True)
+    side = units(np.roll(other, -1, axis=1) - other)
     height = _cross(side[:, None], start[:, :, None] - other[:, None])  # (P, m, m)
     slope = _cross(side[:, None], step[:, :, None])
     flat = np.abs(slope) <= _PARALLEL * np.linalg.norm(step, axis=2)[:, :, None]
@@ -102,9 +101,9 @@ def overlaps(shapes: Boxes, pairs: _Pairs, normals: Floats | None = None) -> _Ov
     step = shapes.place[b] - shapes.place[a]
     axes = _facing(shapes, a, b) if normals is None else _across(shapes, a, b, normals)
     one, other = _towards(shapes, a, axes[0], step), _towards(shapes, b, axes[1], -step)
-    along = _unit(one.out - other.out)
+    along = units(one.out - other.out)
     across = shapes.frame[a, (one.axis + 1) % 3]
-    across = _unit(across - along * (along * across).sum(axis=1, keepdims=True))
+    across = units(across - along * (along * across).sum(axis=1, keepdims=True))
     sides = np.stack([across, np.cross(along, across)], axis=1)
     shared = contact_areas(_corners(shapes, one, sides), _corners(shapes, other, sides))
     return _Overlaps((one, other), along, sides, shared)
@@ -116,12 +115,10 @@ def shares(bricks: Sequence[Brick], pairs: _Pairs, normals: Floats) -> Floats:
         return np.zeros(0)
     shapes = boxes(bricks)
     found = overlaps(shapes, pairs, normals)
-    row = np.arange(len(pairs))
-    whole = [
-        4 * half[row, (face.axis + 1) % 3] * half[row, (face.axis + 2) % 3]
-        for face in found.faces
-        for half in (shapes.half[face.which],)
-    ]
+    whole = []
+    for face in found.faces:
+        side, other = (shapes.half[face.which, (face.axis + k) % 3] for k in (1, 2))
+        whole.append(4 * side * other)
     return np.asarray(found.shared.area / np.minimum(*whole))
 
 
@@ -195,10 +192,6 @@ def _height(shapes: Boxes, face: _Faces, along: Floats, point: Floats) -> Floats
     half = shapes.half[face.which, face.axis]
     away = ((shapes.place[face.which] - point) * face.out).sum(axis=1) + half
     return np.asarray(away / (along * face.out).sum(axis=1))
-
-
-def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
 _STUB = 0.05  # m; of a ground end that does not say

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Floats, units
 from seqopt.errors import SceneError
 from seqopt.scene._checks import check, finite, length, whole_between
 from seqopt.scene.boxes import as_vector, require_apart
@@ -164,12 +164,12 @@ def _poses(line: _ArchLine, shape: VaultShape, places: Sequence[Tile]) -> Iterat
     step = 1e-3 * shape.spacing
     turned = row + _drift(line, shape, row, beside)
     ruling = _moved(line, shape, turned, beside + step) - _moved(line, shape, turned, beside - step)
-    forward = _unit(end - start)
-    left = _unit(ruling)
+    forward = units(end - start)
+    left = units(ruling)
     flush = along[:, None]  # a brick along keeps to its column, one across to the ruling
     forward, left = (
-        np.where(flush, forward, _unit(forward - left * _dot(forward, left))),
-        np.where(flush, _unit(left - forward * _dot(forward, left)), left),
+        np.where(flush, forward, units(forward - left * _dot(forward, left))),
+        np.where(flush, units(left - forward * _dot(forward, left)), left),
     )
     center = np.where(flush, middle, 0.5 * (start + end))
     return zip(center, forward, left, strict=True)
@@ -196,10 +196,6 @@ def _drift(line: _ArchLine, shape: VaultShape, row: Floats, beside: Floats) -> F
     columns = np.clip(beside / shape.spacing, -shape.drift, shape.drift)
     shift = columns * shape.spacing * math.tan(shape.plan_angle) * speed[:, 0] / size
     return np.asarray(-shift / size)
-
-
-def _unit(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
 def _dot(first: Floats, second: Floats) -> Floats:
