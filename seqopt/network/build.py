@@ -68,7 +68,10 @@ def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Net
     scene = in_order(scene, order)
     index_of = {brick.name: i for i, brick in enumerate(scene.placed)}
     every: list[Joint | Ground] = [*scene.grounds, *scene.joints]
-    springs = sorted(((s, _since(s, index_of)) for s in every), key=lambda entry: entry[1])
+    counts = [_since(spring, index_of) for spring in every]
+    ascending = np.argsort(counts, kind="stable")
+    springs = [(every[i], counts[i]) for i in ascending]
+    support = np.argsort(ascending)[: len(scene.grounds)]
     names = _joint_names(springs)
     nodes, edges = _of_bricks(scene)
     for s, (spring, since) in enumerate(springs):
@@ -83,7 +86,7 @@ def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Net
             edges.append(_Edge((name, base), PartKind.BASE, since, spring=s))
     nodes.sort(key=lambda node: node.since)
     edges.sort(key=lambda edge: edge.since)
-    return _arrays(scene, index_of, springs, nodes, edges)
+    return _arrays(scene, index_of, springs, support, nodes, edges)
 
 
 def _of_bricks(scene: Scene) -> tuple[list[_Node], list[_Edge]]:
@@ -131,6 +134,7 @@ def _arrays(
     scene: Scene,
     index_of: dict[int, int],
     springs: _Springs,
+    support: Ints,
     nodes: list[_Node],
     edges: list[_Edge],
 ) -> Network:
@@ -148,7 +152,7 @@ def _arrays(
             axes=_axes(springs, index_of),
             translational_stiffness=np.array([s.translational_stiffness for s, _ in springs]),
             rotational_stiffness=np.array([s.rotational_stiffness for s, _ in springs]),
-            support=_support(scene, index_of, springs),
+            support=support,
             thickness=np.array([s.thickness for s, _ in springs], dtype=float),  # None is NaN
             face=tuple(np.array(s.corners or (), dtype=float).reshape(-1, 3) for s, _ in springs),
         ),
@@ -177,10 +181,3 @@ def _axes(springs: _Springs, index_of: dict[int, int]) -> Floats:
             first, second = (index_of[name] for name in spring.bricks)
             along[i] *= 1.0 if first < second else -1.0
     return frames(along, across)
-
-
-def _support(scene: Scene, index_of: dict[int, int], springs: _Springs) -> Ints:
-    """Return the places of the scene's ground ends among springs sorted by when they act."""
-    order = np.argsort([_since(ground, index_of) for ground in scene.grounds], kind="stable")
-    found = [i for i, (spring, _) in enumerate(springs) if isinstance(spring, Ground)]
-    return np.array(found, dtype=np.int64)[np.argsort(order)]

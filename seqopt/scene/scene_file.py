@@ -23,7 +23,7 @@ import numpy as np
 from seqopt._files import read_text, write_text
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
-from seqopt.scene._checks import reading_json, short
+from seqopt.scene._checks import cut, reading_json, short
 from seqopt.scene.library.arch_form import ArchForm, arch, barrel_vault, chain
 from seqopt.scene.library.dome import DomeShape, dome
 from seqopt.scene.library.vault import VaultShape, herringbone_vault
@@ -90,8 +90,7 @@ def _of_joints(scene: Scene) -> Iterator[str]:
 
 def _distance(brick: Brick, point: Vector) -> float:
     """Return the distance of a point from a brick, m."""
-    frame = brick.frame
-    at = np.abs(frame @ (np.array(point) - np.array(brick.position)))
+    at = np.abs(brick.frame @ (np.array(point) - np.array(brick.position)))
     return float(np.linalg.norm(np.maximum(at - 0.5 * np.array(brick.dimensions), 0.0)))
 
 
@@ -128,22 +127,17 @@ _VAULT = (
 )
 
 
-def _vault338(load: Callable[[str], Scene]) -> Scene:
+def _vault338() -> Scene:
     """Return the vault of Bruun et al. as we reconstruct it around their arch."""
     shape = VaultShape(
         bricks=338, spacing=0.1327, plan_angle=math.radians(5.1), skew=1.74, widening=0.0234
     )
-    return replace(herringbone_vault(load("arch25"), shape, "vault338"), provenance=_VAULT)
+    return replace(herringbone_vault(_load_stored("arch25"), shape, "vault338"), provenance=_VAULT)
 
 
-def _dome163(_load: Callable[[str], Scene]) -> Scene:
-    """Return a dome of the size at which benchmarks of domes are taken."""
-    shape = DomeShape(courses=10, around=22, rise=0.7, opening=0.6, thickness=0.06)
-    return dome(shape, "dome163")
-
-
-_GENERATED = {"dome163": _dome163, "vault338": _vault338}
-"""Scenes by name; each takes what loads a scene that is a file."""
+# of the size at which benchmarks of domes are taken
+_DOME = DomeShape(courses=10, around=22, rise=0.7, opening=0.6, thickness=0.06)
+_GENERATED = {"dome163": partial(dome, _DOME, "dome163"), "vault338": _vault338}
 
 
 @dataclass(frozen=True)
@@ -264,7 +258,7 @@ def load_scene(name: str | Path) -> Scene:
         raise SceneError(f"a {type(name).__name__} is not a name of a scene; give text or a path")
     name = str(name)
     if name in _GENERATED:
-        return _GENERATED[name](_load_stored)
+        return _GENERATED[name]()
     if name in _stored():
         return _load_stored(name)
     if ":" in name and name.partition(":")[0] in KINDS:
@@ -390,8 +384,4 @@ def _check_schema(document: object, source: str) -> None:
     error = jsonschema.exceptions.best_match(validator.iter_errors(document))
     if error is not None:
         entry = error.json_path.removeprefix("$").removeprefix(".") or "document"
-        raise SceneError(f"scene {source}: {entry}: {_cut(error.message)}")
-
-
-def _cut(text: str, limit: int = 160) -> str:
-    return text if len(text) <= limit else f"{text[: limit - 1]}…"
+        raise SceneError(f"scene {source}: {entry}: {cut(error.message, 160)}")

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 
+import networkx as nx
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -254,7 +255,7 @@ def repair_shape(block: FileBlock, *, may_be_open: bool = False) -> Repaired:
     points, faces = block.vertices, [_plain(face) for face in block.faces]
     size = float(np.ptp(points, axis=0).max(initial=0.0)) if len(points) else 0.0
     if _open_edges(faces):
-        points, faces = _welded(points, faces, _WELD * size, mended)
+        faces = _welded(points, faces, mended)
     faces = [face for face in _unrepeated(faces, mended) if len(face) > 2]
     faces = _agreeing(points, faces, mended)
     facets = Surface(points, tuple(face for face in faces if bend(points[list(face)]) < np.inf))
@@ -289,18 +290,13 @@ def _open_edges(faces: Sequence[_Loop]) -> bool:
     return any(count != 2 for count in times.values())
 
 
-def _welded(
-    points: Floats, faces: list[_Loop], reach: float, mended: Counter[str]
-) -> tuple[Floats, list[_Loop]]:
-    """Return points, those in one place united, and the faces between them."""
-    from scipy.spatial import KDTree  # noqa: PLC0415  # slow to import, and seldom needed
-
-    first = np.arange(len(points))
-    for a, b in sorted(KDTree(points).query_pairs(reach)) if len(points) and reach > 0 else ():
-        first[b] = min(first[b], first[a])
-    if united := int((first != np.arange(len(points))).sum()):
+def _welded(points: Floats, faces: list[_Loop], mended: Counter[str]) -> list[_Loop]:
+    """Return faces between the first of all points in one place."""
+    place = _united(points)
+    kept, first = np.unique(place, return_index=True)
+    if united := len(points) - len(kept):
         mended[_WELDED] += united
-    return points, [_plain(tuple(int(first[v]) for v in face)) for face in faces]
+    return [_plain(tuple(first[place[[*face]]].tolist())) for face in faces]
 
 
 def _flat(points: Floats, face: _Loop, size: float, mended: Counter[str]) -> list[_Loop]:
@@ -316,42 +312,32 @@ def _flat(points: Floats, face: _Loop, size: float, mended: Counter[str]) -> lis
     return [(a, b, c) for a, b, c in fans([face]).tolist()]
 
 
-def _agreeing(points: Floats, faces: list[_Loop], mended: Counter[str]) -> list[_Loop]:
-    """Return faces turned so that they agree which side is outside, and that it is outside."""
-    beside = defaultdict(list)
+def _beside(faces: list[_Loop]) -> nx.Graph[int]:
+    """Return which faces meet in an edge, two alone, and whether one of them must be turned."""
+    meeting = defaultdict(list)
     for i, face in enumerate(faces):
         for a, b in edges(face):
-            beside[frozenset((a, b))].append((i, a < b))
-    turned: dict[int, bool] = {}
-    for start in range(len(faces)):
+            meeting[frozenset((a, b))].append((i, a < b))
+    beside: nx.Graph[int] = nx.empty_graph(len(faces))
+    for (i, up), (j, too) in (meet for meet in meeting.values() if len(meet) == 2):
+        beside.add_edge(i, j, turns=up == too)
+    return beside
+
+
+def _agreeing(points: Floats, faces: list[_Loop], mended: Counter[str]) -> list[_Loop]:
+    """Return faces turned so that they agree which side is outside, and that it is outside."""
+    beside, turned = _beside(faces), dict[int, bool]()
+    for start in beside:
         if start not in turned:
             turned[start] = False
-            _spread(start, faces, beside, turned)
+            for i, j in nx.bfs_edges(beside, start):
+                turned[j] = turned[i] ^ beside[i][j]["turns"]
     out = [face[::-1] if turned[i] else face for i, face in enumerate(faces)]
     if _volume(points, out) < 0:
         out = [face[::-1] for face in out]
     if changed := sum(face != before for face, before in zip(out, faces, strict=True)):
         mended[_TURNED] += changed
     return out
-
-
-def _spread(
-    start: int,
-    faces: list[_Loop],
-    beside: dict[frozenset[int], list[tuple[int, bool]]],
-    turned: dict[int, bool],
-) -> None:
-    """Note which faces must be turned to agree with one, neighbor by neighbor."""
-    waiting = [start]
-    while waiting:
-        i = waiting.pop()
-        face = faces[i]
-        for a, b in edges(face):
-            meet = beside[frozenset((a, b))]
-            for j, up in meet if len(meet) == 2 else ():
-                if j not in turned:
-                    turned[j] = turned[i] ^ (up == (a < b))
-                    waiting.append(j)
 
 
 def _volume(points: Floats, faces: list[_Loop]) -> float:

@@ -274,7 +274,8 @@ def flat_face(corners: Floats, normal: Floats | None = None) -> _FlatFace:
     middle = corners.mean(axis=0)
     flat = (corners - middle) @ sides.T
     area, shift, spread = _moments(flat)
-    turned = _principal(spread)
+    first = np.linalg.eigh(spread)[1][:, 1]
+    turned = np.array([first, [-first[1], first[0]]])  # axes of the largest and least moment
     if not np.linalg.det(spread) > 0:
         raise SceneError(f"a face crosses itself; its corners are {short(corners.tolist())}")
     sides = turned @ sides
@@ -320,12 +321,6 @@ def _moments(flat: Floats) -> tuple[float, Floats, Floats]:
         + np.einsum("e,ea,eb->ab", turn, both, both)
     ) / 24
     return area, center, squares
-
-
-def _principal(spread: Floats) -> Floats:
-    """Return rotated axes (2, 2), rows, along which integrals of squares are largest and least."""
-    first = np.linalg.eigh(spread)[1][:, 1]
-    return np.array([first, [-first[1], first[0]]])
 
 
 _GAP = 0.05  # between faces that touch, over the thinnest block

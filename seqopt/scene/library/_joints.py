@@ -122,11 +122,8 @@ def shares(bricks: Sequence[Brick], pairs: _Pairs, normals: Floats) -> Floats:
     return np.asarray(found.shared.area / np.minimum(*whole))
 
 
-def _widths(shapes: Boxes, found: _Overlaps) -> tuple[Floats, Floats, Floats]:
-    """Return where first and second faces are along the normals, in the middle of overlaps, m.
-
-    The third is how much farther apart they are at the ends of the overlap, at most.
-    """
+def _between(shapes: Boxes, pairs: _Pairs, found: _Overlaps) -> tuple[Floats, list[float]]:
+    """Return the points (P, 3) halfway between faces, and the widths of joints that are thick."""
     middle = (found.shared.centroid[:, None, :] @ found.sides)[:, 0]
     start, end = (_height(shapes, face, found.along, middle) for face in found.faces)
     slopes = [
@@ -135,7 +132,12 @@ def _widths(shapes: Boxes, found: _Overlaps) -> tuple[Floats, Floats, Floats]:
     ]
     area = np.maximum(found.shared.area, np.finfo(float).tiny)[:, None]
     reach = np.sqrt(3 * found.shared.moments[:, ::-1] / area)  # half the sides of a rectangle
-    return start, end, np.asarray((np.abs(slopes[1] - slopes[0]) * reach).sum(axis=1))
+    taper = (np.abs(slopes[1] - slopes[0]) * reach).sum(axis=1)  # at the ends of the overlap
+    place = middle + 0.5 * (start + end)[:, None] * found.along
+    thin = 2 * shapes.half[np.array(pairs)].min(axis=(1, 2))
+    widest = end - start + taper
+    thick: list[float] = np.where(widest > THICKEST * thin, widest, 0.0).tolist()
+    return place, thick
 
 
 def _across(shapes: Boxes, a: Ints, b: Ints, normals: Floats) -> tuple[Ints, Ints]:
@@ -236,14 +238,3 @@ def ground_under(brick: Brick, down: Floats, law: JointLaw, stub: float = _STUB)
     stiff = law.over_rectangle(2 * float(half[side]), 2 * float(half[other]))
     fields = spring_fields(place, -out, frame[side], stiff)
     return Ground(brick=brick.name, anchor=as_vector(place + stub * out), **fields)
-
-
-def _between(shapes: Boxes, pairs: _Pairs, found: _Overlaps) -> tuple[Floats, list[float]]:
-    """Return the points (P, 3) halfway between faces, and the widths of joints that are thick."""
-    start, end, taper = _widths(shapes, found)
-    middle = (found.shared.centroid[:, None, :] @ found.sides)[:, 0]
-    place = middle + 0.5 * (start + end)[:, None] * found.along
-    thin = 2 * shapes.half[np.array(pairs)].min(axis=(1, 2))
-    widest = end - start + taper
-    thick: list[float] = np.where(widest > THICKEST * thin, widest, 0.0).tolist()
-    return place, thick

@@ -226,6 +226,9 @@ def herringbone_vault(
     chosen = _chosen(line, shape)
     bricks = _bricks(line, shape, chosen)
     require_apart("vault", bricks, "give a wider spacing or a smaller plan_angle")
+    movers = mobile_robots(bricks)
+    payload = max((robot.payload for robot in arch.robots), default=movers[0].payload)
+    movers = tuple(replace(robot, payload=payload) for robot in movers)
     return replace(
         arch,
         name=name or f"vault {shape.bricks}",
@@ -234,15 +237,8 @@ def herringbone_vault(
         joints=_joints(line, chosen, bricks),
         grounds=_grounds(line, chosen, bricks),
         build_order=tuple(brick.name for brick in bricks),
-        robots=_movers(arch, bricks) if robots is None else tuple(robots),
+        robots=movers if robots is None else tuple(robots),
     )
-
-
-def _movers(arch: Scene, bricks: Sequence[Brick]) -> tuple[Robot, ...]:
-    """Return mobile robots with the largest payload at the arch, where it has robots."""
-    movers = mobile_robots(bricks)
-    payload = max((robot.payload for robot in arch.robots), default=movers[0].payload)
-    return tuple(replace(robot, payload=payload) for robot in movers)
 
 
 def _chosen(line: _ArchLine, shape: VaultShape) -> list[Tile]:
