@@ -155,6 +155,7 @@ def positive(where: str, value: float, unit: str) -> float:
 
 
 not_negative = partial(finite, least=0.0, wanted="a number that is not negative")
+stiffness = partial(vector, at_least=0.0)
 length, density = partial(positive, unit="m"), partial(positive, unit="kg/m³")
 
 

@@ -6,14 +6,13 @@ import math
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.scene._checks import check, density, finite, short, sizes, unless_none, vector
+from seqopt.scene._checks import check, density, finite, short, sizes, stiffness, unless_none
 from seqopt.scene.boxes import as_vector, spring_fields
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot, Side
 from seqopt.scene.scene import Scene
@@ -91,21 +90,18 @@ class ArchShape(Terse):
         check(self, "arch", pitch=_numbers, roll=some, yaw=some, offset=some, pattern=letters)
         check(self, "arch", gap=finite, overhang=finite, stub=finite)
         check(self, "arch", dimensions=sizes, density=density)
-        stiff = partial(vector, at_least=0.0)
-        check(self, "arch", translational_stiffness=stiff, rotational_stiffness=stiff)
+        check(self, "arch", translational_stiffness=stiffness, rotational_stiffness=stiffness)
         count = len(self.pitch)
         if not count:
             raise SceneError("arch: pitch is empty; give one angle per brick")
-        for name in ("roll", "yaw", "offset"):
-            values = getattr(self, name)
-            if values is not None and len(values) != count:
-                raise SceneError(
-                    f"arch: {len(values)} {name} and {count} pitch values; give as many"
-                )
-        for name in ("pitch", "roll", "yaw"):
-            angles = getattr(self, name)
-            largest = 0.0 if angles is None else max(map(abs, angles))
-            if largest > 2 * math.pi:
+        for name in ("pitch", "roll", "yaw", "offset"):
+            if (values := getattr(self, name)) is None:
+                continue
+            if len(values) != count:
+                said = f"{len(values)} {name} and {count} pitch values"
+                raise SceneError(f"arch: {said}; give as many")
+            largest = max(map(abs, values))
+            if name != "offset" and largest > 2 * math.pi:
                 warnings.warn(
                     f"arch: {name} has {largest:g} rad, more than a turn; give radians, if degrees "
                     "are meant",

@@ -26,6 +26,7 @@ from seqopt.scene._checks import (
     settle,
     short,
     sizes,
+    stiffness,
     unless_none,
     vector,
     whole,
@@ -283,8 +284,7 @@ class Spring(Terse):
     def _check(self, where: str) -> None:
         check(self, where, position=vector)
         _unit_axes(self, where, "along", "across")
-        stiff = partial(vector, at_least=0.0)
-        check(self, where, translational_stiffness=stiff, rotational_stiffness=stiff)
+        check(self, where, translational_stiffness=stiffness, rotational_stiffness=stiffness)
         check(self, where, thickness=unless_none(length), face=unless_none(_convex_polygon))
 
     @property

@@ -57,10 +57,8 @@ def _check_springs(springs: Sequence[Joint | Ground], bricks: Mapping[int, Brick
     """Require joints and ground ends whose edges have a length. ``bricks``: by name."""
     farthest = _FAR * max(max(brick.dimensions) for brick in bricks.values())
     for spring in springs:
-        points = [("position", spring.position)]
-        if isinstance(spring, Ground):
-            points.append(("anchor", spring.anchor))
-        for name, point in points:
+        points = {"position": spring.position, "anchor": getattr(spring, "anchor", spring.position)}
+        for name, point in points.items():
             if max(map(abs, point)) > farthest:
                 raise SceneError(f"{spring.label}: {name} is {list(point)}; move it to its bricks")
         stiffness = (*spring.translational_stiffness, *spring.rotational_stiffness)

@@ -8,9 +8,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from seqopt.errors import SceneError
 from seqopt.scene._checks import LARGEST_NUMBER, one_of, positive, rows, short, whole_between
 from seqopt.scene.boxes import as_vector, block_brick, spring_fields
-from seqopt.scene.imports._content import MOST_CORNERS, UNITS, UPS, Content, FileJoint, Given
+from seqopt.scene.imports._content import (
+    GROUND,
+    MOST_CORNERS,
+    UNITS,
+    UPS,
+    Content,
+    FileJoint,
+    Given,
+)
 from seqopt.scene.imports._meshes import Repaired, repair_shape
-from seqopt.scene.imports.contacts import GROUND, Contacts, face_ground, face_joint, find_contacts
+from seqopt.scene.imports.contacts import Contacts, face_ground, face_joint, find_contacts
 from seqopt.scene.library.common import MASONRY, JointLaw, a_law, mobile_robots, touching_order
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene

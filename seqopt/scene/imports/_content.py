@@ -19,6 +19,7 @@ from seqopt.work.progress import Tell
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}  # m
 UPS = ("z", "y")
 _Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # (x, y, z) to (x, -z, y)
+GROUND = -1  # stands for the ground where the place of a block is expected
 LARGEST = 1e15  # number: products of coordinates beyond lose all digits
 MOST_BLOCKS = 20_000
 MOST_CORNERS = 2_000_000  # of all faces of all blocks

@@ -18,6 +18,7 @@ from seqopt.scene._checks import short
 from seqopt.scene.arch import STANDARD_GRAVITY
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.imports._content import (
+    GROUND,
     UNITS,
     Content,
     Entry,
@@ -35,7 +36,6 @@ _UNITS = {"meter": "m", "m": "m", "centimeter": "cm", "cm": "cm", "millimeter": 
 _MEASURES = {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6, "m4": 1.0, "cm4": 1e-8, "mm4": 1e-12}
 _MEASURES |= {"kN/m2": 1e3, "kN/cm2": 1e7, "N/mm2": 1e6, "MPa": 1e6, "Pa": 1.0}
 _MEASURES |= {"kN/m3": 1e3, "N/m3": 1.0, "kN/cm3": 1e9}  # in m, N
-_GROUND = -1
 _LEAST = 1e-30  # area, second moment, modulus or density treated as zero
 
 
@@ -167,14 +167,14 @@ def _joints(bars: list[_Bar], grounded: set[int]) -> list[FileJoint]:
             at.setdefault(node, []).append(i)
     out = []
     for node, mine in sorted(at.items()):
-        first = _GROUND if node in grounded else mine[0]
-        for i in mine if first == _GROUND else mine[1:]:
+        first = GROUND if node in grounded else mine[0]
+        for i in mine if first == GROUND else mine[1:]:
             out.append(_joint(bars, (first, i), node))
     return out
 
 
 def _joint(bars: list[_Bar], pair: tuple[int, int], node: int) -> FileJoint:
-    ends = [bars[i] for i in pair if i != _GROUND]
+    ends = [bars[i] for i in pair if i != GROUND]
     last = ends[-1]
     place = last.ends[last.nodes.index(node)]
     out = last.ends.mean(axis=0) - place

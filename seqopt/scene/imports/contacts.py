@@ -17,7 +17,7 @@ from seqopt.arrays import Floats, FrozenValue, Ints, units
 from seqopt.errors import FileError, SceneError
 from seqopt.scene._checks import positive, short
 from seqopt.scene.boxes import as_vector, spring_fields
-from seqopt.scene.imports._content import Content, FileJoint, Given
+from seqopt.scene.imports._content import GROUND, Content, FileJoint, Given
 from seqopt.scene.imports._meshes import Repaired
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.parts import Brick, Ground, Joint
@@ -314,19 +314,13 @@ def _moments(flat: Floats) -> tuple[float, Floats, Floats]:
     center = turn @ (flat + after) / (6 * area)
     one, two = flat - center, after - center
     turn = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
-    both = one + two
-    squares = (
-        np.einsum("e,ea,eb->ab", turn, one, one)
-        + np.einsum("e,ea,eb->ab", turn, two, two)
-        + np.einsum("e,ea,eb->ab", turn, both, both)
-    ) / 24
-    return area, center, squares
+    squares = sum(np.einsum("e,ea,eb->ab", turn, arm, arm) for arm in (one, two, one + two))
+    return area, center, np.asarray(squares / 24)
 
 
 _GAP = 0.05  # between faces that touch, over the thinnest block
 _OFF = 0.05  # of a face from a block that it joins, over the size of the block
 _ASIDE = 1e-2  # how far beside a face a point is that tells on which side of it a block lies
-GROUND = -1
 _DOWN = np.array([0.0, 0.0, -1.0])
 
 _Held = tuple[tuple[int, int], _FlatFace]

@@ -16,8 +16,8 @@ from seqopt.scene._checks import (
     check,
     kind_of,
     positive,
+    stiffness,
     unless_none,
-    vector,
 )
 from seqopt.scene.arch import STANDARD_GRAVITY
 from seqopt.scene.parts import Brick, Robot
@@ -43,8 +43,7 @@ class JointLaw:
     rotational: Vector | None = None
 
     def __post_init__(self) -> None:
-        stiff = partial(vector, at_least=0.0)
-        check(self, "joint law", translational=stiff, rotational=unless_none(stiff))
+        check(self, "joint law", translational=stiffness, rotational=unless_none(stiffness))
 
     def stiffness(self, area: float, moments: tuple[float, float]) -> tuple[Vector, Vector]:
         """Return the stiffness of a joint over a face, N/m and N m/rad.
