@@ -36,16 +36,6 @@ def skew(vectors: Floats) -> Floats:
     return out
 
 
-def units(vectors: Floats) -> Floats:
-    """Return the unit vectors along vectors (..., m)."""
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
-
-
-def frames(first: Floats, second: Floats) -> Floats:
-    """Return right-handed axes (..., 3, 3), as rows, from the first two of them (..., 3)."""
-    return np.stack([first, second, np.cross(first, second)], axis=-2)
-
-
 class Terse:
     """Base of dataclasses that stay short at the prompt, whatever they hold.
 

@@ -8,10 +8,11 @@ from functools import cached_property
 import numpy as np
 from scipy import sparse
 
-from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frames, frozen, skew, units
+from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frozen, skew
 from seqopt.errors import SceneError
 from seqopt.network._mechanics import spread
 from seqopt.network.network import GROUND
+from seqopt.scene._axes import frames, units
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

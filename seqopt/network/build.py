@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Floats, Ints, frames
+from seqopt.arrays import Floats, Ints
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network, PartKind, Springs
+from seqopt.scene._axes import frames
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene, in_order
 
@@ -72,10 +73,9 @@ def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Net
     ascending = np.argsort(counts, kind="stable")
     springs = [(every[i], counts[i]) for i in ascending]
     support = np.argsort(ascending)[: len(scene.grounds)]
-    names = _joint_names(springs)
     nodes, edges = _of_bricks(scene)
-    for s, (spring, since) in enumerate(springs):
-        name, ends = names[s], [index_of[b] for b in spring.ends]
+    for s, (name, (spring, since)) in enumerate(zip(_joint_names(springs), springs, strict=True)):
+        ends = [index_of[b] for b in spring.ends]
         nodes.append(_Node(name, PartKind.JOINT, min(ends) + 1, spring.position, s))
         for b in ends:
             met = (_nearest(scene.placed[b], spring), name)

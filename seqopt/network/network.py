@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from seqopt._showing import Shown, display
-from seqopt.arrays import Floats, FrozenValue, Ints, frozen, units
+from seqopt.arrays import Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError
+from seqopt.scene._axes import units
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
 

@@ -15,6 +15,7 @@ from seqopt.errors import SceneError
 
 _Part = TypeVar("_Part")
 LARGEST_NUMBER = 10**15  # of a brick or node: what arrays of numbers hold without loss
+LETTERS = "VLR"  # how bricks of an arch lie
 MOST_BRICKS = 20_000  # of a generated scene
 _TURNS = {*range(0x202A, 0x202F), *range(0x2066, 0x206A), 0x2028, 0x2029}  # turn or break lines
 
@@ -47,6 +48,13 @@ def one_of(where: str, value: str, known: Iterable[str]) -> str:
     if not isinstance(value, str) or value not in known:
         raise SceneError(f"{where} is {short(value)}; give one of {', '.join(known)}")
     return value
+
+
+def letters(where: str, pattern: str) -> str:
+    """Return a pattern that is made of `LETTERS`."""
+    if not isinstance(pattern, str) or not pattern or {*pattern} - {*LETTERS}:
+        raise SceneError(f"{where} is {short(pattern)}; give letters of {', '.join(LETTERS)}")
+    return pattern
 
 
 def kind_of(where: str, value: object, kind: type[_Part]) -> _Part:

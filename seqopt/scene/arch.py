@@ -12,13 +12,22 @@ import numpy as np
 
 from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.scene._checks import check, density, finite, short, sizes, stiffness, unless_none
+from seqopt.scene._checks import (
+    LETTERS,
+    check,
+    density,
+    finite,
+    letters,
+    short,
+    sizes,
+    stiffness,
+    unless_none,
+)
 from seqopt.scene.boxes import as_vector, spring_fields
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot, Side
 from seqopt.scene.scene import Scene
 
 _LEFT = np.array([0.0, 1.0, 0.0])
-LETTERS = "VLR"
 STANDARD_GRAVITY = 9.81  # m/s²
 
 
@@ -186,13 +195,6 @@ def _numbers(where: str, values: Sequence[float]) -> Sequence[float]:
     if flat.ndim != 1 or not np.isfinite(flat).all():
         raise SceneError(f"{where} is {short(values)}; give a number per brick")
     return values
-
-
-def letters(where: str, pattern: str) -> str:
-    """Return a pattern that is made of `LETTERS`."""
-    if not isinstance(pattern, str) or not pattern or {*pattern} - {*LETTERS}:
-        raise SceneError(f"{where} is {short(pattern)}; give letters of {', '.join(LETTERS)}")
-    return pattern
 
 
 def _pattern(shape: ArchShape) -> str:

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frames
+from seqopt.arrays import Floats, FrozenValue, Ints, Vector
 from seqopt.errors import SceneError
+from seqopt.scene._axes import frames
 from seqopt.scene._checks import rows, short, vector, whole
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron

@@ -13,8 +13,9 @@ from functools import partial
 
 import numpy as np
 
-from seqopt.arrays import Floats, Terse, Vector, frames
+from seqopt.arrays import Floats, Terse, Vector
 from seqopt.errors import SceneError
+from seqopt.scene._axes import frames
 from seqopt.scene._checks import (
     check,
     density,

@@ -9,8 +9,9 @@ from functools import cached_property
 
 import numpy as np
 
-from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frames, frozen
+from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frozen
 from seqopt.errors import SceneError
+from seqopt.scene._axes import frames
 from seqopt.scene._checks import rows, settle, short, vector, wholes
 
 FLAT = 1e-4  # by how much a face may leave its plane, over the size of the block

@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from seqopt.arrays import Floats, FrozenValue, Ints, units
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import FileError, SceneError
+from seqopt.scene._axes import units
 from seqopt.scene._checks import positive, short
 from seqopt.scene.boxes import as_vector, spring_fields
 from seqopt.scene.imports._content import GROUND, Content, FileJoint, Given
 from seqopt.scene.imports._meshes import Repaired
-from seqopt.scene.library.common import JointLaw
+from seqopt.scene.library.common import DOWN, JointLaw
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.shape import Polyhedron, Surface, normal_of, plane_axes
 from seqopt.work.progress import Progress, Tell
@@ -321,7 +322,6 @@ def _moments(flat: Floats) -> tuple[float, Floats, Floats]:
 _GAP = 0.05  # between faces that touch, over the thinnest block
 _OFF = 0.05  # of a face from a block that it joins, over the size of the block
 _ASIDE = 1e-2  # how far beside a face a point is that tells on which side of it a block lies
-_DOWN = np.array([0.0, 0.0, -1.0])
 
 _Held = tuple[tuple[int, int], _FlatFace]
 
@@ -452,8 +452,8 @@ def _standing(bricks: Mapping[int, Brick], solids: Sequence[_Shape], gap: float)
         for face in solids[i].faces:
             corners = solids[i].points[list(face)]
             flat = flat_face(corners)
-            if flat.axes[0] @ _DOWN > _OPPOSED and corners[:, 2].max() <= level + gap:
+            if flat.axes[0] @ DOWN > _OPPOSED and corners[:, 2].max() <= level + gap:
                 low.append(shapely.Polygon(corners[:, :2]))
         for piece in _convex_pieces(low) if low else ():
             height = np.full((len(piece), 1), level)
-            yield (GROUND, i), flat_face(np.hstack([piece, height]), -_DOWN)
+            yield (GROUND, i), flat_face(np.hstack([piece, height]), -DOWN)

@@ -17,6 +17,7 @@ from seqopt.scene._checks import (
     check,
     density,
     length,
+    letters,
     one_of,
     positive,
     short,
@@ -24,7 +25,7 @@ from seqopt.scene._checks import (
     unless_none,
     whole_between,
 )
-from seqopt.scene.arch import ArchShape, arch_scene, letters
+from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import require_apart
 from seqopt.scene.library.common import MASONRY, JointLaw, a_law, few_enough, joint_width
 from seqopt.scene.parts import THICKEST, Robot

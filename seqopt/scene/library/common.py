@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from functools import partial
 from heapq import heapify, heappop, heappush
 
+import numpy as np
+
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import (
@@ -66,6 +68,7 @@ class JointLaw:
 
 # of the domes that Bruun et al. built later
 MASONRY = JointLaw(translational=(1.5e9, 1.5e8, 1.5e8))
+DOWN = np.array([0.0, 0.0, -1.0])
 a_law = partial(kind_of, kind=JointLaw)
 
 
