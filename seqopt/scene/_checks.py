@@ -43,7 +43,7 @@ def unless_none(checked: Callable[[str, Any], object]) -> Callable[[str, Any], o
     return lambda where, value: None if value is None else checked(where, value)
 
 
-def one_of(where: str, value: str, known: Iterable[str]) -> str:
+def one_of(where: str, value: str | None, known: Iterable[str]) -> str:
     """Return a word that is among those that are known."""
     if not isinstance(value, str) or value not in known:
         raise SceneError(f"{where} is {short(value)}; give one of {', '.join(known)}")

@@ -137,7 +137,10 @@ def _vault338() -> Scene:
 
 # of the size at which benchmarks of domes are taken
 _DOME = DomeShape(courses=10, around=22, rise=0.7, opening=0.6, thickness=0.06)
-_GENERATED = {"dome163": partial(dome, _DOME, "dome163"), "vault338": _vault338}
+_GENERATED: dict[str, Callable[[], Scene]] = {
+    "dome163": partial(dome, _DOME, "dome163"),
+    "vault338": _vault338,
+}
 
 
 @dataclass(frozen=True)
