@@ -433,6 +433,8 @@ class _Course(Generic[_Task, _Result]):
     def _collect(self) -> None:
         """Wait for an answer at least; what came without one is to be given out again."""
         failure: BaseException | None = None
+        if not self.running:  # nothing could be given out
+            return
         while not (ended := wait(self.running, _PATIENCE, FIRST_COMPLETED).done):
             self.crew.look_after()
         for future in ended:

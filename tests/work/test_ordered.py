@@ -198,6 +198,28 @@ def test_what_an_executor_of_others_loses_is_given_out_again():
         assert list(map_ordered(square, range(12), crew)) == WANTED
 
 
+class Reluctant(Forgetful):
+    """Takes no work the first times it is asked, as a cluster does that starts its machines."""
+
+    def __init__(self, times):
+        super().__init__()
+        self.times = times
+
+    def submit(self, function, /, *arguments, **named):
+        if arguments and self.times:
+            self.times -= 1
+            raise OSError("no machine yet")
+        return super().submit(function, *arguments, **named)
+
+
+def test_an_executor_of_others_may_take_no_work_at_first():
+    with hire(Reluctant(3), workers=2) as crew:
+        assert list(map_ordered(square, range(12), crew)) == WANTED
+    wanted = pytest.raises(WorkerError, match="without an answer .*no machine yet")
+    with wanted, hire(Reluctant(100), workers=2) as crew:
+        list(map_ordered(square, range(12), crew))
+
+
 @pytest.mark.slow
 def test_an_error_that_cannot_be_sent_is_an_error_in_a_line():
     with pytest.raises(WorkerError), hire(workers=2) as crew:
