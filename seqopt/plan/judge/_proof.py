@@ -22,6 +22,7 @@ from seqopt.graph.states._visits import move_amounts
 from seqopt.graph.states.states import States
 from seqopt.plan.judge._rule_moves import Follows, RuleTables, ScheduleTables
 from seqopt.plan.judge._standing_proof import StandingProof
+from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import LARGEST, Goal, Measure
 from seqopt.problem.requirements import LIMIT_TOLERANCE, state_costs
 from seqopt.responses._blocks import Block
@@ -29,6 +30,9 @@ from seqopt.responses._grip_sets import KnownRows, solve_sets
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.rules import Payload
 from seqopt.sequence.schedule import Schedule
+
+FEW = 500  # grip sets of which all digits take no longer than to ask some of them twice
+BAND = 1e-3  # share of a value within which six digits do not decide, far more than they err
 
 
 class Answers(NamedTuple):
@@ -44,33 +48,35 @@ class Answers(NamedTuple):
     fit: Bools
 
 
-def ask(problem: States, bricks: int, grips: Ints, most: float = np.inf) -> Answers:
+def ask(
+    problem: States, bricks: int, grips: Ints, most: float = np.inf, *, rough: bool = False
+) -> Answers:
     """Return what is known about grip sets, computed again by the engine.
 
     ``grips`` (S, r): nodes held; ``most``: over scenarios, what the first goal takes more of in one
-    is not asked of the next.
+    is not asked of the next; ``rough``: whether six digits are enough.
     """
     if problem.each:
-        return _worst(problem, bricks, grips, most)
-    return _asked(problem, bricks, grips)
+        return _worst(problem, bricks, grips, most, rough=rough)
+    return _asked(problem, bricks, grips, rough=rough)
 
 
-def _worst(problem: States, bricks: int, grips: Ints, most: float) -> Answers:
+def _worst(problem: States, bricks: int, grips: Ints, most: float, *, rough: bool) -> Answers:
     """Return the largest of all scenarios, of what is passed by those before."""
     out = np.zeros((len(grips), len(problem.goals)))
     forces, fit = np.zeros(grips.shape), np.ones(len(grips), dtype=bool)
     for number, each in enumerate(problem.each):
         rows = np.flatnonzero(fit & (out[:, 0] <= most))
-        found = ask(each, bricks, grips[rows])
+        found = ask(each, bricks, grips[rows], rough=rough)
         out[rows] = problem.joined(out[rows], found.values, number)
         forces[rows], fit[rows] = np.maximum(forces[rows], found.forces), found.fit
     return Answers(out, forces, fit)
 
 
-def _asked(problem: States, bricks: int, grips: Ints) -> Answers:
+def _asked(problem: States, bricks: int, grips: Ints, *, rough: bool) -> Answers:
     """Return the same of one scenario; nothing that is kept anywhere is believed."""
     names = tuple(name for name in problem.named if name != LARGEST)
-    block = Block(bricks, grips, names, screen=False)
+    block = Block(bricks, grips, names, screen=rough)
     rows = solve_sets(problem.engine, block, problem.resources)
     found, forces = dict(zip(names, rows.T, strict=False)), rows[:, len(names) :]
     found[LARGEST] = forces.max(axis=1, initial=0.0)
@@ -100,11 +106,12 @@ class Asked(NamedTuple):
 
     ``values``: of goals; the first that is about no margin bounds states, if it is about a worst
     step; ``margins``: with which states must stand, as is demanded and by the first goals; None
-    does not ask.
+    does not ask; ``exact``: whether all values have all digits, or those that decide about these.
     """
 
     values: Sequence[float] = ()
     margins: Sequence[float] | None = None
+    exact: bool = False
 
 
 class Closed(NamedTuple):
@@ -123,7 +130,6 @@ class Closed(NamedTuple):
 class Passable:
     """Which states may be passed, with responses that the engine computes again.
 
-    ``fallen`` (dict of int to (n,) int): codes of states that are proven to fall, by brick count;
     ``margins``: how many goals are about margins; they come first.
     """
 
@@ -131,12 +137,12 @@ class Passable:
         self.problem = problem
         most, own = _loads(problem, stand=False), _loads(problem, stand=True)
         self.tables = _tables(problem, most)
-        self.fallen: dict[int, Ints] = {}
         self.stands = StandingProof(problem, own)
         self._most = np.array([most[r] for r in self.tables.team])
         self._payload = np.array([own[r] for r in self.tables.team])
         self._known = KnownRows()
         self.margins = sum(goal.of_margins for goal in problem.goals)
+        self._exact = not _screens(problem)  # whether all digits count
 
     def least(self) -> tuple[float, ...]:
         """Return what goals take at least of any plan, for its end and the count of its steps.
@@ -147,7 +153,8 @@ class Passable:
         end, counted = tables.only_end(), float(tables.least_steps())
         last = np.full((1, len(goals)), -np.inf)
         if end is not None:
-            last = self._answers(tables.bricks_at(tables.last), end, np.inf)[0]
+            asked = Asked(exact=True)
+            last = self._answers(tables.bricks_at(tables.last), end, asked, np.inf)[0]
         known = {Measure.PEAK: last[0], Measure.STEPS: np.full(len(goals), counted)}
         none = np.full(len(goals), -np.inf)
         return tuple(float(known.get(goal.measure, none)[k]) for k, goal in enumerate(goals))
@@ -189,15 +196,13 @@ class Passable:
         if not level:
             return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
         held, payload = self._held(states, self._most)
-        most, margins = asked
+        most, margins, _ = asked
         k = self.margins
         below = np.inf
         if len(most) > k and goals[k].measure is Measure.PEAK:
             below = tied(most[k])
-        values, forces, ok = self._answers(self.tables.bricks_at(level), held, below)
+        values, forces, ok = self._answers(self.tables.bricks_at(level), held, asked, below)
         ok &= (forces <= payload).all(axis=1) & (values[:, k : k + 1] <= below).all(axis=1)
-        if level in self.fallen:
-            ok &= ~np.isin(self.tables.codes(states), self.fallen[level])
         if margins is not None:
             ok[ok] = self.may_stand(level, states[ok], margins)
         return values, ok
@@ -213,7 +218,9 @@ class Passable:
         held = self._held(states, self._payload)
         return self.stands.allows_rows(self.tables.bricks_at(level), *held, margins)
 
-    def _answers(self, bricks: int, held: Ints, below: float) -> tuple[Floats, Floats, Bools]:
+    def _answers(
+        self, bricks: int, held: Ints, asked: Asked, below: float
+    ) -> tuple[Floats, Floats, Bools]:
         """Return values, forces of grips and what is within limits, of rows of nodes held.
 
         Over scenarios they are those of the first that exceeds a value of the first goal.
@@ -228,18 +235,48 @@ class Passable:
             codes = nodes @ len(self.tables.nodes) ** np.arange(taken)
 
             def compute(new: Ints, nodes: Ints = nodes) -> Floats:
-                found = ask(self.problem, bricks, self.tables.nodes[nodes[new]], below)
-                return np.column_stack([found.values, found.forces, found.fit])
+                return self._computed(bricks, self.tables.nodes[nodes[new]], asked, below)
 
-            found = self._known.of((bricks, taken, below), codes, compute)
+            key = (bricks, taken, below, asked.exact, *asked.values)
+            found = self._known.of(key, codes, compute)
             out[rows, :goals] = found[:, :goals]
             out[rows, goals + robots - taken :] = found[:, goals:]
         return out[:, :goals], out[:, goals:-1], out[:, -1] > 0
+
+    def _computed(self, bricks: int, grips: Ints, asked: Asked, below: float) -> Floats:
+        """Return values, forces and what is within limits of grip sets, side by side.
+
+        Six digits are enough of what is not close to a value or a payload that decides.
+        """
+        exact = asked.exact or self._exact or len(grips) <= FEW
+        found: Floats = np.column_stack(ask(self.problem, bricks, grips, below, rough=not exact))
+        if not exact:
+            goals = len(self.problem.goals)
+            close = _near(found[:, goals:-1], self._most)
+            for k, value in enumerate(asked.values):
+                if self.problem.goals[k].measure is Measure.PEAK:
+                    close |= _near(found[:, [k]], np.array([value]))
+            found[close] = np.column_stack(ask(self.problem, bricks, grips[close], below))
+        return found
 
     def moved(self, values: Floats, found: Follows) -> Floats:
         """Return what goals take of moves to states with such values, (m, g)."""
         taken = np.column_stack([np.full(len(found.way), float(found.regrip)), found.way])
         return move_amounts(self.problem, values, taken)
+
+
+def _screens(problem: States) -> bool:
+    """Return whether six digits of responses tell nearly as much of what goals take of states."""
+    ratios = isinstance(problem.criterion, WorstRatio)
+    of_states = [goal for goal in problem.goals if goal.of_states and not goal.of_margins]
+    peaks = all(g.measure is Measure.PEAK and (g.response or ratios) for g in of_states)
+    return peaks and not problem.limits
+
+
+def _near(values: Floats, bounds: Floats) -> Bools:
+    """Return the rows (n,) of which a value (n, k) is so close to a bound that digits decide."""
+    finite = bounds[np.isfinite(bounds)]
+    return np.asarray((np.abs(values[:, :, None] - finite) <= BAND * np.abs(finite)).any((1, 2)))
 
 
 def _alike(book: RuleBook, most: Mapping[int, float]) -> list[tuple[int, ...]]:
@@ -300,20 +337,31 @@ class Proof:
         if self._is_better(values, least) is None:
             self.states = 1  # a cut before the end alone
             return least
+        out = self._of_paths(Asked(values))
+        if self._is_better(values, out) is not None:
+            out = self._of_paths(Asked(values, exact=True))
+        return out
+
+    def _of_paths(self, asked: Asked) -> tuple[float, ...]:
+        """Return bounds by the paths of states that are not proven to fall."""
+        levels = _Levels(self._passable, self._told, asked)
+        graph, values = levels.graph(), asked.values
         while True:
-            levels = _Levels(self._passable, self._told, Asked(values))
-            self.states = sum(map(len, levels.states))
-            graph = levels.graph()
             out = lexicographic_bounds(graph, values)
-            if self._is_better(values, out) is None or not self._fall(levels, graph, values):
+            better = self._is_better(values, out) is not None
+            fallen = self._fallen(levels, graph, values) if better else ()
+            if not len(fallen):
+                self.states = int(reached(graph).sum())
                 return out
+            graph = graph.only(~np.isin(graph.target, fallen))
 
     def budget_bounds(
         self, values: Sequence[float], claimed: Sequence[float], prices: Sequence[Sequence[float]]
     ) -> tuple[float, ...]:
         """Return the same for plans within budgets, by prices that a formulation gives."""
         caps, margins = self._passable.problem.budgets, values[: self._passable.margins]
-        asked = Asked(values, margins if self._passable.stands.asked(margins) else None)
+        stand = margins if self._passable.stands.asked(margins) else None
+        asked = Asked(values, stand, exact=True)
         levels = _Levels(self._passable, self._told, asked)
         self.states = sum(map(len, levels.states))
         return budget_bounds(levels.graph(), values, claimed, (caps, prices))
@@ -337,24 +385,22 @@ class Proof:
                 return k
         return None
 
-    def _fall(self, levels: _Levels, graph: Graph, values: Sequence[float]) -> bool:
-        """Return whether a state on a path that would be better is proven to fall."""
-        passable = self._passable
+    def _fallen(self, levels: _Levels, graph: Graph, values: Sequence[float]) -> Ints:
+        """Return the states of a path that would be better that are proven to fall."""
+        passable, first, out = self._passable, 0, [np.zeros(0, dtype=np.int64)]
         margins = values[: passable.margins]
         if not passable.stands.asked(margins):
-            return False
+            return out[0]
         try:
             path = np.array(lexicographic(graph).path)
         except InfeasibleError:
-            return False
-        first, found = 0, False
+            return out[0]
         for level, rows in enumerate(levels.states):
-            own = rows[path[(path >= first) & (path < first + len(rows))] - first]
-            fall = own[~passable.may_stand(level, own, margins)] if level else own[:0]
-            before = passable.fallen.get(level, np.zeros(0, dtype=np.int64))
-            passable.fallen[level] = np.concatenate([before, passable.tables.codes(fall)])
-            first, found = first + len(rows), found or len(fall) > 0
-        return found
+            own = path[(path >= first) & (path < first + len(rows))]
+            if len(own):
+                out.append(own[~passable.may_stand(level, rows[own - first], margins)])
+            first += len(rows)
+        return np.concatenate(out)
 
 
 class _Levels:
