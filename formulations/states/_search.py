@@ -38,6 +38,7 @@ from seqopt.work.progress import Stage, Tell
 
 WIDTH = 50  # new states of a brick count from which the narrow search goes on
 COPIES = 2.0  # of what is kept, that are needed at once while it grows
+GROWN = 1.1  # times as much is kept before it is asked again how much memory is free
 
 _Choose = Callable[[Graph, Watch], tuple[tuple[int, ...], tuple[float, ...], bool]]
 Watching = Callable[[Explorer], None]
@@ -226,15 +227,21 @@ def path_values(graph: Graph, path: Sequence[int]) -> tuple[float, ...]:
 
 def watched(problem: States, watch: Watch, most: float, progress: Tell) -> Watching:
     """Return what is told part by part: it says how far it is, and ends the search in time."""
+    asked = 0.0
 
     def tell(found: Explorer) -> None:
         share = found.level / problem.space.levels
         progress(Stage(f"states, pass {found.passes}", share))
         if watch.over:
             raise StopError("time")
-        room = min(most, free_memory() + found.nbytes)
-        if COPIES * (found.nbytes + problem.nbytes) > room:
+        nonlocal asked
+        used = COPIES * (found.nbytes + problem.nbytes)
+        if used > most:
             raise StopError("memory")
+        if used > GROWN * asked:
+            asked = used
+            if used > free_memory() + found.nbytes:
+                raise StopError("memory")
 
     return tell
 
@@ -285,16 +292,18 @@ def narrow(
 ) -> StatePath | None:
     """Return the best plan through a few states of every brick count, if there is one.
 
-    Where states must stand it is asked of all of them only if the best paths fall; and if ``most``
-    is given, only where goals take no more than that without it; ``enough``: as of `Explorer`.
+    Where states must stand it is asked of all of them only if the best paths fall; ``most``: what
+    goals may take of it, whether states stand or not; ``enough``: as of `Explorer`.
     """
     for standing in (False, True)[: 1 + bool(problem.demands)]:
         space = FreeStates(problem, regrips=False, standing=standing)
         found = Explorer(space, width, tell, enough)
-        if found.rise():
-            best = exact_best(found, problem.budgets)[1]
+        if found.rise(np.inf if most is None else most[0]):
+            visited, best = exact_best(found, problem.budgets)
             if most is not None and not all(map(le, best.values, most)):
                 return None
+            if not problem.demands:
+                return _selection(visited, best)
             with suppress(InfeasibleError):
                 return best_standing(problem, found)
     return None

@@ -35,8 +35,9 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import groupby
 from math import comb
-from operator import le
+from operator import itemgetter, le
 
 import numpy as np
 
@@ -135,8 +136,9 @@ def _first(
     """Return a first plan; where that is dear, only if it takes no more than floors of goals."""
     most, enough = floors if options.dear else None, options.enough
     if options.dear and problem.each and not problem.demands:
-        found = narrow(problem.each[0], options.width, tell, enough=enough)
-        return _in_all(problem, found, floors)
+        found = _in_all(problem, narrow(problem.each[0], options.width, tell, most, enough), floors)
+        if found:
+            return found
     return narrow(problem, options.width, tell, most, enough)
 
 
@@ -191,11 +193,11 @@ def _in_all(problem: States, one: StatePath | None, most: tuple[float, ...]) -> 
     Or if goals then take more of it than ``most``.
     """
     worst = np.full(len(problem.goals), -np.inf)
-    for level, *state in one.states if one else ():
-        values, allowed = problem.values(level, np.array([state]))
-        if not allowed[0]:
+    for level, same in groupby(one.states if one else (), key=itemgetter(0)):
+        values, allowed = problem.values(level, np.array([state for _, *state in same]))
+        if not allowed.all():
             return None
-        worst = np.maximum(worst, values[0])
+        worst = np.maximum(worst, values.max(axis=0))
     if one is None:
         return None
     pairs = zip(problem.goals, worst.tolist(), one.objective, strict=False)
