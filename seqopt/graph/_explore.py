@@ -253,6 +253,8 @@ class Explorer:
         The last level that was looked at.
     passes : int
         How often the threshold rose.
+    nbytes : int
+        How much memory states and moves take.
     """
 
     def __init__(
@@ -268,12 +270,12 @@ class Explorer:
         self._parts: list[dict[Key, Part]] = [{} for _ in range(space.levels + 1)]
         self._moves: dict[tuple[int, Key, Key], list[tuple[Rows, Rows, Floats]]] = defaultdict(list)
         self._shape = (states.shape[1], states.dtype, len(space.peaks))
-        self._first = key
+        self._each = states[0].nbytes + 8 * len(space.peaks) + 14  # bytes of a state
         part = self._part(0, key)
         part.add(space.codes(key, states), states)
         part.value(lambda _: (np.zeros((1, len(space.peaks))), np.ones(1, dtype=bool), np.inf))
         self.threshold = -np.inf
-        self.reached = self.level = self.passes = 0
+        self.reached = self.level = self.passes = self.nbytes = 0
 
     @property
     def peaks(self) -> tuple[bool, ...]:
@@ -304,13 +306,6 @@ class Explorer:
         """The least that the first goal takes of a state above the threshold; infinite if none."""
         least = [p.values[p.mark[: len(p.values)] == PENDING, 0] for p in self._all()]
         return float(min((values.min() for values in least if len(values)), default=np.inf))
-
-    @property
-    def nbytes(self) -> int:
-        """How much memory states and moves take."""
-        states = sum(p.states.nbytes + p.values.nbytes + 13 * len(p.mark) for p in self._all())
-        moves = sum(a.nbytes for part in self._moves.values() for three in part for a in three)
-        return int(states + moves)
 
     def _all(self) -> Iterator[Part]:
         return (part for parts in self._parts for part in parts.values())
@@ -396,8 +391,11 @@ class Explorer:
             self._keep((level, key, following), fresh, moves, self._part(level + 1, following))
 
     def _keep(self, which: tuple[int, Key, Key], fresh: Ints, moves: Moves, to: Part) -> None:
+        before = len(to.states)
         rows = to.add(self._space.codes(which[2], moves.states), moves.states)
         self._moves[which].append((fresh[moves.source].astype(np.int32), rows, moves.taken))
+        self.nbytes += 2 * rows.nbytes + moves.taken.nbytes
+        self.nbytes += (len(to.states) - before) * self._each
 
     def graph(self) -> Visited:
         """Return the visited states and the moves among them, states in the order of codes."""

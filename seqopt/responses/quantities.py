@@ -144,7 +144,7 @@ def support_moments(fields: Fields) -> Floats:
 
 def _squared(vectors: Floats) -> Floats:
     """Return the squared lengths of vectors (..., 3)."""
-    x, y, z = np.moveaxis(vectors, -1, 0)  # adding whole arrays outruns sums of three
+    x, y, z = (vectors[..., i] for i in range(3))  # adding whole arrays outruns sums of three
     return np.asarray(x * x + y * y + z * z)
 
 

@@ -170,9 +170,12 @@ class FreeSpace(StateRows):
             return 2 * self.levels
         return max(self.levels, 2 * self.levels - self.robots) + self.ends_bare
 
-    def within(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
+    def within(
+        self, level: int, states: Ints, *, regrips: bool = True
+    ) -> tuple[tuple[Moves, bool], ...]:
         """Return the moves that place no brick, and whether they are regrips."""
-        return (self.releases(level, states), False), (self.holds(level, states), True)
+        releases = (self.releases(level, states), False)
+        return (releases, (self.holds(level, states), True)) if regrips else (releases,)
 
     def onward(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
         """Return the moves that place the next brick: none of them is a regrip."""

@@ -71,7 +71,9 @@ class ScheduleSpace(StateRows):
         """Return the one state before the first step, (1, robots) int."""
         return np.zeros((1, self.robots), dtype=np.int32)
 
-    def within(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
+    def within(
+        self, level: int, states: Ints, *, regrips: bool = True
+    ) -> tuple[tuple[Moves, bool], ...]:
         """Return the moves that stay in a step: there are none."""
         return ()
 

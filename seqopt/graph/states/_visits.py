@@ -138,7 +138,7 @@ class FreeStates:
 
     def within(self, part: int, states: Ints) -> Moves:
         """Return the moves that place no brick."""
-        return _joined(self.problem.space.within(part, states), states, regrips=self.regrips)
+        return _joined(self.problem.space.within(part, states, regrips=self.regrips), states)
 
     def onward(self, part: int, states: Ints) -> Iterator[tuple[int, Moves]]:
         """Yield the moves that place the next brick, or take the next step of a schedule."""
@@ -255,13 +255,10 @@ def explore(
     return found
 
 
-def _joined(
-    found: Sequence[tuple[free_space.Moves, bool]], states: Ints, *, regrips: bool = True
-) -> Moves:
-    """Return moves together, those that are regrips only if these are wanted."""
+def _joined(found: Sequence[tuple[free_space.Moves, bool]], states: Ints) -> Moves:
+    """Return moves together, with whether they are regrips and how far robots go."""
     parts = [Moves(np.zeros(0, dtype=np.int64), states[:0], np.zeros((0, 2)))]
     for moves, regrip in found:
-        if regrips or not regrip:
-            taken = np.column_stack([np.full(len(moves.way), float(regrip)), moves.way])
-            parts.append(Moves(moves.source, moves.states, taken))
+        taken = np.column_stack([np.full(len(moves.way), float(regrip)), moves.way])
+        parts.append(Moves(moves.source, moves.states, taken))
     return Moves(*map(np.concatenate, zip(*parts, strict=True)))

@@ -209,26 +209,27 @@ class States(Shown):
         enough, except for what is close to a limit. Results: ``responses`` (dict of str to (n,)
         float): SI units; ``within`` (n,).
         """
-        held, bricks = self.space.held(states), self.space.bricks_at(level)
+        (held, most), bricks = self._grips(states), self.space.bricks_at(level)
         answers, forces = (self.screened if rough else self.sets).answers(bricks, held)
         if rough and self.screened is not self.sets:
-            close = self._close(answers, forces, states)
-            answers[close], forces[close] = self.sets.answers(bricks, held[close])
+            close = self._close(answers, forces, most)
+            if close.any():
+                answers[close], forces[close] = self.sets.answers(bricks, held[close])
         found = self._by_name(answers, forces)
         within = np.isfinite(answers).all(axis=1) & np.isfinite(forces).all(axis=1)
         for limit in self.limits:
             if limit.response in found:
                 within &= ~limit.exceeded(found[limit.response])
-        return found, within & self._carried(states, forces)
+        within &= (forces <= most + LIMIT_TOLERANCE * most).all(axis=1)
+        return found, within
 
     def _by_name(self, answers: Floats, forces: Floats) -> dict[str, Floats]:
         found = dict(zip(self.sets.names, answers.T, strict=True))
         found[LARGEST] = forces.max(axis=1, initial=0.0)
         return found
 
-    def _close(self, answers: Floats, forces: Floats, states: Ints) -> Bools:
+    def _close(self, answers: Floats, forces: Floats, most: Floats) -> Bools:
         """Return which states are so close to a limit that more digits decide."""
-        most = self._grips(states)[1]
         close = _near(forces, np.where(np.isfinite(most), most, np.nan)).any(axis=1)
         found = self._by_name(answers, forces)
         for limit in self.limits:
@@ -352,11 +353,6 @@ class States(Shown):
         order = np.argsort(held, axis=1, kind="stable")
         most: Floats = self._payloads if stand else self._caps
         return np.take_along_axis(held, order, axis=1), np.asarray(most[order])
-
-    def _carried(self, states: Ints, forces: Floats) -> Bools:
-        """Return in which states no grip exceeds what its robot may carry."""
-        most = self._grips(states)[1]
-        return np.asarray((forces <= most + LIMIT_TOLERANCE * most).all(axis=1))
 
 
 def _near(values: Floats, bound: Floats | float) -> Bools:
