@@ -220,8 +220,8 @@ class States(Shown):
         for limit in self.limits:
             if limit.response in found:
                 within &= ~limit.exceeded(found[limit.response])
-        within &= (forces <= most + LIMIT_TOLERANCE * most).all(axis=1)
-        return found, within
+        carried: Bools = np.asarray((forces <= most + LIMIT_TOLERANCE * most).all(axis=1))
+        return found, within & carried
 
     def _by_name(self, answers: Floats, forces: Floats) -> dict[str, Floats]:
         found = dict(zip(self.sets.names, answers.T, strict=True))
