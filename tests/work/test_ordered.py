@@ -215,7 +215,7 @@ class Reluctant(Forgetful):
 def test_an_executor_of_others_may_take_no_work_at_first():
     with hire(Reluctant(3), workers=2) as crew:
         assert list(map_ordered(square, range(2), crew)) == WANTED[:2]
-    wanted = pytest.raises(WorkerError, match="without an answer .*no machine yet")
+    wanted = pytest.raises(WorkerError, match=r"without an answer .*no machine yet")
     with wanted, hire(Reluctant(100), workers=2) as crew:
         list(map_ordered(square, range(12), crew))
 
