@@ -1,0 +1,153 @@
+"""Whether the steps of a build stand, one after the other: what proves one is tried on the next.
+
+Whatever is tried is a claim: forces hold a step by `seqopt.stability.limit_analysis.violation`
+alone, and a motion makes it fall by `bound` alone. What is left open is solved as a cone program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from enum import Enum
+from itertools import islice
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.contact.assembly import Assembly
+from seqopt.network.network import GROUND, Network
+from seqopt.sequence.steps import Grips
+from seqopt.stability._interior_point import approach
+from seqopt.stability._partial_assemblies import PartialAssemblies
+from seqopt.stability._prover import Proven, Prover
+from seqopt.stability.limit_analysis import EXACT, Answer, Case, Claim, Compile, bound, violation
+
+_TIGHT = 0.1 * EXACT  # largest violation of forces that are believed without a cone program
+_CLEAR = 10 * EXACT  # least bound of a motion that is
+_LEAST = 1e-3  # corner force below which it changes no less, over the force scale
+_ACROSS = 0.3  # how much forces along faces change, beside those across them
+
+
+class Way(Enum):
+    """How a verdict was proven."""
+
+    FORCES = "forces"
+    EARLIER_FORCES = "earlier forces"
+    MOTION = "motion"
+    EARLIER_MOTION = "earlier motion"
+    CONES = "cone program"
+
+
+Ask = Callable[[Assembly], Case]
+"""Gives the case of an assembly: of a smallest z, of which is only asked whether it is zero."""
+
+
+def judged(assembly: Assembly, case: Case, answer: Answer) -> Proven | None:
+    """Return what an answer proves by itself: that no z is needed, or that some is; or nothing.
+
+    Forces are looked at if the answer says that they need none.
+    """
+    if answer.value <= _TIGHT and violation(assembly, case, answer) <= _TIGHT:
+        return Proven(0.0, 0.0, 0.0, answer)
+    proven = bound(assembly, case, answer) if answer.motion.any() else 0.0
+    return Proven(proven, proven, np.nan, answer) if proven > _CLEAR else None
+
+
+def _labeled(proven: Proven | None, way: Way) -> tuple[Proven | None, Way]:
+    """Return what is proven and how: in a way if by forces."""
+    return proven, Way.MOTION if proven is not None and proven.bound > 0 else way
+
+
+class VerdictChain:
+    """Proves the case of one partial structure after the other, of up to so many bricks.
+
+    Forces and a motion are remembered in N, m and rad. Where not the cone program proves a case, z
+    is only as good as the answer to whether it is zero.
+    """
+
+    def __init__(self, network: Network, bricks: int, ask: Ask, compiled: Compile) -> None:
+        self._parts = PartialAssemblies(network, bricks)
+        self._ask, self._compile = ask, compiled
+        self._corner_force: Floats | None = None
+        self._grip_force: dict[int, Floats] = {}
+        self._motion: Floats | None = None
+
+    def __call__(self, bricks: int, grips: Grips) -> tuple[Assembly, Proven, Way]:
+        """Return a partial structure, its case proven, and how."""
+        assembly, held = self._parts(bricks, grips), [n for n in grips if n is not None]
+        case = self._ask(assembly)
+        tries = self._tries(assembly, case, held)
+        known = next(((proven, way) for proven, way in tries if proven is not None), None)
+        proven, way = known or (Prover(assembly, self._compile)(case), Way.CONES)
+        self._learn(assembly, proven, held)
+        return assembly, proven, way
+
+    def _tries(
+        self, assembly: Assembly, case: Case, held: Sequence[int]
+    ) -> Iterator[tuple[Proven | None, Way]]:
+        """Yield what claims prove, those that are made for the least first."""
+        none = np.zeros((len(assembly.corner), 3)), np.zeros((len(held), 3))
+        for motion in _extended(assembly, self._motion):
+            claim = Answer(Claim.SOLVED, 1.0, *none, motion)
+            yield judged(assembly, case, claim), Way.EARLIER_MOTION
+        force, level = np.concatenate(none), np.ones((len(none[0]) + len(held), 3))
+        if case.tension[0] > 0 or case.cohesion[0] > 0:
+            for answer in islice(approach(assembly, case, force, level), 1):
+                yield _labeled(judged(assembly, case, answer), Way.FORCES)
+        way = Way.FORCES
+        if self._corner_force is not None:
+            force, level = self._earlier(assembly, held)
+            way = Way.EARLIER_FORCES
+        for answer in approach(assembly, case, force, level):
+            yield _labeled(judged(assembly, case, answer), way)
+            way = Way.FORCES
+
+    def _earlier(self, assembly: Assembly, held: Sequence[int]) -> tuple[Floats, Floats]:
+        """Return forces found before, none where there were none, and how much each may change."""
+        assert self._corner_force is not None
+        corners = len(assembly.corner)
+        force, level = np.zeros((corners + len(held), 3)), np.ones((corners + len(held), 3))
+        known = min(corners, len(self._corner_force))
+        force[:known] = self._corner_force[:known]
+        for i, node in enumerate(held):
+            force[corners + i] = self._grip_force.get(node, 0.0)
+        force /= assembly.scales[0]
+        pressed = np.maximum(np.abs(force[:corners, 0]), _LEAST)
+        pressed[known:] = np.median(pressed[:known]) if known else 1.0
+        level[:corners] = pressed[:, None] * [1.0, _ACROSS, _ACROSS]
+        return force, level
+
+    def _learn(self, assembly: Assembly, proven: Proven, held: Sequence[int]) -> None:
+        force, length = assembly.scales
+        answer = proven.answer
+        if proven.held <= EXACT:
+            self._corner_force = force * answer.contact_force
+            self._grip_force = dict(zip(held, force * answer.grip_force, strict=True))
+        if proven.bound > EXACT and np.isfinite(answer.motion).all():
+            self._motion = answer.motion / np.repeat([1.0, length], 3)
+
+
+def _extended(assembly: Assembly, known: Floats | None) -> Iterator[Floats]:
+    """Yield motions (B, 6) in which later blocks rest, or go with one that they touch.
+
+    ``known``: motion of as many blocks, less, or more, m and rad; none is extended to none.
+    """
+    if known is None:
+        return
+    blocks, before = len(assembly.centroid), min(len(assembly.centroid), len(known))
+    motion = np.zeros((blocks, 6))
+    motion[:before] = known[:before]
+    size = np.repeat([1.0, assembly.scales[1]], 3)
+    yield motion * size
+    if before == blocks:
+        return
+    for side in (np.min, np.max):
+        for new in range(before, blocks):
+            beside = assembly.bodies[(assembly.bodies == new).any(axis=1)]
+            others = beside[(beside < new) & (beside != GROUND)]
+            if len(others):
+                other = int(side(others))
+                arm = assembly.centroid[new] - assembly.centroid[other]
+                turn = motion[other, 3:]
+                motion[new, :3] = motion[other, :3] + np.cross(turn, arm)
+                motion[new, 3:] = turn
+        yield motion * size
