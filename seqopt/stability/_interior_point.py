@@ -135,7 +135,7 @@ class _Balance:
         matrix += regular * sparse.eye_array(size, format="csc")
         symmetric = {"SymmetricMode": True}
         found = splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
-        return found.solve  # type: ignore[no-any-return]
+        return found.solve
 
 
 class _Search:
@@ -194,7 +194,7 @@ class _Search:
         """
         balance, cones, square = self._balance, self._cones, inverse @ inverse
         weighed = square @ cones.map
-        soft: Floats = np.linalg.inv(cones.owned(cones.map.transpose(0, 2, 1) @ weighed))
+        soft = np.asarray(np.linalg.inv(cones.owned(cones.map.transpose(0, 2, 1) @ weighed)), float)
         solve = balance.solver(soft)
         lift, stiff = cones.owned(weighed[:, 0]), square[:, 0, 0].sum()
         left = balance.wrench(point.force) + self._load

@@ -1,0 +1,355 @@
+"""Verdicts of many steps: those of the cone program, one by one, whatever is tried before it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import fields, replace
+from itertools import count
+
+import numpy as np
+import pytest
+from scipy import sparse
+from scipy.optimize import linprog
+
+from experiments.harness.scenes import running_bond
+from formulations.contact.limit_analysis import compile_equilibrium
+from seqopt.contact.assembly import Assembly
+from seqopt.contact.faces import Contacts, step_assembly
+from seqopt.contact.mortar import DRY, EPOXY, Mortar
+from seqopt.network.build import build_network
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.steps import Step, StepKind
+from seqopt.sequence.two_robots import METHODS
+from seqopt.stability import _verdict_chain as chain
+from seqopt.stability._partial_assemblies import PartialAssemblies
+from seqopt.stability.assessment import Verdict, bonded, each_verdict, step_verdicts, verdict
+from seqopt.stability.limit_analysis import EXACT, Answer, Claim, bound, violation
+from tests.blocks import with_shapes
+from tests.builders import branch, from_both_ends, six_bricks
+from tests.limit_scenes import chain as leaning_chain
+from tests.limit_scenes import without_joint
+
+SCENES = {
+    "arch": six_bricks,
+    "both ends": lambda: from_both_ends(7),
+    "wall": lambda: running_bond(3, 3),
+    "branch": branch,
+    "blocks": lambda: with_shapes(six_bricks()),
+}
+MORTARS = {
+    "dry": DRY,
+    "smooth": Mortar(friction=0.0),
+    "weak bond": Mortar(friction=0.7, tensile_strength=2e3, cohesion=3e3),
+    "no cohesion": Mortar(friction=0.5, tensile_strength=300.0),
+    "epoxy": EPOXY,
+}
+
+
+def random_steps(network, length, seed, most=None):
+    """Steps that nobody would plan: bricks come and go, and whatever nodes are held."""
+    rng, robots = np.random.default_rng(seed), len(network.scene.robots)
+    most = most or len(network.inner)
+    bricks, steps = int(rng.integers(1, most + 1)), []
+    for number in range(1, length + 1):
+        bricks = int(np.clip(bricks + rng.choice([0, 1, 1, 2, -3]), 1, most))
+        nodes = [node for brick in network.scene.placed[:bricks] for node in brick.nodes]
+        held = rng.choice(nodes, int(rng.integers(0, min(robots, len(nodes)) + 1)), replace=False)
+        grips = rng.permutation([*held.tolist(), *[None] * (robots - len(held))]).tolist()
+        steps.append(Step(number, StepKind.PLACE, bricks, tuple(grips)))
+    return steps
+
+
+def one_by_one(network, steps, mortar):
+    known = Contacts(network)
+    return tuple(verdict(step_assembly(network, s.bricks, s.grips, known), mortar) for s in steps)
+
+
+WHOLE = {name: (scene, None) for name, scene in SCENES.items()} | {
+    "arch25": (lambda: load_scene("arch25"), None),
+    "vault": (lambda: load_scene("vault338"), 40),
+    "dome": (lambda: load_scene("dome163"), 30),
+    "a chain in two": (lambda: without_joint(leaning_chain(25)).scene, None),
+}
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_parts_cut_from_the_whole_are_those_built_alone(name):
+    make, most = WHOLE[name]
+    network = build_network(make())
+    cut, known = PartialAssemblies(network, most or len(network.inner)), Contacts(network)
+    for step in random_steps(network, 12, 5, most):
+        part = cut(step.bricks, step.grips)
+        alone = step_assembly(network, step.bricks, step.grips, known)
+        assert part == alone
+        for own in ("corner_area", "area", "axes", "scales", "stress_scale"):
+            np.testing.assert_array_equal(getattr(part, own), getattr(alone, own), own)
+        for own in ("contact_map", "grip_map"):
+            mine, other = getattr(part, own), getattr(alone, own)
+            assert (type(mine), mine.shape) == (type(other), other.shape)
+            assert abs(mine - other).max() < 1e-12 if mine.size else not other.size
+        assert not any(
+            getattr(part, field.name).flags.writeable
+            for field in fields(Assembly)
+            if isinstance(getattr(part, field.name), np.ndarray)
+        )
+
+
+@pytest.mark.parametrize("mortar", MORTARS)
+@pytest.mark.parametrize("name", SCENES)
+def test_verdicts_are_those_of_the_cone_program(name, mortar):
+    network = build_network(SCENES[name]())
+    steps = random_steps(network, 10, 3)
+    expected = one_by_one(network, steps, MORTARS[mortar])
+    assert step_verdicts(network, steps, MORTARS[mortar]) == expected
+    back = step_verdicts(network, steps[::-1], MORTARS[mortar])
+    assert back[::-1] == expected
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("mortar", MORTARS)
+def test_verdicts_of_larger_structures_too(mortar, seed):
+    scenes = load_scene("arch25"), without_joint(leaning_chain(25)).scene, running_bond(4, 4)
+    for scene in scenes:
+        network = build_network(scene)
+        steps = random_steps(network, 15, seed)
+        expected = one_by_one(network, steps, MORTARS[mortar])
+        assert step_verdicts(network, steps, MORTARS[mortar]) == expected
+
+
+@pytest.mark.parametrize("mortar", [DRY, EPOXY])
+def test_a_build_needs_no_cone_program(arch25, mortar):
+    network = build_network(arch25)
+    steps = METHODS["sequential"](network)
+
+    def none(assembly):
+        raise AssertionError("a cone program")
+
+    found = [*each_verdict(network, steps, mortar, none)]
+    assert Counter(step.verdict for step in found)[Verdict.UNDECIDED] == 0
+    wanted = {"forces"} if mortar is EPOXY else {"earlier forces", "motion", "earlier motion"}
+    assert wanted <= {step.way for step in found}
+    for step, own in zip(found, steps, strict=True):
+        if step.verdict is Verdict.STANDS:
+            assert step.motion is None
+        else:
+            assert step.motion.shape == (own.bricks, 6)
+            assert np.abs(step.motion[:, :3]).max() <= 1
+
+
+def test_the_motion_of_a_step_makes_it_fall(arch25):
+    network = build_network(arch25)
+    steps = METHODS["cantilever"](network)[:24]
+    for step, found in zip(steps, each_verdict(network, steps, DRY), strict=True):
+        if found.motion is None:
+            continue
+        assembly = step_assembly(network, step.bricks, step.grips)
+        none = np.zeros((len(assembly.corner), 3)), np.zeros((len(assembly.payload), 3))
+        scaled = found.motion * np.repeat([1.0, assembly.scales[1]], 3)
+        claim = Answer(Claim.SOLVED, 1.0, *none, scaled)
+        assert bound(assembly, bonded(assembly, DRY), claim) > EXACT
+
+
+def test_equal_partial_structures_are_asked_once(arch25, monkeypatch):
+    network = build_network(arch25)
+    steps, asked = METHODS["sequential"](network)[:6], []
+    real = chain.VerdictChain.__call__
+
+    def counted(self, bricks, grips):
+        asked.append((bricks, grips))
+        return real(self, bricks, grips)
+
+    monkeypatch.setattr(chain.VerdictChain, "__call__", counted)
+    once = [*each_verdict(network, steps * 3, DRY)]
+    assert len(asked) == 6
+    assert once[:6] == once[6:12] == once[12:]
+
+
+def test_nothing_is_asked_ahead(arch25):
+    """Who watches sees every verdict as it is found; no steps give no verdicts."""
+    network = build_network(arch25)
+    steps = METHODS["sequential"](network)
+
+    def none(assembly):
+        raise AssertionError("a cone program")
+
+    assert next(each_verdict(network, steps, DRY, none)).verdict is Verdict.STANDS
+    assert step_verdicts(network, (), DRY) == ()
+
+
+# what is offered is not believed
+
+
+def nonsense(assembly, seed):
+    """Forces and motions of all sizes, some of them no numbers."""
+    rng = np.random.default_rng(seed)
+    shapes = (len(assembly.corner), 3), (len(assembly.payload), 3), (len(assembly.centroid), 6)
+    for size in (0.0, 1e-9, 1.0, 1e9, np.inf, np.nan):
+        with np.errstate(invalid="ignore"):
+            parts = [size * rng.standard_normal(shape) for shape in shapes]
+        yield Answer(Claim.SOLVED, 0.0, *parts)
+    down = np.tile([0.0, 0.0, -1.0, 0.0, 0.0, 0.0], (len(assembly.centroid), 1))
+    yield Answer(Claim.SOLVED, 0.0, *(np.ones(shape) for shape in shapes[:2]), down)
+
+
+@pytest.fixture
+def arch():
+    network = build_network(six_bricks())
+    steps = random_steps(network, 14, 8)
+    return network, steps, {m: one_by_one(network, steps, m) for m in (DRY, EPOXY)}
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("mortar", [DRY, EPOXY])
+def test_nonsense_from_the_search_turns_no_verdict(arch, mortar, monkeypatch):
+    network, steps, expected = arch
+    monkeypatch.setattr(chain, "approach", lambda assembly, *_: nonsense(assembly, 1))
+    found = [*each_verdict(network, steps, mortar)]
+    assert tuple(step.verdict for step in found) == expected[mortar]
+    assert "cone program" in {step.way for step in found}
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("mortar", [DRY, EPOXY])
+def test_nonsense_from_all_solvers_turns_no_verdict(arch, mortar, monkeypatch):
+    network, steps, expected = arch
+    monkeypatch.setattr(chain, "approach", lambda assembly, *_: nonsense(assembly, 2))
+    for number in range(7):
+
+        def compiled(assembly, number=number):
+            return lambda *_: [*nonsense(assembly, number)][number]
+
+        found = [step.verdict for step in each_verdict(network, steps, mortar, compiled)]
+        assert all(
+            f in (e, Verdict.UNDECIDED) for f, e in zip(found, expected[mortar], strict=True)
+        )
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("mortar", [DRY, EPOXY])
+def test_nonsense_that_is_remembered_turns_no_verdict(arch, mortar, monkeypatch):
+    network, steps, expected = arch
+    real, kind = chain.VerdictChain._learn, count()
+
+    def poisoned(self, assembly, proven, held):
+        bad = [*nonsense(assembly, 3)][next(kind) % 7]
+        real(self, assembly, replace(proven, held=0.0, bound=1.0, answer=bad), held)
+
+    monkeypatch.setattr(chain.VerdictChain, "_learn", poisoned)
+    assert step_verdicts(network, steps, mortar) == expected[mortar]
+
+
+def test_almost_true_forces_and_motions_prove_nothing():
+    network = build_network(six_bricks())
+    for step in random_steps(network, 10, 4):
+        assembly = step_assembly(network, step.bricks, step.grips)
+        case = bonded(assembly, DRY)
+        true = compile_equilibrium(assembly)(case)
+        stands = verdict(assembly, DRY) is Verdict.STANDS
+        still = replace(true, motion=0 * true.motion)
+        if stands:
+            assert violation(assembly, case, true) < EXACT
+        for share in (1e-5, -1e-5, 1e-3):
+            off = replace(still, value=0.0, contact_force=(1 + share) * true.contact_force)
+            assert chain.judged(assembly, case, off) is None
+        backwards = replace(true, value=1.0, motion=-true.motion)
+        assert chain.judged(assembly, case, backwards) is None
+        proven = chain.judged(assembly, case, replace(true, value=1.0))
+        assert (proven is None) == stands
+
+
+WEAKER = {
+    "forces may violate": ("violation", lambda *_: 0.0),
+    "every motion proves": ("bound", lambda *_: 1.0),
+}
+
+
+@pytest.mark.parametrize("weaker", WEAKER)
+def test_a_weaker_judge_is_noticed(arch, weaker, monkeypatch):
+    network, steps, expected = arch
+    monkeypatch.setattr(chain, *WEAKER[weaker])
+    assert step_verdicts(network, steps, DRY) != expected[DRY]
+
+
+# numbers from elsewhere
+
+
+def feasible(assembly, friction, sides, *, around):
+    """Whether a linear program of its own finds forces: cones around the true ones, or within."""
+    columns, most = [], []
+
+    def push(bodies, point, force):
+        column = np.zeros(6 * len(assembly.centroid))
+        for body, sign in zip(bodies, (-1.0, 1.0), strict=True):
+            if body >= 0:
+                arm = point - assembly.centroid[body]
+                column[6 * body : 6 * body + 3] += sign * force
+                column[6 * body + 3 : 6 * body + 6] += sign * np.cross(arm, force)
+        columns.append(column)
+
+    angles = 2 * np.pi * np.arange(sides) / sides
+    slope = friction / np.cos(np.pi / sides) if around else friction
+    for corner, contact in zip(assembly.corner, assembly.contact, strict=True):
+        normal = assembly.normal[contact]
+        side = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+        side /= np.linalg.norm(side)
+        for angle in angles:
+            along = np.cos(angle) * side + np.sin(angle) * np.cross(normal, side)
+            push(assembly.bodies[contact], corner, normal + slope * along)
+            most.append((0.0, None))
+    largest = np.linalg.norm(assembly.weight, axis=1).max()
+    share = 1.0 if around else 1 / np.sqrt(3)
+    grips = assembly.grip_block, assembly.grip_position, assembly.payload * share / largest
+    for body, point, payload in zip(*grips, strict=True):
+        for axis in np.eye(3):
+            push((-1, body), point, axis)
+            most.append((-payload, payload))
+    load = np.pad(assembly.weight / largest, ((0, 0), (0, 3))).ravel()
+    matrix = sparse.csc_array(np.array(columns).T)
+    return linprog(np.zeros(len(most)), A_eq=matrix, b_eq=-load, bounds=most).status == 0
+
+
+ARCHES = {  # steps and how many of them fall dry
+    "arch:span=2,rise=0.8,pattern=VLR": {"sequential": (37, 18), "cantilever": (37, 20)},
+    "arch:span=3,rise=1.5,pattern=VLR": {"sequential": (65, 49), "cantilever": (65, 48)},
+}
+
+
+@pytest.mark.parametrize("name", [*ARCHES][:1])
+def test_arches_fall_dry_where_a_program_of_its_own_finds_no_forces(name):
+    """Every sixth step: cones around the true ones are too weak, or cones within them enough."""
+    network = build_network(load_scene(name))
+    for method, counts in ARCHES[name].items():
+        steps = METHODS[method](network)
+        found = step_verdicts(network, steps, DRY)
+        assert (len(found), found.count(Verdict.FALLS)) == counts
+        assert found.count(Verdict.UNDECIDED) == 0
+        for step, own in [*zip(steps, found, strict=True)][::6]:
+            assembly = step_assembly(network, step.bricks, step.grips)
+            falls = own is Verdict.FALLS
+            assert feasible(assembly, DRY.friction, 16, around=falls) is not falls
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*ARCHES][1:])
+def test_longer_arches_fall_dry_as_the_cone_program_says(name):
+    network = build_network(load_scene(name))
+    for method, counts in ARCHES[name].items():
+        steps = METHODS[method](network)
+        found = step_verdicts(network, steps, DRY)
+        assert (len(found), found.count(Verdict.FALLS)) == counts
+        assert found == one_by_one(network, steps, DRY)
+
+
+@pytest.mark.long
+def test_a_vault_is_proven_without_cone_programs():
+    """The start of a vault; with epoxy all of it."""
+    network = build_network(load_scene("vault338"))
+    steps = METHODS["sequential"](network)
+    glued = [*each_verdict(network, steps, EPOXY)]
+    assert {step.verdict for step in glued} == {Verdict.STANDS}
+    assert "cone program" not in {step.way for step in glued}
+    dry = [*each_verdict(network, steps[:200], DRY)]
+    assert "cone program" not in {step.way for step in dry}
+    for k in range(0, 200, 20):
+        assert dry[k].verdict is one_by_one(network, steps[k : k + 1], DRY)[0]
