@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -18,9 +18,8 @@ from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Grips, Step, require_steps
+from seqopt.sequence.steps import Step, require_steps
 from seqopt.stability._prover import DIRECTIONS, Proven, Prover, safe_pull
-from seqopt.stability._verdict_chain import VerdictChain
 from seqopt.stability.limit_analysis import (
     CAP,
     EXACT,
@@ -149,7 +148,7 @@ def assess(
     failure = min(pulls, key=lambda pull: np.nan_to_num(pull.held, nan=CAP), default=stand)
     known = failure.value < CAP if stands else verdict is Verdict.FALLS
     motion = failure.answer.motion if known else np.zeros((len(assembly.centroid), 6))
-    motion = _unit(motion)
+    motion = motion / (np.abs(motion).max(initial=0.0) or 1.0)
     block, contact = _first_to_fail(assembly, motion)
     friction = _least_friction(prove, mortar)
     least = replace(fixed, sense=Sense.SMALLEST, payload=(0.0, 1.0))
@@ -161,7 +160,7 @@ def assess(
         pull=np.array([pull.held for pull in pulls[:DIRECTIONS]] or [np.nan] * DIRECTIONS),
         tilt=float(np.arctan(worst)),
         grip=_amount(grip) * assembly.scales[0],
-        motion=_in_meters(assembly, motion),
+        motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
         first_block=block,
         first_contact=contact,
         jammed=stands and not friction > _LITTLE and friction != 0 and _is_jammed(prove, mortar),
@@ -265,16 +264,6 @@ def _is_jammed(prove: Prover, mortar: Mortar) -> bool:
     return bool(proven.held <= EXACT and most > LARGEST_FORCE * total)
 
 
-def _unit(motion: Floats) -> Floats:
-    """Return a motion (B, 6) whose largest entry is one, if any is not zero."""
-    return np.asarray(motion / (np.abs(motion).max(initial=0.0) or 1.0))
-
-
-def _in_meters(assembly: Assembly, motion: Floats) -> Floats:
-    """Return a motion (B, 6) with rotations in rad, not times the length scale."""
-    return np.asarray(motion / np.repeat([1.0, assembly.scales[1]], 3))
-
-
 def _amount(value: float) -> float:
     """Return a proven z, zero where it is no more than what proofs leave open."""
     return 0.0 if value <= EXACT else value
@@ -320,47 +309,6 @@ def assess_steps(
         assess(step_assembly(network, step.bricks, step.grips, known), mortar, up)
         for step in with_progress("assessing steps", require_steps(steps), progress)
     )
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class StepVerdict(FrozenValue):
-    """Verdict of a step, and how it was proven.
-
-    ``way``: "forces" or a "motion" that prove it by themselves, "earlier" ones of another step, or
-    the "cone program". ``motion`` (B, 6): how it falls, as of `Stability`; none if it does not.
-    """
-
-    verdict: Verdict
-    way: str
-    motion: Floats | None
-
-
-def each_verdict(
-    network: Network, steps: Sequence[Step], mortar: Mortar, compiled: Compile = compile_equilibrium
-) -> Iterator[StepVerdict]:
-    """Yield the verdict of every step as soon as it is found: that of `verdict`, mostly unsolved.
-
-    Of equal partial structures it is asked once. What is found for one is tried on those that
-    follow, so steps of a build are asked best in their order. ``compiled``: makes the programs of
-    the steps for which that proves nothing.
-    """
-    most = max((step.bricks for step in steps), default=1)
-    prove = VerdictChain(network, most, lambda assembly: bonded(assembly, mortar), compiled)
-    found: dict[tuple[int, Grips], StepVerdict] = {}
-    for step in steps:
-        key = step.bricks, step.grips
-        if key not in found:
-            assembly, proven, way = prove(*key)
-            verdict, motion = _verdict_of(proven), None
-            if verdict is Verdict.FALLS:
-                motion = _in_meters(assembly, _unit(proven.answer.motion))
-            found[key] = StepVerdict(verdict, way.value, motion)
-        yield found[key]
-
-
-def step_verdicts(network: Network, steps: Sequence[Step], mortar: Mortar) -> tuple[Verdict, ...]:
-    """Return the verdict of every step; of equal partial structures it is asked once."""
-    return tuple(found.verdict for found in each_verdict(network, steps, mortar))
 
 
 def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.DataFrame:

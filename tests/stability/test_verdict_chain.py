@@ -22,7 +22,8 @@ from seqopt.sequence.steps import Step, StepKind
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability import _verdict_chain as chain
 from seqopt.stability._partial_assemblies import PartialAssemblies
-from seqopt.stability.assessment import Verdict, bonded, each_verdict, step_verdicts, verdict
+from seqopt.stability._step_verdicts import each_verdict, step_verdicts
+from seqopt.stability.assessment import Verdict, bonded, verdict
 from seqopt.stability.limit_analysis import EXACT, Answer, Claim, bound, violation
 from tests.blocks import with_shapes
 from tests.builders import branch, from_both_ends, six_bricks

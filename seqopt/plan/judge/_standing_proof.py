@@ -12,7 +12,8 @@ from seqopt.errors import SolverError
 from seqopt.graph.states.states import States
 from seqopt.problem.standing import Standing, StandingSets, slack
 from seqopt.sequence.steps import Step
-from seqopt.stability.assessment import Stability, Verdict, assess_steps, step_verdicts
+from seqopt.stability._step_verdicts import step_verdicts
+from seqopt.stability.assessment import Stability, Verdict, assess_steps
 
 SURE = 1e-3  # rad, or as a share: how far the cone program may be from what forces prove
 
