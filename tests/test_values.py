@@ -32,8 +32,10 @@ from seqopt.scene.boxes import boxes
 from seqopt.scene.imports.contacts import flat_face, touching_faces
 from seqopt.scene.library._joints import overlaps
 from seqopt.scene.shape import Surface
+from seqopt.sequence.two_robots import sequential
 from seqopt.stability._held_states import _HoldingForces, _Known, first_directions
 from seqopt.stability._prover import Prover
+from seqopt.stability._step_verdicts import each_verdict
 from seqopt.stability.assessment import assess, bonded
 from tests.blocks import box
 
@@ -69,6 +71,7 @@ def values(arch25):
         *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, EPOXY)),
         *_Known(assembly, bonded(assembly, EPOXY)).motions_of(np.ones((2, 6))),
         *(_HoldingForces(0.0, np.zeros(1)), first_directions(4, 1)),
+        *each_verdict(network, sequential(network)[:1], EPOXY),
     )
     return {type(value).__name__: value for value in every}
 
