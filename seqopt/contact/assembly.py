@@ -165,4 +165,6 @@ class Assembly(FrozenValue):
         pull = self.weight
         if direction is not None:
             pull = np.linalg.norm(self.weight, axis=1, keepdims=True) * np.array(direction)
-        return np.pad(pull / self.scales[0], ((0, 0), (0, 3))).ravel()
+        out = np.zeros((len(pull), 6))
+        out[:, :3] = pull / self.scales[0]
+        return out.ravel()

@@ -140,6 +140,7 @@ def _extended(assembly: Assembly, known: Floats | None) -> Iterator[Floats]:
     yield motion * size
     if before == blocks:
         return
+    tried = [motion.copy()]
     for side in (np.min, np.max):
         for new in range(before, blocks):
             beside = assembly.bodies[(assembly.bodies == new).any(axis=1)]
@@ -150,4 +151,6 @@ def _extended(assembly: Assembly, known: Floats | None) -> Iterator[Floats]:
                 turn = motion[other, 3:]
                 motion[new, :3] = motion[other, :3] + np.cross(turn, arm)
                 motion[new, 3:] = turn
-        yield motion * size
+        if not any(np.array_equal(motion, other) for other in tried):
+            yield motion * size
+        tried.append(motion.copy())
