@@ -127,15 +127,24 @@ class _Balance:
         if size <= _DENSE:
             full = np.zeros((self._bodies, 6, self._bodies, 6))
             full[rows, :, columns] = block
-            full = full.reshape(size, size) + regular * np.eye(size)
-            factor = linalg.cho_factor(full, check_finite=False)
-            return lambda right: np.asarray(linalg.cho_solve(factor, right, check_finite=False))
+            full = full.reshape(size, size)
+            factor = linalg.cho_factor(full + regular * np.eye(size), check_finite=False)
+            return _refined(full, lambda r: linalg.cho_solve(factor, r, check_finite=False))
         ends = np.searchsorted(rows, np.arange(self._bodies + 1))
         matrix = sparse.bsr_array((block, columns, ends), shape=(size, size)).tocsc()
-        matrix += regular * sparse.eye_array(size, format="csc")
-        symmetric = {"SymmetricMode": True}
-        found = splu(matrix, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
-        return found.solve
+        safe, symmetric = regular * sparse.eye_array(size, format="csc"), {"SymmetricMode": True}
+        factors = splu(matrix + safe, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
+        return _refined(matrix, factors.solve)
+
+
+def _refined(matrix: Floats | sparse.csc_array, solve: _Solve) -> _Solve:
+    """Return the solution of a system by that of one nearby, corrected once."""
+
+    def solution(right: Floats) -> Floats:
+        first = solve(right)
+        return np.asarray(first + solve(right - matrix @ first))
+
+    return solution
 
 
 class _Search:
@@ -150,11 +159,10 @@ class _Search:
         ``level`` (N, 3): how much each of the ``force`` (N, 3) may change beside the others.
         """
         weight = np.einsum("ni,ij->nij", np.square(level), np.eye(3))
-        solve, left = self._balance.solver(weight), self._load + self._balance.wrench(force)
-        for _ in range(2):  # the second time what rounding left
-            motion = solve(left)
-            force = force - np.square(level) * self._balance.parting(motion)
-            left = self._load + self._balance.wrench(force)
+        left = self._load + self._balance.wrench(force)
+        motion = self._balance.solver(weight)(left)
+        force = force - np.square(level) * self._balance.parting(motion)
+        left = self._load + self._balance.wrench(force)
         loose = motion if np.abs(left).max() > _DONE else 0 * motion
         slack = self._cones.most + self._cones.of(force)
         raised = _ROOM + 1.2 * float(max((_length(slack[:, 1:]) - slack[:, 0]).max(), 0.0))

@@ -21,7 +21,7 @@ from seqopt.stability._partial_assemblies import PartialAssemblies
 from seqopt.stability._prover import Proven, Prover
 from seqopt.stability.limit_analysis import EXACT, Answer, Case, Claim, Compile, bound, violation
 
-_TIGHT = 0.1 * EXACT  # largest violation of forces that are believed without a cone program
+_TIGHT = 0.01 * EXACT  # largest violation of forces that are believed without a cone program
 _CLEAR = 10 * EXACT  # least bound of a motion that is
 _LEAST = 1e-3  # corner force below which it changes no less, over the force scale
 _ACROSS = 0.3  # how much forces along faces change, beside those across them
