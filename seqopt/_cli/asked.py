@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import parse_robots
-from seqopt.contact.mortar import MORTARS
+from seqopt._cli.values import asked_standing, parse_robots
+from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
 from seqopt.engines._auto import AutoEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine
@@ -26,6 +26,8 @@ from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import AnyStep, Step
 from seqopt.sequence.two_robots import METHODS
+from seqopt.stability._builds import BuildProver, BuildVerdicts
+from seqopt.stability.assessment import Verdict
 from seqopt.study.published import PUBLISHED, is_reference_arch, published_plan
 
 
@@ -109,6 +111,15 @@ def exceeded(scene: Scene, *tables: pd.DataFrame) -> tuple[str, ...]:
     return tuple(str(excess) for table in tables for excess in overloads(scene, table))
 
 
+def asked_prover(options: argparse.Namespace, network: Network) -> BuildProver:
+    """Return what says which steps of builds stand, with the mortars that a command shows."""
+    own = getattr(options, "stands", None) or getattr(options, "mortar", None) or "epoxy"
+    demanded = asked_standing(options) if getattr(options, "stands", None) else None
+    mortar = find_mortar(own) if demanded is None else demanded.mortar
+    shown = {"dry": Mortar(friction=mortar.friction), own: mortar}
+    return BuildProver(network, {} if options.no_stability else shown, options.tell)
+
+
 def marked(answer: Answer, outside: Sequence[object]) -> Answer:
     """Return an answer that begins with how results leave the linear range, and what to do."""
     left = [str(departure) for departure in outside]
@@ -122,12 +133,28 @@ def marked(answer: Answer, outside: Sequence[object]) -> Answer:
 
 
 def strictly(
-    answer: Answer, options: argparse.Namespace, over: Sequence[str], outside: Sequence[object] = ()
+    answer: Answer,
+    options: argparse.Namespace,
+    over: Sequence[str],
+    outside: Sequence[object] = (),
+    verdicts: Mapping[str, Sequence[BuildVerdicts]] | None = None,
 ) -> Answer:
-    """Return an answer, `marked`, with payloads that are `exceeded` and the status of --strict."""
+    """Return an answer, `marked`, with payloads that are `exceeded` and the status of --strict.
+
+    ``verdicts``: by build, with the mortar of the scene last.
+    """
     answer = marked(answer, outside)
     answer = replace(answer, facts={**answer.facts, "payloads_exceeded": list(over)})
-    wrong = {"payload exceeded": over, OUTSIDE: [*map(str, outside)]}
+    found = {
+        name: {each.mortar: each.facts() for each in own} for name, own in (verdicts or {}).items()
+    }
+    answer = replace(answer, facts={**answer.facts, "stability": found})
+    falls = [
+        f"{name}, {own[-1]}"
+        for name, own in (verdicts or {}).items()
+        if own and own[-1].count(Verdict.FALLS)
+    ]
+    wrong = {"payload exceeded": over, OUTSIDE: [*map(str, outside)], "does not stand": falls}
     said = [f"seqopt: {name}: {'; '.join(each)}" for name, each in wrong.items() if each]
     if not options.strict or not said or answer.status is not Status.DONE:
         return answer

@@ -64,6 +64,10 @@ STEPS_USAGE = (
     "[SCENE] --method NAME [--out FILE] [other options]",
     "[SCENE] --plan FILE [--out FILE] [other options]",
 )
+STABILITY = {
+    "--no-stability": "do not prove which steps stand, dry and with epoxy (or the mortar of "
+    "--stands or --mortar): quicker"
+}
 CSV_OUT = {"--out FILE": "CSV file to write (default: standard output)"}
 
 
@@ -101,9 +105,15 @@ def engine_options(command: argparse.ArgumentParser) -> Takes:
     return takes
 
 
-def form_options(command: argparse.ArgumentParser, *, strict: bool = False) -> None:
-    """Add what says in which form the answer is printed, and whether ``--strict`` is taken."""
+def form_options(
+    command: argparse.ArgumentParser, *, strict: bool = False, builds: bool = False
+) -> None:
+    """Add what says in which form the answer is printed, and what is said of builds in it.
+
+    ``strict``, ``builds``: whether ``--strict`` is taken, and ``--no-stability``.
+    """
     takes = command.add_argument_group("what is printed")
+    declare(takes, STABILITY if builds or strict else {})
     declare(takes, STRICT if strict else {})
     forms = {
         "--quiet": "print errors and the paths of what is written, nothing else",

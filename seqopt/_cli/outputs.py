@@ -20,6 +20,7 @@ from seqopt.plan.plan import Plan
 from seqopt.report._pages import PAGE, plan_page
 from seqopt.report.comparison import Comparison
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
+from seqopt.stability._builds import BuildProver
 
 
 def figure_notes() -> tuple[str, ...]:
@@ -48,18 +49,17 @@ def comparison_files(result: Comparison) -> dict[str, bytes | str]:
 
 
 def plan_files(
-    plan: Plan, report: Mapping[str, object], trial: Trial | None = None
+    plan: Plan, report: Mapping[str, object], prover: BuildProver, trial: Trial | None = None
 ) -> dict[str, bytes | str]:
     """Return the tables of a plan, its summary, scene and page, by file name.
 
     The trial is of the plan in other scenarios.
     """
-    tables, stands = {"plan": plan.responses()}, list[str]()
+    tables = {"plan": plan.responses()}
     if not isinstance(plan.graph, States):
         tables["selection"] = plan.table()
     elif plan.graph.standing is not None:
         tables["stability"] = plan.stability()
-        stands = [str(verdict) for verdict in tables["stability"]["verdict"]]
     if isinstance(plan.graph, Layers):
         tables["responses"] = plan.alternatives()
     if rows := trace_rows(plan.trace):
@@ -70,7 +70,7 @@ def plan_files(
         **{f"{name}.csv": csv_text(table) for name, table in tables.items()},
         "summary.json": json.dumps(_plain(report), indent=2) + "\n",
         "scene.json": dump_scene(plan.engine.network.scene),
-        PAGE: plan_page(plan.engine, plan.title, tables["plan"], plan.result, stands),
+        PAGE: plan_page(plan.engine, plan.title, tables["plan"], plan.result, prover),
     }
 
 

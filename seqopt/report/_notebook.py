@@ -31,6 +31,7 @@ from seqopt.responses.table import OUTSIDE, REMEDY
 from seqopt.scene.boxes import boxes
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
+from seqopt.stability._builds import BuildProver
 from seqopt.stability.assessment import Stability, Verdict
 
 if TYPE_CHECKING:
@@ -189,6 +190,7 @@ def _build(value: ShownBuild) -> _Card:
         posed = value.states if isinstance(value.graph, States) else value.layers
         rows |= {"criterion": posed.criterion.name} if posed.criterion.name else {}
     rows |= {"result": value.result, "steps": len(value.steps), **(_worst(value) if small else {})}
+    rows |= _standing(value) if small else {"stability": "see verdicts: not computed here"}
     if value.seconds:
         rows["time to find it, s"] = f"{sum(value.seconds.values()):.3g}"
 
@@ -201,6 +203,12 @@ def _build(value: ShownBuild) -> _Card:
         return [*pictures, *([value.gantt(1, min(count, STEPS))] if small else [])]
 
     return _Card(f"Plan for {scene.name}", rows, draw)
+
+
+def _standing(value: ShownBuild) -> Rows:
+    """Return which steps stand, dry and with epoxy."""
+    (found,) = BuildProver(value.engine.network).of_builds({"": value.steps}).values()
+    return {f"stability, {each.how}": str(each).partition(": ")[2] for each in found}
 
 
 def _worst(value: ShownBuild) -> Rows:

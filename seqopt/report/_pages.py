@@ -30,6 +30,8 @@ from seqopt.responses.table import OUTSIDE, REMEDY, Departure, LinearRange, anal
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule_file import parse_plan, read_plan
+from seqopt.stability._builds import BuildProver, BuildVerdicts
+from seqopt.stability.assessment import Verdict
 
 WORDS = {
     "F_rob": "grip force, N",
@@ -47,7 +49,10 @@ Tables = Mapping[str, pd.DataFrame]
 
 
 def _builds(
-    scene: Scene, tables: Tables, departures: Mapping[str, Sequence[Departure]]
+    scene: Scene,
+    tables: Tables,
+    departures: Mapping[str, Sequence[Departure]],
+    verdicts: Mapping[str, Sequence[BuildVerdicts]],
 ) -> list[Build]:
     """Return builds by their tables, and a payload that all robots have, where forces exceed it."""
     payloads = {robot.payload for robot in scene.robots}
@@ -56,7 +61,8 @@ def _builds(
         over = len(payloads) == 1 and overloads(scene, table)
         bounds = {"F_largest": max(payloads)} if over else {}
         steps = parse_plan(scene, csv_text(table), name)
-        out.append(Build(name, steps, table, (), bounds, departures.get(name, ())))
+        stands = verdicts.get(name, ())
+        out.append(Build(name, steps, table, stands, bounds, departures.get(name, ())))
     return out
 
 
@@ -97,8 +103,25 @@ def _worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFra
         found[OVER] = [f"{len(steps):,} steps" if steps else "" for steps in over]
     if any(build.departures for build in builds):
         found[OUTSIDE] = ["yes" if build.departures else "" for build in builds]
+    found = found.join(_falls(builds))
     caption = _with_legend("Largest responses", found)
     return caption, found.rename(columns=WORDS).rename_axis("build").reset_index()
+
+
+def _falls(builds: Sequence[Build]) -> pd.DataFrame:
+    """Return how many steps of builds fall with every mortar, a row each; nothing if not asked."""
+    rows = {
+        build.name: {
+            f"steps that fall, {each.how}": each.count(Verdict.FALLS) for each in build.verdicts
+        }
+        for build in builds
+    }
+    return pd.DataFrame.from_dict(rows, orient="index")
+
+
+def _standing_said(build: Build) -> str:
+    """Return which steps of a build stand, as sentences; nothing if that was not asked."""
+    return "".join(f" {str(each)[:1].upper()}{str(each)[1:]}." for each in build.verdicts)
 
 
 def plan_page(  # a plan, what there is to say about it, and what is beside it
@@ -106,20 +129,22 @@ def plan_page(  # a plan, what there is to say about it, and what is beside it
     name: str,
     table: pd.DataFrame,
     said: str,
-    stands: Sequence[str] = (),
+    prover: BuildProver | None = None,
     *,
     others: Tables | None = None,
 ) -> str:
     """Return the page of a plan, beside others and, where the scene is small, fixed methods.
 
-    ``name`` is what found it, ``said`` what it is worth, and ``stands`` whether each step stands.
+    ``name`` is what found it, ``said`` what it is worth, and ``prover`` says which steps stand:
+    by default dry, and with epoxy.
     """
     scene = engine.network.scene
     tables = {name: table, **(others or {})}
     if len(scene.bricks) <= SMALL:
         tables |= {key: each for key, each in fixed_methods(engine).items() if key not in tables}
-    first, *rest = _builds(scene, tables, LinearRange(engine).of_builds(tables))
-    builds = [replace(first, stands=stands), *rest]
+    verdicts = (prover or BuildProver(engine.network)).of_tables(tables)
+    builds = _builds(scene, tables, LinearRange(engine).of_builds(tables), verdicts)
+    first = builds[0]
     robots = int(sum(table[f"{robot.name}_node"].notna().any() for robot in scene.robots))
     does = "1 robot builds" if robots == 1 else f"{robots} robots build"
     how = ""
@@ -138,7 +163,7 @@ def plan_page(  # a plan, what there is to say about it, and what is beside it
     most = ", ".join(f"{word.split(',')[0]} {shown[n]}" for n, word in WORDS.items())
     sentence = (
         f"{_outside(builds[:1])}{does} {scene.name} in {len(table):,} steps{how} ({name}: {said}). "
-        f"The largest of any step: {most}."
+        f"The largest of any step: {most}.{_standing_said(first)}"
     )
     return report_page(engine, builds, sentence, [_worst_table(scene, builds)])
 
@@ -146,11 +171,12 @@ def plan_page(  # a plan, what there is to say about it, and what is beside it
 def comparison_page(engine: Engine, result: Comparison) -> str:
     """Return the page of a comparison."""
     scene = engine.network.scene
-    builds = _builds(scene, result.tables, result.departures)
+    builds = _builds(scene, result.tables, result.departures, result.verdicts)
     marks = {"overloaded": OVER, "outside": OUTSIDE}
     marks = {name: said for name, said in marks.items() if result.table[name].any()}
     columns = ["problem", "objective", "gap", *WORDS, *marks, "models", "seconds"]
     shown = result.table[columns].replace({True: "yes", False: ""}).rename(columns=WORDS | marks)
+    shown = shown.join(_falls(builds))
     shown = shown.sort_values("problem", key=lambda each: ~each.isin(FIRST), kind="stable")
     shown = shown.rename_axis("method or formulation").reset_index()
     tables = [(_with_legend("Methods and formulations; a click shows the build", shown), shown)]
@@ -166,15 +192,15 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     return _page(engine, builds, sentence, tables, scatter)
 
 
-def folder_page(engine: Engine, folder: Path) -> str:
+def folder_page(engine: Engine, folder: Path, prover: BuildProver) -> str:
     """Return the page of the plans in a folder that a command has written."""
-    scene, builds = engine.network.scene, folder_builds(engine, folder)
+    scene, builds = engine.network.scene, folder_builds(engine, folder, prover)
     ways = f"{len(builds)} way{'s' * (len(builds) > 1)}"
     sentence = f"{scene.name}, built in {ways}, step by step"
     return _page(engine, builds, sentence, [_worst_table(scene, builds)])
 
 
-def folder_builds(engine: Engine, folder: Path) -> list[Build]:
+def folder_builds(engine: Engine, folder: Path, prover: BuildProver) -> list[Build]:
     """Return the plans in a folder that a command has written, analyzed."""
     scene = engine.network.scene
     paths = [path for name in PLANS for path in sorted(folder.glob(name))]
@@ -185,7 +211,8 @@ def folder_builds(engine: Engine, folder: Path) -> list[Build]:
         )
     plans = {path.stem.removeprefix("steps_"): read_plan(scene, path) for path in paths}
     tables = {name: analyze(engine, steps) for name, steps in plans.items()}
-    return _builds(scene, tables, LinearRange(engine).of_builds(tables))
+    found = prover.of_tables(tables)
+    return _builds(scene, tables, LinearRange(engine).of_builds(tables), found)
 
 
 def front_page(
@@ -193,21 +220,23 @@ def front_page(
     front: Front,
     plans: Sequence[pd.DataFrame],
     departures: Sequence[Sequence[Departure]],
+    verdicts: Sequence[Sequence[BuildVerdicts]],
 ) -> str:
-    """Return the page of a Pareto set: its points, and responses and departures of each plan."""
+    """Return the page of a Pareto set: its points, and what is known of each plan."""
     scene, table = engine.network.scene, shown_table(front.table)
     names = [f"point {number}" for number in range(1, len(plans) + 1)]
     builds = []
-    for name, own, plan, left in zip(names, front.engines, plans, departures, strict=True):
+    each = zip(names, front.engines, plans, departures, verdicts, strict=True)
+    for name, own, plan, left, stands in each:
         placed = own.network.scene
-        (build,) = _builds(placed, {name: plan}, {name: left})
+        (build,) = _builds(placed, {name: plan}, {name: left}, {name: stands})
         another = placed.build_order != scene.build_order
         builds.append(replace(build, order=placed.build_order) if another else build)
     words = {**WORDS, "F_largest": WORDS["F_rob"]}  # another name for the same
     points = table.rename(columns=words).set_axis(names)
     lengths = [name for name in points if str(name).endswith("1e-3 mm")]
     points = points.assign(**{str(name): 1e6 * points[name] for name in lengths})
-    shown = points.rename_axis("plan").reset_index()
+    shown = points.join(_falls(builds)).rename_axis("plan").reset_index()
     if any(departures):
         shown[OUTSIDE] = ["yes" if each else "" for each in departures]
     sentence = (

@@ -9,9 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from seqopt._files import csv_text
 from seqopt.arrays import Terse
-from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, SeqoptError, StepError
 from seqopt.graph.layers.costs import TINY
@@ -32,11 +30,11 @@ from seqopt.responses.resources import Resources
 from seqopt.responses.table import Departure, LinearRange, analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, FreeRules
-from seqopt.sequence.schedule_file import MOST, find_schedule, parse_plan
+from seqopt.sequence.schedule_file import MOST, find_schedule
 from seqopt.sequence.steps import AnyStep, idle_robots
 from seqopt.sequence.three_robots import modified_sequential
 from seqopt.sequence.two_robots import METHODS, degeneration
-from seqopt.stability._builds import BuildVerdicts, build_verdicts
+from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
 from seqopt.study.published import (
     IRREGULARITIES,
@@ -54,7 +52,6 @@ RANKS = ["pairs", "conditional", "short_sight", "change_of_objective"]
 MARKS, COST = ["overloaded", "outside"], ["models", "seconds", "solve_seconds"]
 COLUMNS = ["problem", "objective", "gap", *RANKS, *LARGEST, *MARKS, *COST]
 CLOSED = "no choice"  # the problem of a sequence without open grips
-SHOWN = {"dry": DRY, "epoxy": EPOXY}  # with which it is said what stands
 PATIENCE = 10.0  # s, after which the best plan so far is the row
 
 
@@ -117,12 +114,12 @@ class Comparison(Terse):
     verdicts: Mapping[str, tuple[BuildVerdicts, ...]]
 
 
-def compare(  # what is asked of all ways to build a scene
+def compare(
     engine: Engine,
     criterion: Criterion,
     progress: Tell = lambda _: None,
     robots: Sequence[str] = (),
-    mortars: Mapping[str, Mortar] = SHOWN,
+    prover: BuildProver | None = None,
 ) -> Comparison:
     """Analyze every method on an engine's scene and solve its usual loop by every formulation.
 
@@ -136,8 +133,8 @@ def compare(  # what is asked of all ways to build a scene
         Told how far it is, in a few words or as a `seqopt.work.Stage`.
     robots : sequence of str, optional
         Of those that take part, as many as a method needs; found from reach by default.
-    mortars : mapping of str to Mortar, optional
-        With which it is proven what stands, by what they are called; none leaves it out.
+    prover : BuildProver, optional
+        Says which steps stand; by default dry, and with epoxy.
 
     Returns
     -------
@@ -162,23 +159,20 @@ def compare(  # what is asked of all ways to build a scene
     if problem is not None:
         notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
-    builds = {name: parse_plan(scene, csv_text(each), name) for name, each in tables.items()}
-    verdicts = build_verdicts(engine.network, builds, mortars, progress)
+    verdicts = (prover or BuildProver(engine.network, progress=progress)).of_tables(tables)
     for name, found in verdicts.items():
         rows[name] |= {f"falls_{each.mortar}": each.count(Verdict.FALLS) for each in found}
-    table = _table(rows, left := LinearRange(engine).of_builds(tables), mortars)
+    table = _table(rows, left := LinearRange(engine).of_builds(tables))
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
     return Comparison(
         maxima, printed, table, tables, loop, tuple(notes), refusal, left, criteria, verdicts
     )
 
 
-def _table(
-    rows: dict[str, dict[str, object]], left: Iterable[str], mortars: Iterable[str]
-) -> pd.DataFrame:
+def _table(rows: dict[str, dict[str, object]], left: Iterable[str]) -> pd.DataFrame:
     """Return rows as a table, and which of them leave the linear range."""
-    columns = [*COLUMNS, *(f"falls_{mortar}" for mortar in mortars)]
-    table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=columns)
+    falls = [name for name in next(iter(rows.values())) if name.startswith("falls_")]
+    table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=[*COLUMNS, *falls])
     return table.astype(dict.fromkeys(RANKS, float)).assign(outside=table.index.isin([*left]))
 
 

@@ -34,6 +34,7 @@ from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Order, Scene
 from seqopt.scene.shape import normal_of
 from seqopt.sequence.steps import Step
+from seqopt.stability._builds import WORDS, BuildVerdicts
 
 LARGEST = 32767
 FIELDS = ("twist", "edge", "push", "turn")  # packed, a row for every step
@@ -53,15 +54,16 @@ LEFT_OUT = "Displacements and axial forces of some builds are left out"
 class Build:
     """A build that is shown step by step, with the responses of its steps.
 
-    ``stands`` says of every step whether it stands, where that was asked; ``bounds`` are limits by
-    column of the table, or ``F_largest``, that are drawn beside the responses; ``order`` names the
-    bricks as they are placed, where that is not the scene's own order.
+    ``verdicts`` say which steps stand, where that was asked, with the mortar of the scene last;
+    ``bounds`` are limits by column of the table, or ``F_largest``, that are drawn beside the
+    responses; ``order`` names the bricks as they are placed, where that is not the scene's own
+    order.
     """
 
     name: str
     steps: Sequence[Step]
     table: pd.DataFrame
-    stands: Sequence[str] = ()
+    verdicts: Sequence[BuildVerdicts] = ()
     bounds: Mapping[str, float] = field(default_factory=dict)
     departures: Sequence[Departure] = ()
     order: Order = ()
@@ -167,7 +169,7 @@ def _build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[st
         "name": build.name,
         "bounds": dict(build.bounds),
         "rank": [build.order.index(name) for name in own] if build.order else None,
-        "stands": list(build.stands),
+        "stands": _stands(build.verdicts),
         "marks": _marks(engine.network.scene, build),
         "steps": [
             {
@@ -192,8 +194,15 @@ def _marks(scene: Scene, build: Build) -> list[str]:
         said = [f"{each.robot} exceeds its payload" for each in over if step.number in each.steps]
         left = [each.what for each in build.departures if step.number in each.steps]
         said += [f"{OUTSIDE}: {', '.join(left)}"] if left else []
+        said += [f"falls {each.how}" for each in build.verdicts[-1:] if each.falls(step.number)]
         out.append("; ".join(said))
     return out
+
+
+def _stands(verdicts: Sequence[BuildVerdicts]) -> list[str]:
+    """Return whether every step stands with every mortar, in words; none if it was not asked."""
+    found = [[f"{WORDS[v]} {each.how}" for v in each.verdicts] for each in verdicts]
+    return [" and ".join(said) for said in zip(*found, strict=True)]
 
 
 def _fields(engine: Engine, build: Build) -> dict[str, Floats]:

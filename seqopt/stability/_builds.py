@@ -8,18 +8,25 @@ from itertools import chain, groupby
 from operator import attrgetter
 
 import numpy as np
+import pandas as pd
 
+from seqopt._files import csv_text
 from seqopt.contact.faces import step_assembly
-from seqopt.contact.mortar import Mortar
+from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.network.network import Network
+from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.steps import Grips, Step
 from seqopt.stability._screens import OPEN, STANDS, Screen
 from seqopt.stability._step_verdicts import each_verdict
 from seqopt.stability.assessment import Verdict, _first_to_fail
 from seqopt.work.progress import Tell, with_progress
 
+SHOWN = {"dry": DRY, "epoxy": EPOXY}  # with which it is said what stands
 SCREENED = 60  # bricks up to which a program for all grips at once is quickly solved
-_WORDS = {Verdict.FALLS: "fall", Verdict.UNDECIDED: "are undecided"}
+_State = tuple[int, Grips]  # bricks that stand, and nodes held
+_Found = Iterator[tuple[_State, Verdict]]
+WORDS = {Verdict.STANDS: "stands", Verdict.FALLS: "falls", Verdict.UNDECIDED: "is undecided"}
+_MANY = {Verdict.FALLS: "fall", Verdict.UNDECIDED: "are undecided"}
 
 
 @dataclass(frozen=True)
@@ -41,6 +48,15 @@ class BuildVerdicts:
         """Return how many steps have a verdict."""
         return self.verdicts.count(verdict)
 
+    def falls(self, number: int) -> bool:
+        """Return whether a step falls, by its number from 1."""
+        return self.verdicts[number - 1] is Verdict.FALLS
+
+    @property
+    def how(self) -> str:
+        """With what it stands or falls, in words."""
+        return self.mortar if self.mortar == "dry" else f"with {self.mortar}"
+
     def facts(self) -> dict[str, object]:
         """Return it as numbers and words, for scripts."""
         counts = {"falls": self.count(Verdict.FALLS), "undecided": self.count(Verdict.UNDECIDED)}
@@ -54,38 +70,61 @@ class BuildVerdicts:
 
     def __str__(self) -> str:
         steps = len(self.verdicts)
-        said = [f"{self.count(v)} of {steps} steps {w}" for v, w in _WORDS.items() if self.count(v)]
+        counts = [(self.count(verdict), verdict) for verdict in _MANY]
+        said = [f"{n} of {steps} steps {WORDS[v] if n == 1 else _MANY[v]}" for n, v in counts if n]
         first = f", first {self.first_said}" if self.first else ""
-        return f"{self.mortar}: {'; '.join(said) or 'every step stands'}{first}"
+        return f"{self.how}: {'; '.join(said) or 'every step stands'}{first}"
 
 
-def build_verdicts(
-    network: Network,
-    builds: Mapping[str, Sequence[Step]],
-    mortars: Mapping[str, Mortar],
-    progress: Tell | None = None,
-) -> dict[str, tuple[BuildVerdicts, ...]]:
-    """Return by build which steps stand with every mortar; equal partial structures are asked once.
+class BuildProver:
+    """Says which steps of builds stand; what was asked once is known.
 
-    ``network``: of the scene in the order in which all of the builds place bricks; ``mortars``: by
-    what they are called; without any, nothing is asked.
+    ``network``: of the scene in the order in which the builds place bricks; ``mortars``: by what
+    they are called, that of the scene last; without any, nothing is asked; ``progress``: told how
+    far it is.
     """
-    distinct = {_state(step): step for step in chain.from_iterable(builds.values())}
-    steps = sorted(distinct.values(), key=attrgetter("bricks"))
-    prove = _screened if len(network.inner) <= SCREENED else _one_by_one
-    out: dict[str, tuple[BuildVerdicts, ...]] = dict.fromkeys(builds, ())
-    for name, mortar in mortars.items():
-        answers = with_progress(f"proving what stands ({name})", steps, progress)
-        found = dict(prove(network, answers, mortar))
-        for build, own in builds.items():
-            verdicts = tuple(found[_state(step)] for step in own)
-            falls = [s for s, v in zip(own, verdicts, strict=True) if v is Verdict.FALLS][:1]
-            first = [(s.number, *_failing(network, s, mortar)) for s in falls]
-            out[build] += (BuildVerdicts(name, verdicts, *chain.from_iterable(first)),)
-    return out
 
+    def __init__(
+        self, network: Network, mortars: Mapping[str, Mortar] = SHOWN, progress: Tell | None = None
+    ) -> None:
+        self._network, self._mortars, self._progress = network, mortars, progress
+        self._known: dict[str, dict[_State, Verdict]] = {name: {} for name in mortars}
+        self._prove = _screened if len(network.inner) <= SCREENED else _one_by_one
 
-_Found = Iterator[tuple[tuple[int, Grips], Verdict]]
+    def of_tables(self, tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[BuildVerdicts, ...]]:
+        """Return the verdicts of builds by their tables of responses, one for every mortar."""
+        scene = self._network.scene
+        builds = {name: parse_plan(scene, csv_text(table), name) for name, table in tables.items()}
+        return self.of_builds(builds)
+
+    def of_builds(
+        self, builds: Mapping[str, Sequence[Step]]
+    ) -> dict[str, tuple[BuildVerdicts, ...]]:
+        """Return the same by their steps."""
+        return {
+            build: tuple(self._of_build(steps, name) for name in self._mortars)
+            for build, steps in builds.items()
+            if self._ask(chain.from_iterable(builds.values()))
+        }
+
+    def _ask(self, steps: Iterable[Step]) -> bool:
+        """Ask what is not known of steps yet; return whether anything is asked at all."""
+        distinct = {_state(step): step for step in steps}
+        for name, mortar in self._mortars.items():
+            known = self._known[name]
+            new = [step for state, step in distinct.items() if state not in known]
+            new.sort(key=attrgetter("bricks"))
+            asked = with_progress(f"proving what stands, {name}", new, self._progress)
+            known.update(self._prove(self._network, asked, mortar))
+        return bool(self._mortars)
+
+    def _of_build(self, steps: Sequence[Step], name: str) -> BuildVerdicts:
+        verdicts = tuple(self._known[name][_state(step)] for step in steps)
+        for step, verdict in zip(steps, verdicts, strict=True):
+            if verdict is Verdict.FALLS:
+                failing = _failing(self._network, step, self._mortars[name])
+                return BuildVerdicts(name, verdicts, step.number, *failing)
+        return BuildVerdicts(name, verdicts)
 
 
 def _one_by_one(network: Network, steps: Iterable[Step], mortar: Mortar) -> _Found:
@@ -119,5 +158,5 @@ def _failing(network: Network, step: Step, mortar: Mortar) -> tuple[str, str]:
     return _first_to_fail(step_assembly(network, step.bricks, step.grips), found.motion)
 
 
-def _state(step: Step) -> tuple[int, Grips]:
+def _state(step: Step) -> _State:
     return step.bricks, step.grips

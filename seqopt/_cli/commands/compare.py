@@ -14,6 +14,7 @@ import pandas as pd
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import (
     asked_engine,
+    asked_prover,
     asked_scene,
     exceeded,
     level_notes,
@@ -42,6 +43,8 @@ from seqopt.report.text import format_details
 from seqopt.responses.table import builds_in_words
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
+from seqopt.stability._builds import BuildVerdicts
+from seqopt.stability.assessment import Verdict
 from seqopt.study.published import PUBLISHED
 
 DESCRIPTION = (
@@ -61,6 +64,10 @@ WRITTEN = {
     "--details": "also show the largest force of each robot, every formulation under both "
     "objectives of ranks, and where the grips of the published plan rank",
 }
+ABOUT_STANDING = (
+    "Proven as rigid bricks whose joints may open and slide, robots within their payload. First: "
+    "the step that falls first, the brick that is fastest in it, and the joint that opens fastest."
+)
 NAME = 21  # columns of a name
 RESPONSES = {
     "F_rob": ("grip", "force, N", 15),
@@ -89,7 +96,8 @@ def run(options: argparse.Namespace) -> Answer:
     engine = asked_engine(options, build_network(scene))
     criterion = asked_criterion(options)
     require_out(options)
-    result = compare(engine, criterion, options.tell, parse_robots(options.robots))
+    prover = asked_prover(options, engine.network)
+    result = compare(engine, criterion, options.tell, parse_robots(options.robots), prover)
     about = {"scene": scene.name, "criteria": _criteria(result), **provenance(engine)}
     text, headings = _tell(result, scene, criterion)
     blocks = [text]
@@ -113,7 +121,8 @@ def run(options: argparse.Namespace) -> Answer:
         notes=(*level_notes(engine), *(figure_notes() if written else ())),
     )
     over = exceeded(scene, *result.tables.values())
-    return strictly(answer, options, over, builds_in_words(result.departures))
+    left = builds_in_words(result.departures)
+    return strictly(answer, options, over, left, result.verdicts)
 
 
 def _where(folder: Path) -> str:
@@ -175,6 +184,8 @@ def _tell(
     ]
     if comparison.loop is None:
         blocks.append([wrapped(f"Loop of robots: not possible here; {comparison.refusal}")])
+    if comparison.verdicts:
+        blocks.append(["Steps that fall", *_stands(comparison), "", wrapped(ABOUT_STANDING)])
     if comparison.table["objective"].notna().any():
         about = _about_choices(comparison, criterion)
         blocks.append(["How the grips were chosen", *_choices(comparison), "", about])
@@ -197,6 +208,31 @@ def _responses(comparison: Comparison) -> Iterator[str]:
             label = f"  {name}{f' +{more}' if more else ''}"
             row = "".join(_cells(comparison, str(name), rows.loc[name]))
             yield f"{label:{NAME}}{row}".rstrip()
+
+
+def _stands(comparison: Comparison) -> Iterator[str]:
+    """Yield the table of the steps that fall; rows with the same are one."""
+    first, *_ = comparison.verdicts.values()
+    heads = "".join(f"{each.mortar:>9}" for each in first)
+    yield f"{'':{NAME}}{'steps':>5}{heads}   first, {first[0].mortar}".rstrip()
+    for problem, rows in comparison.table.groupby("problem", sort=False):
+        yield _title_of(str(problem))
+        same: dict[object, list[str]] = {}
+        for name in map(str, rows.index):
+            same.setdefault(comparison.verdicts[name], []).append(name)
+        for name, *more in (sorted(names, key=_plainness) for names in same.values()):
+            label = f"  {name}{f' +{len(more)}' if more else ''}"
+            shown, *_ = found = comparison.verdicts[name]
+            counts = "".join(map(_falling, found))
+            where = f"step {shown.first}: brick {shown.brick}" if shown.first else ""
+            where += f", joint {shown.joint}" if shown.joint else ""
+            yield f"{label:{NAME}}{len(shown.verdicts):5}{counts}   {where}".rstrip()
+
+
+def _falling(found: BuildVerdicts) -> str:
+    """Return how many steps fall, and how many are undecided, in nine columns."""
+    undecided = found.count(Verdict.UNDECIDED)
+    return f"{found.count(Verdict.FALLS)}{f' ({undecided}?)' if undecided else ''}".rjust(9)
 
 
 def _plainness(name: str) -> tuple[bool, bool, str]:

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.asked import exceeded, idle_notes, level_notes, scene_facts, strictly
+from seqopt._cli.asked import asked_prover, exceeded, idle_notes, level_notes, scene_facts, strictly
 from seqopt._cli.options import (
     LIMIT,
     RULE,
@@ -36,6 +36,7 @@ from seqopt.problem.requirements import OWN
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.three_robots import SCHEDULES
+from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.study.published import paper_models
 from seqopt.work.progress import within
 
@@ -153,6 +154,7 @@ class _Found:
     asked: Asked
     plan: Plan
     assemble: float
+    prover: BuildProver
 
     @cached_property
     def trial(self) -> Trial | None:
@@ -162,11 +164,22 @@ class _Found:
         return judge_unseen(self.plan, self.asked.unseen)
 
     @cached_property
+    def verdicts(self) -> dict[str, tuple[BuildVerdicts, ...]]:
+        """Which steps of the plan stand."""
+        return self.prover.of_builds({self.plan.title: self.plan.steps})
+
+    @property
+    def own(self) -> tuple[BuildVerdicts, ...]:
+        """The same, by mortar alone."""
+        return self.verdicts.get(self.plan.title, ())
+
+    @cached_property
     def report(self) -> dict[str, object]:
         """The summary, and what the command adds to it."""
         out = self.plan.summary() | {
             "seconds": {"assemble": self.assemble, **self.plan.seconds},
             "models_paper_count": _paper_count(self.plan),
+            "stability": {each.mortar: each.facts() for each in self.own},
         }
         known, unseen = self.asked.known, self.asked.unseen
         if known is None or unseen is None:
@@ -188,8 +201,10 @@ def run(options: argparse.Namespace) -> Answer:
     assemble = time.perf_counter() - start
     tell = options.tell if formulation.on is On.STATES else within(options.tell, limit)
     plan = solve(asked.problem, formulation, time_limit=limit, progress=tell, **how)
-    found = _Found(asked, plan, assemble)
-    written = write_outputs(options, lambda: plan_files(plan, found.report, found.trial))
+    found = _Found(asked, plan, assemble, asked_prover(options, plan.engine.network))
+    written = write_outputs(
+        options, lambda: plan_files(plan, found.report, found.prover, found.trial)
+    )
     return _answer(options, found, written)
 
 
@@ -212,6 +227,7 @@ def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]
     stopped = plan.ended is End.INTERRUPTED
     over = () if stopped else exceeded(scene, table)
     lines = [f"{_said(found)}; {written_to(options.out)}"]
+    lines += [f"stability, {each}" for each in found.own]
     facts: dict[str, object] = {"scene": scene_facts(scene), "summary": found.report}
     if plan.order is not None:
         order = plan.order.selection.order
@@ -225,7 +241,7 @@ def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]
         failures=(INTERRUPTED,) if stopped else (),
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )
-    return strictly(answer, options, over, plan.departures)
+    return strictly(answer, options, over, plan.departures, found.verdicts)
 
 
 def _said(found: _Found) -> str:

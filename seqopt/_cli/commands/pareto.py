@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import pandas as pd
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import level_notes, marked, scene_facts
+from seqopt._cli.asked import asked_prover, level_notes, marked, scene_facts
 from seqopt._cli.options import (
     LIMIT,
     RULE,
@@ -35,6 +35,7 @@ from seqopt.responses.table import LinearRange, analyze, builds_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.three_robots import SCHEDULES
+from seqopt.stability.assessment import Verdict
 from seqopt.work.progress import with_progress, within
 
 FOUR = "F_largest,M_sup,T_max,D_max"
@@ -80,7 +81,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     choice = command.add_argument_group("which plan is picked, and when the search ends")
     declare(choice, CHOICE)
     declare(choice, SECONDS, default="inf", type=float)
-    form_options(command)
+    form_options(command, builds=True)
     declare(command.add_argument_group("with --schedule free"), RULE | STANDING)
     engine_options(command)
     command.set_defaults(criteria=None, crown=None)
@@ -136,6 +137,11 @@ def _front_files(
     departures = [
         ranges[own].departures(table) for own, table in zip(front.engines, tables, strict=True)
     ]
+    provers = {own: asked_prover(options, own.network) for own in {*front.engines}}
+    verdicts = [
+        provers[own].of_builds({"": steps}).get("", ())
+        for own, steps in zip(front.engines, front.steps, strict=True)
+    ]
     said = builds_in_words({f"point {k}": each for k, each in enumerate(departures, start=1)})
     posed = {
         "scene": engine.network.scene.name,
@@ -154,6 +160,8 @@ def _front_files(
     }
     numbered = shown_table(front.table)
     numbered.insert(0, "point", range(1, len(numbered) + 1))
+    for each in [*zip(*verdicts, strict=True)]:
+        numbered[f"falls_{each[0].mortar}"] = [found.count(Verdict.FALLS) for found in each]
     if said:
         numbered["outside_linear_range"] = ["yes" if each else "" for each in departures]
     orders = [own.network.scene.build_order for own in front.engines]
@@ -161,7 +169,7 @@ def _front_files(
         numbered["order"] = [",".join(map(str, order)) for order in orders]
     plans = [table.assign(point=number) for number, table in enumerate(tables, start=1)]
     return {
-        PAGE: front_page(engine, front, tables, departures),
+        PAGE: front_page(engine, front, tables, departures, verdicts),
         "pareto.csv": csv_text(numbered),
         "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
         **_picture(front, methods),

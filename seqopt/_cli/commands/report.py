@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import asked_engine, asked_scene, scene_facts
+from seqopt._cli.asked import asked_engine, asked_prover, asked_scene, scene_facts
 from seqopt._cli.options import declare, engine_options, form_options, scene_options
 from seqopt._cli.outputs import figure_notes, keep_apart
 from seqopt._files import require_folder, write_folder, write_text
@@ -39,7 +39,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     scene_options(basic)
     declare(basic, SHOWN)
     engine_options(command)
-    form_options(command)
+    form_options(command, builds=True)
 
 
 def run(options: argparse.Namespace) -> Answer:
@@ -56,12 +56,15 @@ def run(options: argparse.Namespace) -> Answer:
         written += () if figure_notes() else (options.figures,)
     options.tell("analyzing plans and writing the page")
     engine = asked_engine(options, build_network(scene))
-    write_text(path, folder_page(engine, options.folder))
+    prover = asked_prover(options, engine.network)
+    write_text(path, folder_page(engine, options.folder, prover))
     if options.figures in written:
         from seqopt.report.charts import plan_figures  # noqa: PLC0415  # needs an extra
 
         options.tell("drawing figures")
-        write_folder(options.figures, plan_figures(engine, folder_builds(engine, options.folder)))
+        write_folder(
+            options.figures, plan_figures(engine, folder_builds(engine, options.folder, prover))
+        )
     return Answer(
         facts={"scene": scene_facts(scene)},
         text=f"written to {' and '.join(map(str, written))}",
