@@ -1,0 +1,131 @@
+"""Which steps stand of builds that are shown, against the verdict of every step on its own."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt._cli.answer import Answer, Status
+from seqopt._cli.asked import strictly
+from seqopt._cli.main import main
+from seqopt.contact.faces import step_assembly
+from seqopt.report.comparison import compare
+from seqopt.report.page import Build, _build_data
+from seqopt.responses.table import analyze
+from seqopt.stability import _builds
+from seqopt.stability._builds import SHOWN, BuildProver, BuildVerdicts
+from seqopt.stability.assessment import Verdict, assess, verdict
+
+FLAT = "arch:span=2,rise=0.8,pattern=VLR"
+
+
+@pytest.fixture(scope="module")
+def flat():
+    return seqopt.build_network(seqopt.load_scene(FLAT))
+
+
+@pytest.fixture(scope="module")
+def builds(flat):
+    return {"sequential": seqopt.sequential(flat), "cantilever": seqopt.cantilever(flat)}
+
+
+@pytest.fixture(scope="module")
+def found(flat, builds):
+    return BuildProver(flat).of_builds(builds)
+
+
+def test_they_are_those_of_every_step_on_its_own(flat, builds, found):
+    for name, steps in builds.items():
+        for each, (mortar, held) in zip(found[name], SHOWN.items(), strict=True):
+            assert each.mortar == mortar
+            for step, said in [*zip(steps, each.verdicts, strict=True)][::4]:
+                assert verdict(step_assembly(flat, step.bricks, step.grips), held) is said
+    counts = {name: [each.count(Verdict.FALLS) for each in found[name]] for name in builds}
+    assert counts == {"sequential": [18, 0], "cantilever": [20, 0]}
+
+
+@pytest.mark.parametrize("how", ["one by one", "left open"])
+def test_every_way_says_the_same(flat, builds, found, monkeypatch, how):
+    if how == "one by one":
+        monkeypatch.setattr(_builds, "SCREENED", 0)
+    else:
+        nothing = lambda self, bricks, held, payload: np.zeros(len(held), np.int8)  # noqa: E731
+        monkeypatch.setattr(_builds.Screen, "stands", nothing)
+    assert BuildProver(flat).of_builds(builds) == found
+
+
+def test_what_fails_first_is_what_the_first_fallen_step_says(flat, builds, found):
+    for name, steps in builds.items():
+        dry = found[name][0]
+        step = steps[dry.first - 1]
+        said = assess(step_assembly(flat, step.bricks, step.grips), SHOWN["dry"])
+        assert Verdict.FALLS not in dry.verdicts[: dry.first - 1]
+        assert (dry.brick, dry.joint) == (said.first_block, said.first_contact)
+
+
+def test_equal_structures_are_asked_once(flat, builds, found, monkeypatch):
+    prover = BuildProver(flat)
+    prover.of_builds(builds)
+    monkeypatch.setattr(_builds.Screen, "stands", None)
+    assert prover.of_builds(builds) == found
+
+
+def test_words_count_what_falls_and_what_is_open():
+    falls, open_ = Verdict.FALLS, Verdict.UNDECIDED
+    assert str(BuildVerdicts("dry", (Verdict.STANDS,) * 2)) == "dry: every step stands"
+    first = BuildVerdicts("epoxy", (falls, falls, open_), 1, "3", "2-3")
+    wanted = "with epoxy: 2 of 3 steps fall; 1 of 3 steps is undecided, first step 1 "
+    assert str(first) == f"{wanted}(brick 3, joint 2-3)"
+
+
+def test_a_step_that_falls_with_the_own_mortar_is_marked(flat, builds):
+    engine, steps = seqopt.make_engine("compliance", flat), builds["cantilever"]
+    table = analyze(engine, steps)
+    for mortars, marked in (({"dry": SHOWN["dry"]}, True), (SHOWN, False), ({}, False)):
+        stands = BuildProver(flat, mortars).of_tables({"a": table}).get("a", ())
+        data = _build_data(engine, Build("a", steps, table, stands), fields=False)
+        assert ("falls dry" in data["marks"][3]) == marked
+        assert len(data["stands"]) == len(steps) * bool(mortars)
+    assert data["stands"] == []
+
+
+def test_a_comparison_counts_them():
+    engine = seqopt.make_engine("compliance", seqopt.load_scene("chain:bricks=7"))
+    result = compare(engine, seqopt.CRITERIA["worst-ratio"])
+    assert (result.table["falls_dry"] > 0).any()
+    assert (result.table["falls_epoxy"] == 0).all()
+    bare = compare(engine, seqopt.CRITERIA["worst-ratio"], prover=BuildProver(engine.network, {}))
+    assert not bare.verdicts
+    assert "falls_dry" not in bare.table
+
+
+@pytest.mark.parametrize(
+    ("words", "falls"),
+    [
+        ((), {"dry": True, "epoxy": False}),
+        (("--stands", "bond=2e4", "--friction", "0.7"), {"dry": True, "bond=2e4": False}),
+        (("--stands", "dry"), {"dry": False}),
+        (("--no-stability",), {}),
+    ],
+)
+def test_the_command_line_says_it(capsys, words, falls):
+    asked = ["optimize", "chain:bricks=7", "--schedule", "free", "--json", "--strict", *words]
+    assert main(asked) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert {n: each["falls"] > 0 for n, each in answer["summary"]["stability"].items()} == falls
+
+
+@pytest.mark.parametrize("strict", [False, True])
+def test_a_plan_that_falls_does_not_hold_strictly(strict):
+    dry = BuildVerdicts("dry", (Verdict.FALLS,), 1, "3", "2-3")
+    bonded = BuildVerdicts("epoxy", (Verdict.STANDS,))
+    for last, wrong in ((bonded, False), (dry, True)):
+        answer = strictly(Answer({}), Namespace(strict=strict), (), (), {"a": (dry, last)})
+        assert (answer.status is Status.DOES_NOT_HOLD) == (wrong and strict)
+        assert any("does not stand: a, dry: 1 of 1" in each for each in answer.failures) == (
+            wrong and strict
+        )
