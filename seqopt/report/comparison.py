@@ -151,29 +151,34 @@ def compare(
     loop = None if problem is None else _facts(problem, rows, robots)
     own = _free_criterion(criterion, [largest(scene, tables[str(name)]) for name in maxima])
     free, refused = _free_plan(engine, own, robots, progress)
-    notes += refused
-    criteria = {} if problem is None else {problem.schedule.method: problem.criterion}
+    notes, criteria = notes + refused, dict[str, Criterion]()
     if free is not None:
         tables[FREE], rows[FREE] = free.responses(), _free_row(free)
         criteria[FREE] = free.states.criterion
     if problem is not None:
+        criteria = {problem.schedule.method: problem.criterion, **criteria}
         notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
     verdicts = (prover or BuildProver(engine.network, progress=progress)).of_tables(tables)
-    for name, found in verdicts.items():
-        rows[name] |= {f"falls_{each.mortar}": each.count(Verdict.FALLS) for each in found}
-    table = _table(rows, left := LinearRange(engine).of_builds(tables))
+    table = _table(rows, left := LinearRange(engine).of_builds(tables), verdicts)
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
-    return Comparison(
-        maxima, printed, table, tables, loop, tuple(notes), refusal, left, criteria, verdicts
-    )
+    found = (maxima, printed, table, tables, loop, tuple(notes), refusal)
+    return Comparison(*found, left, criteria, verdicts)
 
 
-def _table(rows: dict[str, dict[str, object]], left: Iterable[str]) -> pd.DataFrame:
-    """Return rows as a table, and which of them leave the linear range."""
-    falls = [name for name in next(iter(rows.values())) if name.startswith("falls_")]
-    table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=[*COLUMNS, *falls])
-    return table.astype(dict.fromkeys(RANKS, float)).assign(outside=table.index.isin([*left]))
+def _table(
+    rows: dict[str, dict[str, object]],
+    left: Iterable[str],
+    verdicts: Mapping[str, Sequence[BuildVerdicts]],
+) -> pd.DataFrame:
+    """Return rows as a table, which of them leave the linear range, and how many steps fall."""
+    table = pd.DataFrame.from_dict(rows, orient="index").reindex(columns=COLUMNS)
+    falls = {
+        name: {f"falls_{each.mortar}": each.count(Verdict.FALLS) for each in found}
+        for name, found in verdicts.items()
+    }
+    table = table.astype(dict.fromkeys(RANKS, float)).assign(outside=table.index.isin([*left]))
+    return table.join(pd.DataFrame.from_dict(falls, orient="index"))
 
 
 def _add_largest(
