@@ -120,6 +120,11 @@ def asked_prover(options: argparse.Namespace, network: Network) -> BuildProver:
     return BuildProver(network, {} if options.no_stability else shown, options.tell)
 
 
+def refused(prover: BuildProver) -> tuple[str, ...]:
+    """Return why it is not said which steps stand, if it is not known."""
+    return (f"stability: not proven; {prover.refusal}",) if prover.refusal else ()
+
+
 def marked(answer: Answer, outside: Sequence[object]) -> Answer:
     """Return an answer that begins with how results leave the linear range, and what to do."""
     left = [str(departure) for departure in outside]
@@ -145,15 +150,12 @@ def strictly(
     """
     answer = marked(answer, outside)
     answer = replace(answer, facts={**answer.facts, "payloads_exceeded": list(over)})
-    found = {
-        name: {each.mortar: each.facts() for each in own} for name, own in (verdicts or {}).items()
-    }
-    answer = replace(answer, facts={**answer.facts, "stability": found})
-    falls = [
-        f"{name}, {own[-1]}"
-        for name, own in (verdicts or {}).items()
-        if own and own[-1].count(Verdict.FALLS)
-    ]
+    falls = []
+    if verdicts is not None:
+        found = {n: {each.mortar: each.facts() for each in own} for n, own in verdicts.items()}
+        answer = replace(answer, facts={**answer.facts, "stability": found})
+        last = {name: own[-1] for name, own in verdicts.items()}
+        falls = [f"{name}, {own}" for name, own in last.items() if own.count(Verdict.FALLS)]
     wrong = {"payload exceeded": over, OUTSIDE: [*map(str, outside)], "does not stand": falls}
     said = [f"seqopt: {name}: {'; '.join(each)}" for name, each in wrong.items() if each]
     if not options.strict or not said or answer.status is not Status.DONE:

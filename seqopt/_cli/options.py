@@ -113,7 +113,7 @@ def form_options(
     ``strict``, ``builds``: whether ``--strict`` is taken, and ``--no-stability``.
     """
     takes = command.add_argument_group("what is printed")
-    declare(takes, STABILITY if builds or strict else {})
+    declare(takes, STABILITY if builds else {})
     declare(takes, STRICT if strict else {})
     forms = {
         "--quiet": "print errors and the paths of what is written, nothing else",

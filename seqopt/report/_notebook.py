@@ -207,8 +207,10 @@ def _build(value: ShownBuild) -> _Card:
 
 def _standing(value: ShownBuild) -> Rows:
     """Return which steps stand, dry and with epoxy."""
-    (found,) = BuildProver(value.engine.network).of_builds({"": value.steps}).values()
-    return {f"stability, {each.how}": str(each).partition(": ")[2] for each in found}
+    prover = BuildProver(value.engine.network)
+    found = prover.of_builds({"": value.steps}).get("", ())
+    said = {f"stability, {each.how}": str(each).partition(": ")[2] for each in found}
+    return said or {"stability": f"not proven; {prover.refusal}"}
 
 
 def _worst(value: ShownBuild) -> Rows:

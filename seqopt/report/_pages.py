@@ -30,7 +30,7 @@ from seqopt.responses.table import OUTSIDE, REMEDY, Departure, LinearRange, anal
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule_file import parse_plan, read_plan
-from seqopt.stability._builds import BuildProver, BuildVerdicts
+from seqopt.stability._builds import SHOWN, BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
 
 WORDS = {
@@ -136,13 +136,15 @@ def plan_page(  # a plan, what there is to say about it, and what is beside it
     """Return the page of a plan, beside others and, where the scene is small, fixed methods.
 
     ``name`` is what found it, ``said`` what it is worth, and ``prover`` says which steps stand:
-    by default dry, and with epoxy.
+    by default dry, and with epoxy, where the scene is small.
     """
     scene = engine.network.scene
     tables = {name: table, **(others or {})}
     if len(scene.bricks) <= SMALL:
         tables |= {key: each for key, each in fixed_methods(engine).items() if key not in tables}
-    verdicts = (prover or BuildProver(engine.network)).of_tables(tables)
+    small = len(scene.bricks) <= SMALL
+    prover = prover or BuildProver(engine.network, SHOWN if small else {})
+    verdicts = prover.of_tables(tables)
     builds = _builds(scene, tables, LinearRange(engine).of_builds(tables), verdicts)
     first = builds[0]
     robots = int(sum(table[f"{robot.name}_node"].notna().any() for robot in scene.robots))

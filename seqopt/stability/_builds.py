@@ -13,6 +13,7 @@ import pandas as pd
 from seqopt._files import csv_text
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
+from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.steps import Grips, Step
@@ -81,7 +82,7 @@ class BuildProver:
 
     ``network``: of the scene in the order in which the builds place bricks; ``mortars``: by what
     they are called, that of the scene last; without any, nothing is asked; ``progress``: told how
-    far it is.
+    far it is; ``refusal``: why nothing can be said, where bricks do not touch; empty otherwise.
     """
 
     def __init__(
@@ -90,6 +91,7 @@ class BuildProver:
         self._network, self._mortars, self._progress = network, mortars, progress
         self._known: dict[str, dict[_State, Verdict]] = {name: {} for name in mortars}
         self._prove = _screened if len(network.inner) <= SCREENED else _one_by_one
+        self.refusal = ""
 
     def of_tables(self, tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[BuildVerdicts, ...]]:
         """Return the verdicts of builds by their tables of responses, one for every mortar."""
@@ -109,14 +111,22 @@ class BuildProver:
 
     def _ask(self, steps: Iterable[Step]) -> bool:
         """Ask what is not known of steps yet; return whether anything is asked at all."""
-        distinct = {_state(step): step for step in steps}
+        if self.refusal:
+            return False
+        try:
+            self._ask_all({_state(step): step for step in steps})
+        except SceneError as error:
+            self.refusal = str(error)
+            return False
+        return bool(self._mortars)
+
+    def _ask_all(self, distinct: Mapping[_State, Step]) -> None:
         for name, mortar in self._mortars.items():
             known = self._known[name]
             new = [step for state, step in distinct.items() if state not in known]
             new.sort(key=attrgetter("bricks"))
             asked = with_progress(f"proving what stands, {name}", new, self._progress)
             known.update(self._prove(self._network, asked, mortar))
-        return bool(self._mortars)
 
     def _of_build(self, steps: Sequence[Step], name: str) -> BuildVerdicts:
         verdicts = tuple(self._known[name][_state(step)] for step in steps)

@@ -18,6 +18,7 @@ from seqopt._cli.asked import (
     asked_scene,
     exceeded,
     level_notes,
+    refused,
     scene_facts,
     strictly,
 )
@@ -87,7 +88,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     declare(basic, WRITTEN)
     criterion_options(command)
     engine_options(command)
-    form_options(command, strict=True)
+    form_options(command, strict=True, builds=True)
 
 
 def run(options: argparse.Namespace) -> Answer:
@@ -118,7 +119,7 @@ def run(options: argparse.Namespace) -> Answer:
         text="\n\n".join(blocks),
         headings=headings,
         written=written,
-        notes=(*level_notes(engine), *(figure_notes() if written else ())),
+        notes=(*level_notes(engine), *refused(prover), *(figure_notes() if written else ())),
     )
     over = exceeded(scene, *result.tables.values())
     left = builds_in_words(result.departures)

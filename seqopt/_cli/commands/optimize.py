@@ -9,7 +9,15 @@ from functools import cached_property
 from typing import Any
 
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.asked import asked_prover, exceeded, idle_notes, level_notes, scene_facts, strictly
+from seqopt._cli.asked import (
+    asked_prover,
+    exceeded,
+    idle_notes,
+    level_notes,
+    refused,
+    scene_facts,
+    strictly,
+)
 from seqopt._cli.options import (
     LIMIT,
     RULE,
@@ -113,7 +121,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``optimize``, those of a first use before those of an expert."""
     _basic(command)
     declare(command.add_argument_group("what is allowed"), LIMIT | BUDGET)
-    form_options(command, strict=True)
+    form_options(command, strict=True, builds=True)
     states = "what plans are compared by, state after state, with any schedule"
     declare(command.add_argument_group(states), AIM | STANDING)
     declare(command.add_argument_group("with --schedule free"), RULE)
@@ -166,7 +174,11 @@ class _Found:
     @cached_property
     def verdicts(self) -> dict[str, tuple[BuildVerdicts, ...]]:
         """Which steps of the plan stand."""
-        return self.prover.of_builds({self.plan.title: self.plan.steps})
+        try:
+            return self.prover.of_builds({self.plan.title: self.plan.steps})
+        except KeyboardInterrupt:  # the plan is there, and is not lost
+            self.prover.refusal = "interrupted"
+            return {}
 
     @property
     def own(self) -> tuple[BuildVerdicts, ...]:
@@ -237,7 +249,11 @@ def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]
         facts={**facts, "plan": table},
         text="\n".join([*lines, *(f"payload exceeded: {excess}" for excess in over)]),
         written=written,
-        notes=(*_posed_notes(found.asked.problem), *idle_notes(scene, plan.steps)),
+        notes=(
+            *_posed_notes(found.asked.problem),
+            *idle_notes(scene, plan.steps),
+            *refused(found.prover),
+        ),
         failures=(INTERRUPTED,) if stopped else (),
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import pandas as pd
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import asked_prover, level_notes, marked, scene_facts
+from seqopt._cli.asked import asked_prover, level_notes, marked, refused, scene_facts
 from seqopt._cli.options import (
     LIMIT,
     RULE,
@@ -23,6 +23,7 @@ from seqopt._cli.outputs import figure_notes, write_outputs, written_to
 from seqopt._cli.posing import asked_problem
 from seqopt._cli.values import parse_numbers
 from seqopt._files import csv_text, require_folder
+from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.graph.states.states import States
@@ -35,6 +36,7 @@ from seqopt.responses.table import LinearRange, analyze, builds_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.three_robots import SCHEDULES
+from seqopt.stability._builds import BuildProver
 from seqopt.stability.assessment import Verdict
 from seqopt.work.progress import with_progress, within
 
@@ -98,7 +100,8 @@ def run(options: argparse.Namespace) -> Answer:
         asked.problem, rounding=rounding, seconds=seconds, progress=within(options.tell, seconds)
     )
     methods = fixed_methods(free.engine)
-    files, left = _front_files(front, free, methods, options)
+    provers = {own: asked_prover(options, own.network) for own in {*front.engines}}
+    files, left = _front_files(front, free, methods, provers, options)
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
     if options.pick:
@@ -120,13 +123,17 @@ def run(options: argparse.Namespace) -> Answer:
         },
         text=f"{said}; {written_to(options.out)}",
         written=(options.out,),
-        notes=(*level_notes(free.engine), *figure_notes()),
+        notes=(*level_notes(free.engine), *refused(next(iter(provers.values()))), *figure_notes()),
     )
     return marked(answer, left)
 
 
 def _front_files(
-    front: Front, free: States, methods: Mapping[str, pd.DataFrame], options: argparse.Namespace
+    front: Front,
+    free: States,
+    methods: Mapping[str, pd.DataFrame],
+    provers: Mapping[Engine, BuildProver],
+    options: argparse.Namespace,
 ) -> tuple[dict[str, bytes | str], tuple[str, ...]]:
     """Return the files of a Pareto set by name, and which points leave the linear range."""
     engine, tell = free.engine, options.tell
@@ -135,13 +142,9 @@ def _front_files(
     tell("drawing and writing the page")
     ranges = {own: LinearRange(own) for own in {*front.engines}}
     departures = [
-        ranges[own].departures(table) for own, table in zip(front.engines, tables, strict=True)
+        ranges[own].departures(table) for (own, _), table in zip(ways, tables, strict=True)
     ]
-    provers = {own: asked_prover(options, own.network) for own in {*front.engines}}
-    verdicts = [
-        provers[own].of_builds({"": steps}).get("", ())
-        for own, steps in zip(front.engines, front.steps, strict=True)
-    ]
+    verdicts = [provers[own].of_builds({"": steps}).get("", ()) for own, steps in ways]
     said = builds_in_words({f"point {k}": each for k, each in enumerate(departures, start=1)})
     posed = {
         "scene": engine.network.scene.name,
