@@ -111,9 +111,7 @@ def _worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFra
 def _falls(builds: Sequence[Build]) -> pd.DataFrame:
     """Return how many steps of builds fall with every mortar, a row each; nothing if not asked."""
     rows = {
-        build.name: {
-            f"steps that fall, {each.how}": each.count(Verdict.FALLS) for each in build.verdicts
-        }
+        build.name: {f"fall {each.how}": each.count(Verdict.FALLS) for each in build.verdicts}
         for build in builds
     }
     return pd.DataFrame.from_dict(rows, orient="index")

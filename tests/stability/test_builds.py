@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from argparse import Namespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from seqopt.contact.faces import step_assembly
 from seqopt.report.comparison import compare
 from seqopt.report.page import Build, _build_data
 from seqopt.responses.table import analyze
+from seqopt.scene.scene_file import dump_scene
 from seqopt.stability import _builds
 from seqopt.stability._builds import SHOWN, BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict, assess, verdict
@@ -65,6 +67,22 @@ def test_what_fails_first_is_what_the_first_fallen_step_says(flat, builds, found
         said = assess(step_assembly(flat, step.bricks, step.grips), SHOWN["dry"])
         assert Verdict.FALLS not in dry.verdicts[: dry.first - 1]
         assert (dry.brick, dry.joint) == (said.first_block, said.first_contact)
+
+
+def test_what_is_not_known_has_a_reason(arch25, tmp_path, capsys):
+    narrow = tuple(replace(brick, dimensions=(0.246, 0.09, 0.053)) for brick in arch25.bricks)
+    scene = replace(arch25, bricks=narrow)  # those across are 26 mm apart
+    network = seqopt.build_network(scene)
+    prover = BuildProver(network)
+    assert prover.of_builds({"a": seqopt.sequential(network)}) == {}
+    assert "mm between its faces" in prover.refusal
+    (path := tmp_path / "apart.json").write_text(dump_scene(scene), encoding="utf-8")
+    out = tmp_path / "out"
+    assert main(["optimize", str(path), "--schedule", "free", "--out", str(out)]) == 0
+    said = capsys.readouterr()
+    assert "stability: not proven; " in said.err
+    assert "stability" not in said.out
+    assert (out / "report.html").exists()
 
 
 def test_equal_structures_are_asked_once(flat, builds, found, monkeypatch):
