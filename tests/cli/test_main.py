@@ -191,7 +191,7 @@ def test_optimize(capsys, tmp_path):
     folder = tmp_path / "new" / "out"
     arguments = ("optimize", "--formulation", "overlap_dp", "--out", str(folder))
     status, out, _ = run(capsys, *arguments)
-    assert (status, out.count("\n")) == (0, 1)
+    assert (status, out.count("\n")) == (0, 3)
     report = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert report["status"] == "optimal"
     assert report["gap"] == pytest.approx(0)
