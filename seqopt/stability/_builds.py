@@ -30,7 +30,7 @@ WORDS = {Verdict.STANDS: "stands", Verdict.FALLS: "falls", Verdict.UNDECIDED: "i
 _MANY = {Verdict.FALLS: "fall", Verdict.UNDECIDED: "are undecided"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BuildVerdicts:
     """Which steps of a build stand with a mortar, and what fails first where one falls.
 
@@ -68,6 +68,9 @@ class BuildVerdicts:
         """What fails first, in words; empty if nothing does."""
         joint = f", joint {self.joint}" if self.joint else ""
         return f"step {self.first} (brick {self.brick}{joint})" if self.first else ""
+
+    def __repr__(self) -> str:
+        return f"<BuildVerdicts: {self}>"
 
     def __str__(self) -> str:
         steps = len(self.verdicts)
