@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain, groupby
 from operator import attrgetter
 
@@ -26,6 +27,7 @@ SHOWN = {"dry": DRY, "epoxy": EPOXY}  # with which it is said what stands
 SCREENED = 60  # bricks up to which a program for all grips at once is quickly solved
 _State = tuple[int, Grips]  # bricks that stand, and nodes held
 _Found = Iterator[tuple[_State, Verdict]]
+_Told = Callable[[], Iterator[Step]]  # steps, told as they are asked
 WORDS = {Verdict.STANDS: "stands", Verdict.FALLS: "falls", Verdict.UNDECIDED: "is undecided"}
 _MANY = {Verdict.FALLS: "fall", Verdict.UNDECIDED: "are undecided"}
 
@@ -128,8 +130,9 @@ class BuildProver:
             known = self._known[name]
             new = [step for state, step in distinct.items() if state not in known]
             new.sort(key=attrgetter("bricks"))
-            asked = with_progress(f"proving what stands, {name}", new, self._progress)
-            known.update(self._prove(self._network, asked, mortar))
+            what = f"proving what stands, {name}"
+            tell = partial(with_progress, what, new, self._progress)
+            known.update(self._prove(self._network, new, mortar, tell))
 
     def _of_build(self, steps: Sequence[Step], name: str) -> BuildVerdicts:
         verdicts = tuple(self._known[name][_state(step)] for step in steps)
@@ -140,19 +143,21 @@ class BuildProver:
         return BuildVerdicts(name, verdicts)
 
 
-def _one_by_one(network: Network, steps: Iterable[Step], mortar: Mortar) -> _Found:
+def _one_by_one(
+    network: Network, steps: Sequence[Step], mortar: Mortar, tell: _Told | None = None
+) -> _Found:
     """Yield the verdicts of partial structures, by what was found for those before."""
-    asked = [*steps]
-    for step, found in zip(asked, each_verdict(network, asked, mortar), strict=True):
+    told = steps if tell is None else tell()
+    for step, found in zip(told, each_verdict(network, steps, mortar), strict=True):
         yield _state(step), found.verdict
 
 
-def _screened(network: Network, steps: Iterable[Step], mortar: Mortar) -> _Found:
+def _screened(network: Network, _: Sequence[Step], mortar: Mortar, tell: _Told) -> _Found:
     """Yield the same, many grip sets at a time; what is left open is asked one by one."""
     screen, scene = Screen(network, mortar), network.scene
     place = {node: i for i, node in enumerate((n for b in scene.placed for n in b.nodes), 1)}
     payload = np.array([robot.payload for robot in scene.robots])
-    for bricks, same in groupby(steps, attrgetter("bricks")):
+    for bricks, same in groupby(tell(), attrgetter("bricks")):
         part = [*same]
         held = np.array([[place[n] if n is not None else 0 for n in s.grips] for s in part])
         found = screen.stands(bricks, held, payload)

@@ -85,6 +85,16 @@ def test_what_is_not_known_has_a_reason(arch25, tmp_path, capsys):
     assert (out / "report.html").exists()
 
 
+@pytest.mark.parametrize("most", [0, 60])
+def test_progress_is_told_as_verdicts_are_found(flat, builds, monkeypatch, most):
+    monkeypatch.setattr(_builds, "SCREENED", most)
+    known = []
+    prover = BuildProver(flat, SHOWN, lambda _: known.append(len(prover._known["dry"])))
+    prover.of_builds(builds)
+    assert known[0] == 0
+    assert len(set(known)) > 10  # not told all at once, before the first is found
+
+
 def test_equal_structures_are_asked_once(flat, builds, found, monkeypatch):
     prover = BuildProver(flat)
     prover.of_builds(builds)
