@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, fields, replace
@@ -316,7 +317,7 @@ class NamedEngine:
         return f"<{type(self).__name__} of {scene.name}: {len(scene.bricks)} bricks>"
 
 
-class SerialEngine(NamedEngine):
+class SerialEngine(NamedEngine, ABC):
     """Base of engines that solve grip sets one after the other, each from scratch.
 
     All fields are evaluated whatever is asked: the solution dominates the cost.
@@ -330,6 +331,6 @@ class SerialEngine(NamedEngine):
         answer = join_sets([none, *self._answers(bricks, columns)])
         return require_finite(answer, bricks, grips)
 
+    @abstractmethod
     def _answers(self, bricks: int, columns: Ints) -> Iterable[Fields]:
         """Return the fields of every grip set by itself."""
-        raise NotImplementedError
