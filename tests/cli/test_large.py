@@ -126,7 +126,7 @@ def test_a_run_under_a_memory_limit_ends_in_a_line(tmp_path, workers):
     save_scene(small_arch(45), scene)
     words = [*WORDS, "overlap_dp", scene, "--workers", workers]
     statuses = set()
-    for mebibytes in (60, 200, 300, 340, 370, 400, 420, 800):
+    for mebibytes in (60, 200, 300, 340, 370, 400, 420, 800, 4096):
         limit = (mebibytes * 2**20,) * 2
         out = tmp_path / str(mebibytes)
         limited = partial(resource.setrlimit, resource.RLIMIT_AS, limit)
