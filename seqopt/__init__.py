@@ -50,7 +50,8 @@ _HOMES = {
     "plan.build": ("GivenSequence",),
     "plan.judge.certificate": ("Certificate",),
     "contact.mortar": ("DRY", "EPOXY"),
-    "stability.assessment": ("assess_steps", "Stability"),
+    "stability.assessment": ("Stability",),
+    "stability.steps": ("assess_steps",),
     "errors": ("SeqoptError",),
 }  # in the order in which they are met; type checkers read them in __init__.pyi
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}

@@ -34,7 +34,7 @@ from seqopt.sequence.three_robots import three_robot_loop as three_robot_loop
 from seqopt.sequence.two_robots import cantilever as cantilever
 from seqopt.sequence.two_robots import sequential as sequential
 from seqopt.stability.assessment import Stability as Stability
-from seqopt.stability.assessment import assess_steps as assess_steps
+from seqopt.stability.steps import assess_steps as assess_steps
 from seqopt.study.published import CRITERIA as CRITERIA
 from seqopt.workflow import optimize as optimize
 

@@ -32,7 +32,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.report._style import BLUE, GRAY, VERMILION, plain, styled
 from seqopt.sequence.two_robots import METHODS
-from seqopt.stability.assessment import Verdict, assess_steps
+from seqopt.stability.assessment import Verdict
+from seqopt.stability.steps import assess_steps
 
 RESTS, GOES, NEITHER = "rests", "goes", "neither"
 SHOWN: dict[str, dict[str, Any]] = {

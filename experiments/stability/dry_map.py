@@ -59,7 +59,8 @@ from seqopt.responses.table import analyze, force_column
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability._prover import Prover
 from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen
-from seqopt.stability.assessment import Verdict, _verdict_of, assess_steps, bonded, stability_table
+from seqopt.stability.assessment import MARGINS, Verdict, _verdict_of, bonded
+from seqopt.stability.steps import assess_steps, stability_table
 
 BRICKS, THICKNESSES = (7, 10, 13, 16), (0.03, 0.053, 0.116)  # m
 FRICTIONS, ROBOTS = (0.2, 0.3, 0.466, 0.8), (2, 3, 4)
@@ -200,7 +201,7 @@ def tabulate(engine: ComplianceEngine, name: str, steps: tuple[Step, ...]) -> pd
     table = analyze(engine, steps)
     robots = [force_column(robot) for robot in net.scene.robots]
     largest = table[robots].abs().max(axis=1).fillna(0.0)
-    dry, bound = (stability_table(steps, assess_steps(net, steps, m)) for m in (DRY, EPOXY))
+    dry, bound = (stability_table(steps, assess_steps(net, steps, m, MARGINS)) for m in (DRY, EPOXY))
     own = {name: f"dry{end}" for name, end in ENDS.items()}
     other = {name: f"epoxy{end}" for name, end in ENDS.items()}
     out = dry.rename(columns=own).join(bound[[*ENDS]].rename(columns=other))

@@ -155,9 +155,9 @@ def criterion_options(command: argparse.ArgumentParser) -> None:
     )
 
 
-def steps_options(takes: Takes) -> None:
+def steps_options(takes: Takes, *, required: bool = True) -> None:
     """Add what names a closed sequence of steps."""
-    steps = takes.add_mutually_exclusive_group(required=True)
+    steps = takes.add_mutually_exclusive_group(required=required)
     steps.add_argument(
         "--method",
         choices=(*METHODS, PUBLISHED),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
 from functools import cache, cached_property
@@ -14,45 +14,12 @@ from typing import Protocol, SupportsIndex
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy import linalg
-from scipy.linalg import blas, lapack
-from threadpoolctl import ThreadpoolController
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
-from seqopt.errors import GripError, MemoryShortError, SolverError
+from seqopt.errors import GripError, SolverError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.work._workers import free_memory
-
-_BUFFERS = 100e6  # bytes; taken at once: OpenBLAS waits without end for buffers it does not get
-
-
-def one_thread() -> AbstractContextManager[object]:
-    """Return a context in which BLAS uses one thread; on leaving, it uses as many as before.
-
-    The matrices of a partial structure are small enough for one core. Threads that share them spend
-    their time waiting, without end where another process wants the second core. Entered for a whole
-    operator or pass of grip sets, it costs some 10 µs.
-    """
-    limited: AbstractContextManager[object] = _libraries().limit(limits=1, user_api="blas")
-    return limited
-
-
-@cache
-def _libraries() -> ThreadpoolController:
-    """Return the handle to the linear algebra of the process; finding it takes milliseconds."""
-    free = free_memory()
-    if free < _BUFFERS:
-        raise MemoryShortError(
-            f"linear algebra takes buffers of {_BUFFERS / 1e6:.0f} MB, and {free / 1e6:.0f} MB are "
-            "free; raise the limit"
-        )
-    found = ThreadpoolController()
-    with found.limit(limits=1, user_api="blas"):
-        some = np.eye(200)  # large enough for its product and factors to need them
-        _ = some @ some, np.linalg.inv(some)  # of NumPy's library, and
-        _ = blas.dgemm(1.0, some, some), lapack.dgetrf(some)  # of SciPy's
-    return found
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -14,7 +14,8 @@ from seqopt.engines.interface import Engine
 from seqopt.responses.table import Departure, LinearRange, grips_table
 from seqopt.sequence.steps import Step
 from seqopt.stability._step_verdicts import step_verdicts
-from seqopt.stability.assessment import Verdict, assess_steps, stability_table
+from seqopt.stability.assessment import MARGINS, Verdict
+from seqopt.stability.steps import assess_steps, stability_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -76,9 +77,9 @@ class ShownBuild(Shown):
 
         Margins take ten times as long as `verdicts` alone. ``mortar``: of all joints; or its name,
         ``dry`` or ``epoxy``. Result: as of
-        `seqopt.stability.assessment.stability_table`.
+        `seqopt.stability.steps.stability_table`.
         """
-        results = assess_steps(self.engine.network, self.steps, mortar)
+        results = assess_steps(self.engine.network, self.steps, mortar, MARGINS)
         return stability_table(self.steps, results)
 
     def verdicts(self, mortar: Mortar | str = "dry") -> tuple[Verdict, ...]:

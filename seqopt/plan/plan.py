@@ -46,7 +46,7 @@ from seqopt.responses.table import analyze
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step, StepKind, idle_robots
-from seqopt.stability.assessment import stability_table
+from seqopt.stability.steps import stability_table
 
 COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stability of states
 
@@ -344,7 +344,7 @@ class Plan(ShownBuild):
         """Return whether every step stands and by which margins, by the cone program.
 
         ``mortar``: of all joints; by default that which was demanded, or dry. Result: as of
-        `seqopt.stability.assessment.stability_table`.
+        `seqopt.stability.steps.stability_table`.
         """
         if mortar is None and isinstance(self.graph, States):
             return stability_table(self.steps, certified(self.graph, self.steps))

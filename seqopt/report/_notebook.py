@@ -32,7 +32,7 @@ from seqopt.scene.boxes import boxes
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.stability._builds import BuildProver
-from seqopt.stability.assessment import Stability, Verdict
+from seqopt.stability.assessment import Stability
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -225,12 +225,13 @@ def _worst(value: ShownBuild) -> Rows:
 
 @facts.register
 def _stability(value: Stability) -> _Card:
-    rows: dict[str, object] = {
-        "verdict": value.verdict.value,
-        "bond needed, Pa": f"{value.bond:.4g}",
-        "friction needed": f"{value.friction:.4g}",
-        "largest grip force, N": f"{value.grip:.4g}",
+    margins = {
+        "bond needed, Pa": value.bond,
+        "friction needed": value.friction,
+        "largest grip force, N": value.grip,
     }
+    rows: dict[str, object] = {"verdict": value.verdict.value, "proven by": value.proof}
+    rows |= {name: f"{found:.4g}" for name, found in margins.items() if not np.isnan(found)}
     if value.jammed:
         rows["jammed"] = "stands only because it is wedged in place: do not trust it"
     if np.isfinite(value.tilt):
@@ -239,6 +240,6 @@ def _stability(value: Stability) -> _Card:
         joint = f", joint {value.first_contact}" if value.first_contact else ""
         rows["fails first"] = f"block {value.first_block}{joint}"
     title = f"Stability: {value.verdict.value}"
-    if value.verdict is not Verdict.STANDS:
+    if not np.isfinite(value.tilt):
         return _Card(title, rows)
     return _Card(title, rows, lambda: [display("tilt_picture")(value)])

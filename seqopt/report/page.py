@@ -57,7 +57,7 @@ class Build:
     ``verdicts`` say which steps stand, where that was asked, with the mortar of the scene last;
     ``bounds`` are limits by column of the table, or ``F_largest``, that are drawn beside the
     responses; ``order`` names the bricks as they are placed, where that is not the scene's own
-    order.
+    order; ``falls`` (steps, B, 6): how steps fall, with the first mortar.
     """
 
     name: str
@@ -67,6 +67,7 @@ class Build:
     bounds: Mapping[str, float] = field(default_factory=dict)
     departures: Sequence[Departure] = ()
     order: Order = ()
+    falls: Floats | None = None
 
     def overloads(self, scene: Scene) -> tuple[Excess, ...]:
         """Return the payloads that steps exceed."""
@@ -164,7 +165,8 @@ def _build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[st
     """
     lines = [line.split(",") for line in csv_text(build.table).splitlines()]
     own = engine.network.scene.build_order
-    found = _fields(engine, build) if fields else dict.fromkeys(FIELDS)
+    found: dict[str, Floats | None] = {"fall": build.falls}
+    found |= _fields(engine, build) if fields else dict.fromkeys(FIELDS)
     return {
         "name": build.name,
         "bounds": dict(build.bounds),

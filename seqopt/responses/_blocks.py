@@ -35,11 +35,12 @@ import numpy as np
 from seqopt._files import HIDDEN, make_folder, require_folder, write_bytes
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines._auto import Level, LevelChoice
-from seqopt.engines.interface import Engine, Want, one_thread
+from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
 from seqopt.errors import FileError, MemoryShortError, SceneError
 from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite, robot_response
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
+from seqopt.work._threads import one_thread
 from seqopt.work._workers import free_memory
 
 _Tally = tuple[tuple[object, int], ...]

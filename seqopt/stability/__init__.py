@@ -17,6 +17,7 @@ An assembly of blocks is assessed with the mortar in its joints. Every verdict i
 
 from seqopt.stability._margins import Margins
 from seqopt.stability._screens import Screen
-from seqopt.stability.assessment import Stability, Verdict, assess, assess_steps, stability_table
+from seqopt.stability.assessment import Stability, Verdict, assess
+from seqopt.stability.steps import assess_steps, stability_table
 
 __all__ = ["Margins", "Screen", "Stability", "Verdict", "assess", "assess_steps", "stability_table"]

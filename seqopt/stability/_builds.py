@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 
 from seqopt._files import csv_text
-from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
@@ -20,7 +19,7 @@ from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.steps import Grips, Step
 from seqopt.stability._screens import OPEN, STANDS, Screen
 from seqopt.stability._step_verdicts import each_verdict
-from seqopt.stability.assessment import Verdict, _first_to_fail
+from seqopt.stability.assessment import Verdict
 from seqopt.work.progress import Tell, with_progress
 
 SHOWN = {"dry": DRY, "epoxy": EPOXY}  # with which it is said what stands
@@ -171,9 +170,7 @@ def _screened(network: Network, _: Sequence[Step], mortar: Mortar, tell: _Told) 
 def _failing(network: Network, step: Step, mortar: Mortar) -> tuple[str, str]:
     """Return the brick and the joint that fail first in a step that falls."""
     (found,) = each_verdict(network, [step], mortar)
-    if found.motion is None:
-        return "", ""
-    return _first_to_fail(step_assembly(network, step.bricks, step.grips), found.motion)
+    return found.first_block, found.first_contact
 
 
 def _state(step: Step) -> _State:

@@ -24,7 +24,7 @@ class PartialAssemblies:
     """
 
     def __init__(self, network: Network, bricks: int) -> None:
-        self._network = network
+        self.network = network
         self._whole = whole = bare_assembly(network, bricks)
         placed = network.scene.placed
         self._block = {node: i for i, brick in enumerate(placed) for node in brick.nodes}
@@ -40,8 +40,8 @@ class PartialAssemblies:
 
     def __call__(self, bricks: int, grips: Sequence[int | None]) -> Assembly:
         """Return a partial structure with the grips that hold it."""
-        whole, scene = self._whole, self._network.scene
-        contacts = len(self._network.springs.acting(bricks))
+        whole, scene = self._whole, self.network.scene
+        contacts = len(self.network.springs.acting(bricks))
         corners = int(np.searchsorted(whole.contact, contacts))
         pairs = zip(grips, scene.robots, strict=True)
         held = [(node, robot.payload) for node, robot in pairs if node is not None]

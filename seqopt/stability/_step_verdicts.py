@@ -1,58 +1,191 @@
-"""Verdicts of the steps of a build as they are found, and how each was proven."""
+"""The steps of a build one after the other: verdicts, margins, and the rows that show them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+import pickle
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 
 import numpy as np
+import pandas as pd
 
-from seqopt.arrays import Floats, FrozenValue
+from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import Mortar
+from seqopt.errors import SceneError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.sequence.steps import Grips, Step
+from seqopt.stability._partial_assemblies import PartialAssemblies
+from seqopt.stability._prover import DIRECTIONS, Proven
 from seqopt.stability._verdict_chain import VerdictChain
-from seqopt.stability.assessment import Verdict, _verdict_of, bonded
-from seqopt.stability.limit_analysis import Compile, compile_equilibrium
+from seqopt.stability.assessment import (
+    MARGINS,
+    Stability,
+    Verdict,
+    _first_to_fail,
+    _verdict_of,
+    assess,
+    bonded,
+)
+from seqopt.stability.limit_analysis import Claim, Compile, compile_equilibrium
+from seqopt.work._workers import hire, map_ordered
 
-
-@dataclass(frozen=True, eq=False, repr=False)
-class StepVerdict(FrozenValue):
-    """Verdict of a step, and how it was proven.
-
-    ``way``: "forces" or a "motion" that prove it by themselves, "earlier" ones of another step, or
-    the "cone program". ``motion`` (B, 6): how it falls, as of `Stability`; none if it does not.
-    """
-
-    verdict: Verdict
-    way: str
-    motion: Floats | None
+_PORTIONS = 8  # for every worker, of neighboring steps, which are proven by one another
 
 
 def each_verdict(
-    network: Network, steps: Sequence[Step], mortar: Mortar, compiled: Compile = compile_equilibrium
-) -> Iterator[StepVerdict]:
-    """Yield the verdict of every step as soon as it is found: that of `verdict`, mostly unsolved.
+    built: Network | PartialAssemblies,
+    steps: Sequence[Step],
+    mortar: Mortar,
+    compiled: Compile = compile_equilibrium,
+) -> Iterator[Stability]:
+    """Yield the verdict of every step as soon as it is found, without margins, mostly unsolved.
 
     Of equal partial structures it is asked once. What is found for one is tried on those that
     follow, so steps of a build are asked best in their order. ``compiled``: makes the programs of
     the steps for which that proves nothing.
     """
     most = max((step.bricks for step in steps), default=1)
-    prove = VerdictChain(network, most, lambda assembly: bonded(assembly, mortar), compiled)
-    found: dict[tuple[int, Grips], StepVerdict] = {}
+    parts = PartialAssemblies(built, most) if isinstance(built, Network) else built
+    prove = VerdictChain(parts, lambda assembly: bonded(assembly, mortar), compiled)
+    found: dict[tuple[int, Grips], Stability] = {}
     for step in steps:
         key = step.bricks, step.grips
         if key not in found:
             assembly, proven, way = prove(*key)
-            verdict, motion = _verdict_of(proven), None
-            if verdict is Verdict.FALLS:
-                fastest = np.abs(proven.answer.motion).max()
-                motion = proven.answer.motion / fastest / np.repeat([1.0, assembly.scales[1]], 3)
-            found[key] = StepVerdict(verdict, way.value, motion)
+            found[key] = _without_margins(assembly, proven, way.value)
         yield found[key]
+
+
+def _without_margins(assembly: Assembly, proven: Proven, proof: str) -> Stability:
+    """Return what is proven of a step, and how it falls if it does."""
+    verdict, motion = _verdict_of(proven), np.zeros((len(assembly.centroid), 6))
+    if verdict is Verdict.FALLS:
+        motion = proven.answer.motion / np.abs(proven.answer.motion).max()
+    block, contact = _first_to_fail(assembly, motion)
+    return Stability(
+        verdict=verdict,
+        proof=proof,
+        bond=np.nan,
+        friction=np.nan,
+        pull=np.full(DIRECTIONS, np.nan),
+        tilt=np.nan,
+        grip=np.nan,
+        motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
+        first_block=block,
+        first_contact=contact,
+        jammed=None,
+        claims={},
+        unproven=int(verdict is Verdict.UNDECIDED),
+    )
 
 
 def step_verdicts(network: Network, steps: Sequence[Step], mortar: Mortar) -> tuple[Verdict, ...]:
     """Return the verdict of every step; of equal partial structures it is asked once."""
     return tuple(found.verdict for found in each_verdict(network, steps, mortar))
+
+
+def find_margins(asked: Collection[str] | str) -> tuple[str, ...]:
+    """Return margins by their names, as of `assess_steps`; text has commas between them."""
+    names = tuple(asked.split(",")) if isinstance(asked, str) else tuple(asked)
+    for name in names:
+        if name not in (*MARGINS, "all"):
+            hint = did_you_mean(str(name), MARGINS)
+            raise SceneError(f"margin {name!r}{hint}: give all, or some of {', '.join(MARGINS)}")
+    return MARGINS if "all" in names else names
+
+
+@dataclass(frozen=True)
+class _Portion:
+    """Neighboring steps of a build, and the numbers of those whose margins are asked for."""
+
+    steps: tuple[Step, ...]
+    mortar: Mortar
+    margins: tuple[str, ...]
+    at: Collection[int]
+
+
+def each_stability(
+    network: Network,
+    steps: Sequence[Step],
+    mortar: Mortar,
+    margins: tuple[str, ...] = (),
+    at: Collection[int] | None = None,
+    shared: tuple[Executor | None, int] = (None, 1),
+) -> Iterator[Stability]:
+    """Yield what `assess_steps` returns, as soon as it is found.
+
+    ``at``: numbers of the steps whose margins are found, by default of all; ``shared``: an executor
+    and among how many workers the steps are shared.
+    """
+    numbers = {step.number for step in steps} if at is None else at
+    whole = _Portion(tuple(steps), mortar, margins, numbers if margins else ())
+    with hire(*shared) as crew:
+        if crew is None:
+            most = max((step.bricks for step in steps), default=1)
+            yield from _each(PartialAssemblies(network, most), whole)
+            return
+        size = -(-len(steps) // (_PORTIONS * crew.workers)) or 1
+        cut = [whole.steps[i : i + size] for i in range(0, len(steps), size)]
+        portions = (replace(whole, steps=part) for part in cut)
+        for found in map_ordered(partial(_sent, pickle.dumps(network)), portions, crew):
+            yield from found
+
+
+def _sent(network: bytes, portion: _Portion) -> tuple[Stability, ...]:
+    return tuple(_each(_parts(network), portion))
+
+
+@lru_cache(maxsize=1)
+def _parts(network: bytes) -> PartialAssemblies:
+    """Return what a worker prepares once for all portions of a build."""
+    whole: Network = pickle.loads(network)  # our own, of `each_stability`
+    return PartialAssemblies(whole, len(whole.inner))
+
+
+def _each(parts: PartialAssemblies, portion: _Portion) -> Iterator[Stability]:
+    verdicts = each_verdict(parts, portion.steps, portion.mortar)
+    up = parts.network.scene.up
+    full = partial(assess, mortar=portion.mortar, up=up, margins=portion.margins)
+    for step, found in zip(portion.steps, verdicts, strict=True):
+        if step.number not in portion.at:
+            yield found
+            continue
+        margins = full(parts(step.bricks, step.grips))
+        yield replace(margins, verdict=found.verdict, proof=found.proof)
+
+
+def stability_row(step: Step, result: Stability) -> dict[str, object]:
+    """Return the row of a step in `seqopt.stability.steps.stability_table`."""
+    return {
+        "step": step.number,
+        "type": step.kind.value,
+        "bricks": step.bricks,
+        "verdict": result.verdict.value,
+        "proof": result.proof,
+        "bond_needed_Pa": result.bond,
+        "friction_needed": result.friction,
+        "tilt_survived_deg": float(np.degrees(result.tilt)),
+        "largest_grip_force_N": result.grip,
+        "first_brick": result.first_block,
+        "first_joint": result.first_contact,
+        "jammed": result.jammed,
+        "almost_solved": result.claims.get(Claim.ALMOST, 0),
+        "stalled": result.claims.get(Claim.STALLED, 0),
+        "unproven": result.unproven,
+    }
+
+
+def format_rows(table: pd.DataFrame) -> str:
+    """Return in a line how many steps stand, fall and are undecided, and what proved it."""
+    found, proofs = Counter(table["verdict"]), Counter(table["proof"])
+    words = zip(Verdict, ("stand", "do not stand", "are undecided"), strict=True)
+    said = ", ".join(f"{found[verdict.value]} {word}" for verdict, word in words)
+    jammed = [*table["jammed"]].count(True)
+    said += f" ({jammed} only jammed: do not trust these)" if jammed else ""
+    by = ", ".join(f"{count} by {proof}" for proof, count in proofs.most_common())
+    unproven = int(table["unproven"].sum())
+    ends = f"; {unproven} cases unproven" if unproven else ""
+    return f"{len(table)} steps: {said}; proven {by}{ends}"

@@ -14,12 +14,13 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
-from seqopt.network.network import GROUND, Network
+from seqopt.network.network import GROUND
 from seqopt.sequence.steps import Grips
 from seqopt.stability._interior_point import approach
 from seqopt.stability._partial_assemblies import PartialAssemblies
 from seqopt.stability._prover import Proven, Prover
 from seqopt.stability.limit_analysis import EXACT, Answer, Case, Claim, Compile, bound, violation
+from seqopt.work._threads import one_thread
 
 _TIGHT = 0.01 * EXACT  # largest violation of forces that are believed without a cone program
 _CLEAR = 10 * EXACT  # least bound of a motion that is
@@ -58,15 +59,14 @@ def _labeled(proven: Proven | None, way: Way) -> tuple[Proven | None, Way]:
 
 
 class VerdictChain:
-    """Proves the case of one partial structure after the other, of up to so many bricks.
+    """Proves the case of one partial structure after the other.
 
     Forces and a motion are remembered in N, m and rad. Where not the cone program proves a case, z
     is only as good as the answer to whether it is zero.
     """
 
-    def __init__(self, network: Network, bricks: int, ask: Ask, compiled: Compile) -> None:
-        self._parts = PartialAssemblies(network, bricks)
-        self._ask, self._compile = ask, compiled
+    def __init__(self, parts: PartialAssemblies, ask: Ask, compiled: Compile) -> None:
+        self._parts, self._ask, self._compile = parts, ask, compiled
         self._corner_force: Floats | None = None
         self._grip_force: dict[int, Floats] = {}
         self._motion: Floats | None = None
@@ -76,7 +76,8 @@ class VerdictChain:
         assembly, held = self._parts(bricks, grips), [n for n in grips if n is not None]
         case = self._ask(assembly)
         tries = self._tries(assembly, case, held)
-        known = next(((proven, way) for proven, way in tries if proven is not None), None)
+        with one_thread():
+            known = next(((proven, way) for proven, way in tries if proven is not None), None)
         proven, way = known or (Prover(assembly, self._compile)(case), Way.CONES)
         self._learn(assembly, proven, held)
         return assembly, proven, way

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
-import pandas as pd
 
 from seqopt._showing import Shown
 from seqopt.arrays import Floats, FrozenValue, Vector
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import Contacts, step_assembly
-from seqopt.contact.mortar import Mortar, find_mortar
-from seqopt.network.build import network_of
-from seqopt.network.network import Network
-from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Step, require_steps
+from seqopt.contact.mortar import Mortar
 from seqopt.stability._prover import DIRECTIONS, Proven, Prover, safe_pull
 from seqopt.stability.limit_analysis import (
     CAP,
@@ -30,8 +23,9 @@ from seqopt.stability.limit_analysis import (
     Sense,
     compile_equilibrium,
 )
-from seqopt.work.progress import Tell, with_progress
 
+CONES = "cone program"  # what proves a verdict where nothing simpler does
+MARGINS = ("bond", "friction", "tilt", "payload")
 _STILL = 1e-6  # motion slower than this, beside the fastest, is none
 ROUGHEST = 10.0  # largest coefficient of friction that is tried
 _LITTLE = 1e-3  # friction that holds nothing but what is jammed
@@ -48,12 +42,15 @@ class Verdict(Enum):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Stability(Shown, FrozenValue):
-    """Verdict and margins of one assembly; a margin that is not proven is NaN.
+    """Verdict and margins of one assembly; a margin that is not proven, or not asked for, is NaN.
 
     Attributes
     ----------
     verdict : Verdict
         The verdict with the given mortar and payloads.
+    proof : str
+        What proves the verdict: ``forces`` or a ``motion``, those of an ``earlier`` step, or those
+        of a ``cone program``.
     bond : float
         Least strength of a bond, in tension and at the same time in shear, with which it stands at
         the mortar's friction, Pa; inf if none is enough.
@@ -76,9 +73,10 @@ class Stability(Shown, FrozenValue):
         or rotation times lever, is 1 m; zero if unknown.
     first_block, first_contact : str
         The fastest block and the contact that opens fastest in that motion; empty if unknown.
-    jammed : bool
+    jammed : bool or None
         Whether it stands only because it is wedged in place: the least friction is enough, by
-        contact forces that nothing makes develop. Do not trust that it stands.
+        contact forces that nothing makes develop. Do not trust that it stands. None if the friction
+        is not asked for, or it does not stand.
     claims : mapping of Claim to int
         How the solver said it ended, over all cases that were solved.
     unproven : int
@@ -86,8 +84,7 @@ class Stability(Shown, FrozenValue):
 
     Examples
     --------
-    >>> from seqopt.contact.faces import Contacts, step_assembly
-    >>> from seqopt.contact.mortar import DRY
+    >>>     >>> from seqopt.contact.mortar import DRY
     >>> from seqopt.network.build import build_network
     >>> from seqopt.scene.scene_file import load_scene
     >>> network = build_network(load_scene("arch25"))
@@ -97,6 +94,7 @@ class Stability(Shown, FrozenValue):
     """
 
     verdict: Verdict
+    proof: str
     bond: float
     friction: float
     pull: Floats
@@ -105,7 +103,7 @@ class Stability(Shown, FrozenValue):
     motion: Floats
     first_block: str
     first_contact: str
-    jammed: bool
+    jammed: bool | None
     claims: Mapping[Claim, int]
     unproven: int
 
@@ -122,6 +120,7 @@ def assess(
     mortar: Mortar,
     up: Vector = (0.0, 0.0, 1.0),
     compiled: Compile = compile_equilibrium,
+    margins: Collection[str] = MARGINS,
 ) -> Stability:
     """Return verdict and margins of an assembly.
 
@@ -133,6 +132,8 @@ def assess(
         Unit vector against gravity; it is pulled at right angles.
     compiled : callable, optional
         Makes the program to solve; the registered one by default.
+    margins : collection of str, optional
+        Of `MARGINS`; those left out are NaN.
 
     Returns
     -------
@@ -141,32 +142,44 @@ def assess(
     prove, growing = Prover(assembly, compiled), bonded(assembly, mortar)
     stand = prove(growing)
     verdict = _verdict_of(stand)
-    bare = bonded(assembly, Mortar(friction=mortar.friction))
-    bond = stand if bare == growing else prove(bare)
     fixed, stands = growing.fixed(), verdict is Verdict.STANDS
-    pulls, worst = safe_pull(prove, fixed, up) if stands else ([], np.nan)
+    pulls, worst = safe_pull(prove, fixed, up) if stands and "tilt" in margins else ([], np.nan)
     failure = min(pulls, key=lambda pull: np.nan_to_num(pull.held, nan=CAP), default=stand)
-    known = failure.value < CAP if stands else verdict is Verdict.FALLS
+    known = failure.value < CAP if pulls else verdict is Verdict.FALLS
     motion = failure.answer.motion if known else np.zeros((len(assembly.centroid), 6))
     motion = motion / (np.abs(motion).max(initial=0.0) or 1.0)
     block, contact = _first_to_fail(assembly, motion)
-    friction = _least_friction(prove, mortar)
-    least = replace(fixed, sense=Sense.SMALLEST, payload=(0.0, 1.0))
-    grip = prove(least).value if len(assembly.payload) else 0.0
+    friction = _least_friction(prove, mortar) if "friction" in margins else np.nan
     return Stability(
         verdict=verdict,
-        bond=_amount(bond.value) * assembly.stress_scale,
+        proof=CONES,
+        bond=_least_bond(prove, mortar, stand) if "bond" in margins else np.nan,
         friction=friction,
         pull=np.array([pull.held for pull in pulls[:DIRECTIONS]] or [np.nan] * DIRECTIONS),
         tilt=float(np.arctan(worst)),
-        grip=_amount(grip) * assembly.scales[0],
+        grip=_least_payload(prove, fixed) if "payload" in margins else np.nan,
         motion=motion / np.repeat([1.0, assembly.scales[1]], 3),
         first_block=block,
         first_contact=contact,
-        jammed=stands and not friction > _LITTLE and friction != 0 and _is_jammed(prove, mortar),
+        jammed=_is_jammed(prove, mortar, friction) if "friction" in margins and stands else None,
         claims=dict(prove.claims),
         unproven=prove.unproven,
     )
+
+
+def _least_bond(prove: Prover, mortar: Mortar, stand: Proven) -> float:
+    """Return the least bond with which an assembly stands, Pa; ``stand``: with its mortar."""
+    bare = bonded(prove.assembly, Mortar(friction=mortar.friction))
+    same = bare == bonded(prove.assembly, mortar)
+    return _amount((stand if same else prove(bare)).value) * prove.assembly.stress_scale
+
+
+def _least_payload(prove: Prover, fixed: Case) -> float:
+    """Return the largest grip force where it is smallest, N."""
+    if not len(prove.assembly.payload):
+        return 0.0
+    least = prove(replace(fixed, sense=Sense.SMALLEST, payload=(0.0, 1.0)))
+    return _amount(least.value) * prove.assembly.scales[0]
 
 
 def verdict(assembly: Assembly, mortar: Mortar, compiled: Compile = compile_equilibrium) -> Verdict:
@@ -252,11 +265,13 @@ def _least_friction(prove: Prover, mortar: Mortar) -> float:
     return high
 
 
-def _is_jammed(prove: Prover, mortar: Mortar) -> bool:
+def _is_jammed(prove: Prover, mortar: Mortar, least: float) -> bool:
     """Return whether forces prove hardly any friction enough, but far above all loads.
 
-    ``prove``: of an assembly that stands with the mortar, and not without friction.
+    ``prove``: of an assembly that stands with the mortar; ``least``: the friction it needs.
     """
+    if least > _LITTLE or least == 0:
+        return False
     assembly, case = prove.assembly, bonded(prove.assembly, mortar)
     proven = prove(replace(case, friction=min(_LITTLE, mortar.friction)))
     total = np.linalg.norm(assembly.weight, axis=1).sum() + assembly.payload.sum()
@@ -267,100 +282,3 @@ def _is_jammed(prove: Prover, mortar: Mortar) -> bool:
 def _amount(value: float) -> float:
     """Return a proven z, zero where it is no more than what proofs leave open."""
     return 0.0 if value <= EXACT else value
-
-
-def assess_steps(
-    network: Network | Scene,
-    steps: Sequence[Step],
-    mortar: Mortar | str,
-    progress: Tell | None = None,
-) -> tuple[Stability, ...]:
-    """Return verdict and margins of every step.
-
-    Parameters
-    ----------
-    network : Network or Scene
-    steps : sequence of Step
-    mortar : Mortar or str
-        The mortar of all joints, or its name.
-    progress : callable, optional
-        Told as a `seqopt.work.Stage` how far it is, step by step.
-
-    Returns
-    -------
-    tuple of Stability
-
-    Raises
-    ------
-    SceneError
-        If bricks that share a joint do not touch.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
-    >>> steps = seqopt.sequential(network)[:2]
-    >>> [stability.verdict.value for stability in seqopt.assess_steps(network, steps, seqopt.EPOXY)]
-    ['stands', 'stands']
-    """
-    network, mortar = network_of(network), find_mortar(mortar)
-    known, up = Contacts(network), network.scene.up
-    return tuple(
-        assess(step_assembly(network, step.bricks, step.grips, known), mortar, up)
-        for step in with_progress("assessing steps", require_steps(steps), progress)
-    )
-
-
-def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.DataFrame:
-    """Return one row per step; an empty cell is a number that is not proven.
-
-    Parameters
-    ----------
-    steps : sequence of Step
-    results : sequence of Stability
-        Of the steps.
-
-    Returns
-    -------
-    pandas.DataFrame
-        ``step``, ``type``, ``bricks``, ``verdict``, ``bond_needed_Pa``, ``friction_needed``,
-        ``tilt_survived_deg``, ``largest_grip_force_N``, ``first_brick``, ``first_joint`` and
-        ``jammed``, as in `seqopt.stability.assessment.Stability`; ``almost_solved``, ``stalled``
-        and ``unproven`` count cases.
-    """
-    rows = [
-        {
-            "step": step.number,
-            "type": step.kind.value,
-            "bricks": step.bricks,
-            "verdict": result.verdict.value,
-            "bond_needed_Pa": result.bond,
-            "friction_needed": result.friction,
-            "tilt_survived_deg": np.degrees(result.tilt),
-            "largest_grip_force_N": result.grip,
-            "first_brick": result.first_block,
-            "first_joint": result.first_contact,
-            "jammed": result.jammed,
-            "almost_solved": result.claims.get(Claim.ALMOST, 0),
-            "stalled": result.claims.get(Claim.STALLED, 0),
-            "unproven": result.unproven,
-        }
-        for step, result in zip(steps, results, strict=True)
-    ]
-    return pd.DataFrame(rows)
-
-
-def format_verdicts(results: Sequence[Stability]) -> str:
-    """Return in a line how many steps stand, fall and are undecided, and how the solver ended."""
-    found = Counter(result.verdict for result in results)
-    words = zip(Verdict, ("stand", "do not stand", "are undecided"), strict=True)
-    verdicts = ", ".join(f"{found[verdict]} {word}" for verdict, word in words)
-    jammed = sum(result.jammed for result in results)
-    verdicts += f" ({jammed} only jammed: do not trust these)" if jammed else ""
-    claims = Counter[Claim]()
-    for result in results:
-        claims.update(result.claims)
-    ends = ", ".join(f"{claims[end]} {end.value}" for end in (Claim.ALMOST, Claim.STALLED))
-    unproven = sum(result.unproven for result in results)
-    cases = f"{claims.total()} cases: {ends}, {unproven} unproven"
-    return f"{len(results)} steps: {verdicts}; {cases}"

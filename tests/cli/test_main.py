@@ -382,6 +382,7 @@ CERTIFIED = [
     "type",
     "bricks",
     "verdict",
+    "proof",
     "bond_needed_Pa",
     "friction_needed",
     "tilt_survived_deg",
@@ -396,6 +397,7 @@ CERTIFIED = [
 def test_assess(capsys, tmp_path):
     out = tmp_path / "dry.csv"
     words = ("assess", "arch25", "--method", "cantilever", "--mortar", "dry", "--out", str(out))
+    words += ("--margins", "all")
     status, text, err = run(capsys, *words)
     assert (status, err) == (1, "")  # done, and some do not stand
     assert text.startswith("49 steps: 27 stand, 22 do not stand, 0 are undecided; ")
@@ -418,7 +420,7 @@ def test_assess_a_plan_with_a_mortar_of_ones_own(capsys, tmp_path):
     plan.write_text("\n".join(rows) + "\n", encoding="utf-8")
     for strength, verdict in (("600", "does not stand"), ("640", "stands")):
         mortar = ("--mortar", "dry", "--tensile-strength", strength, "--cohesion", "1e4")
-        status, out, _ = run(capsys, "assess", "--plan", str(plan), *mortar)
+        status, out, _ = run(capsys, "assess", "--plan", str(plan), *mortar, "--margins", "bond")
         assert status == (verdict != "stands")
         last = pd.read_csv(io.StringIO(out)).iloc[-1]
         assert last["verdict"] == verdict
@@ -428,11 +430,13 @@ def test_assess_a_plan_with_a_mortar_of_ones_own(capsys, tmp_path):
 def test_assess_says_what_it_cannot_decide(capsys, tmp_path, monkeypatch):
     """A solver out of time is neither 'stands' nor 'does not stand'; the table is still written."""
     monkeypatch.setattr("formulations.contact.limit_analysis.SECONDS", 1e-9)
+    monkeypatch.setattr("seqopt.stability._verdict_chain.approach", lambda *_: iter(()))
     plan, out = tmp_path / "plan.csv", tmp_path / "out.csv"
     plan.write_text(
         "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n", encoding="utf-8"
     )
-    status, text, err = run(capsys, "assess", "--plan", str(plan), "--out", str(out))
+    words = ("--plan", str(plan), "--out", str(out), "--margins", "all")
+    status, text, err = run(capsys, "assess", *words)
     assert (status, err.count("\n")) == (4, 1)
     assert "steps 1 are undecided" in err
     assert "1 are undecided" in text
@@ -479,7 +483,7 @@ def test_help_teaches(capsys, command):
             "--robots rob1,rob2: a plan",
         ),
         (("assess", "--plan", "no.csv", "--robots", "rob1,rob2"), "--robots rob1,rob2: a plan"),
-        (("assess",), "--method --plan is required"),
+        (("assess",), "nothing to assess: give --method NAME, --plan FILE, or --map friction"),
         (("assess", "--method", "sequential", "--plan", "x.csv"), "not allowed with"),
         (("assess", "--method", "sequential", "--mortar", "glue"), "'glue' (choose from 'epoxy'"),
         (("assess", "--method", "sequential", "--friction", "-1"), "--friction: '-1' is not"),

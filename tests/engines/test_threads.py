@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from seqopt.engines.interface import one_thread
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._refinement import Refinement
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
+from seqopt.work._threads import one_thread
 from tests.builders import hinged, six_bricks
 
 

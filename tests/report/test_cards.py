@@ -15,7 +15,7 @@ from seqopt.problem.problem import Orders
 from seqopt.report._notebook import card, facts
 from seqopt.report.comparison import largest
 from seqopt.report.draw import ROBOT_COLORS
-from seqopt.stability.assessment import assess_steps
+from seqopt.stability.steps import assess_steps
 
 HEAVIEST = 60_000  # letters of HTML
 
@@ -28,7 +28,12 @@ def values():
     robust = posed.but(scenarios=seqopt.scenarios(scene, count=2, seed=1).scenes)
     network = posed.engine.network
     found = [plan, free, posed, free.problem, free.problem.but(orders=Orders.TIED), robust]
-    found += [posed.schedule, network, scene, *assess_steps(network, plan.steps[:1], "epoxy")]
+    found += [
+        posed.schedule,
+        network,
+        scene,
+        *assess_steps(network, plan.steps[:1], "epoxy", "all"),
+    ]
     return {type(value).__name__: value for value in found}
 
 

@@ -8,7 +8,9 @@ import pytest
 from experiments.stability.parts.blocks import Blocks, Contact, ring, stack
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.stability.assessment import Verdict, assess, format_verdicts, stability_table
+from seqopt.stability._step_verdicts import format_rows
+from seqopt.stability.assessment import Verdict, assess
+from seqopt.stability.steps import stability_table
 
 
 def bar(*, on_the_ground=False):
@@ -26,8 +28,9 @@ def test_a_bar_between_walls_is_marked(friction):
     assert result.jammed
     assert "stands, but only jammed" in repr(result)
     step = Step(1, StepKind.PLACE, 1, (None,))
-    assert stability_table([step], [result])["jammed"].tolist() == [True]
-    assert "1 stand, 0 do not stand, 0 are undecided (1 only jammed" in format_verdicts([result])
+    table = stability_table([step], [result])
+    assert table["jammed"].tolist() == [True]
+    assert "1 stand, 0 do not stand, 0 are undecided (1 only jammed" in format_rows(table)
 
 
 def test_what_its_weight_holds_is_not_marked():
@@ -41,4 +44,5 @@ def test_what_its_weight_holds_is_not_marked():
     for name, (assembly, mortar) in plain.items():
         result = assess(assembly, mortar)
         assert not result.jammed, name
-        assert "jammed" not in format_verdicts([result])
+        table = stability_table([Step(1, StepKind.PLACE, 1, (None,))], [result])
+        assert "jammed" not in format_rows(table)

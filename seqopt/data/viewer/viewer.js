@@ -133,8 +133,9 @@
       if (!this.turned) this.look();
       this.draw();
     }
-    moved(build, s, i, point, by, out) {
-      const c = structure.bricks[i].center, t = [0, 1, 2, 3, 4, 5].map((k) => by * value(build.twist, s, 6 * i + k));
+    moved(build, s, i, point, options, out) {
+      const [field, by] = options.fall && build.fall ? [build.fall, options.fall] : [build.twist, options.magnify];
+      const c = structure.bricks[i].center, t = [0, 1, 2, 3, 4, 5].map((k) => by * value(field, s, 6 * i + k));
       const r = [point[0] - c[0], point[1] - c[1], point[2] - c[2]];
       out[0] = point[0] + t[0] + t[4] * r[2] - t[5] * r[1];
       out[1] = point[1] + t[1] + t[5] * r[0] - t[3] * r[2];
@@ -150,7 +151,7 @@
       this.bricks.forEach(({ brick, mesh, outline, places, rims }, i) => {
         mesh.visible = outline.visible = rank(build, i) < step.bricks;
         if (rank(build, i) >= step.bricks) return;
-        const here = brick.corners.map((corner) => [...this.moved(build, s, i, corner, options.magnify, p)]);
+        const here = brick.corners.map((corner) => [...this.moved(build, s, i, corner, options, p)]);
         for (const [object, order] of [[mesh, places], [outline, rims]]) {
           const array = object.geometry.attributes.position.array;
           order.forEach((corner, k) => array.set(here[corner], 3 * k));
@@ -171,7 +172,7 @@
         ball.visible = node !== null && node !== undefined;
         if (!ball.visible) return;
         const { at: place, brick } = structure.nodes[node];
-        ball.position.set(...this.moved(build, s, brick, place, options.magnify, p));
+        ball.position.set(...this.moved(build, s, brick, place, options, p));
       });
       this.draw();
     }
@@ -184,7 +185,7 @@
         const [start, end] = [a, b].map((node) => {
           const point = structure.points[node], bricks = structure.carried[node].filter((i) => i < step.bricks);
           const at = new THREE.Vector3();
-          bricks.forEach((i) => { this.moved(build, s, i, point, options.magnify, p); at.add(new THREE.Vector3(...p)); });
+          bricks.forEach((i) => { this.moved(build, s, i, point, options, p); at.add(new THREE.Vector3(...p)); });
           return bricks.length ? at.divideScalar(bricks.length) : at.set(...point);
         });
         const force = value(build.edge, s, e), share = Math.abs(force) / largest;
@@ -283,7 +284,7 @@
   const slider = byId("step");
   let timer = null;
   const shown = () => [builds[byId("first").value], byId("second").value === "" ? null : builds[byId("second").value]].filter(Boolean);
-  const options = () => ({ magnify: Number(byId("magnify").value) || 0, forces: byId("forces").checked });
+  const options = () => ({ magnify: Number(byId("magnify").value) || 0, forces: byId("forces").checked, fall: byId("fall").checked ? 0.15 * radius : 0 });
   function refresh() {
     const pair = shown(), at = Number(slider.value);
     slider.max = Math.max(...pair.map((build) => build.steps.length)) - 1;
@@ -340,9 +341,9 @@
   });
   byId("second").prepend(new Option("nothing", "", true, true));
   byId("second").value = "";
-  await Promise.all(builds.flatMap((build) => ["twist", "edge", "push", "turn"].map((name) => unpack(build[name]))));
+  await Promise.all(builds.flatMap((build) => ["twist", "edge", "push", "turn", "fall"].map((name) => unpack(build[name]))));
   for (const id of ["first", "second"]) byId(id).addEventListener("change", () => { drawCharts(); refresh(); });
-  for (const id of ["magnify", "forces"]) byId(id).addEventListener("input", refresh);
+  for (const id of ["magnify", "forces", "fall"]) byId(id).addEventListener("input", refresh);
   slider.addEventListener("input", refresh);
   byId("back").addEventListener("click", () => go(Number(slider.value) - 1));
   byId("on").addEventListener("click", () => go(Number(slider.value) + 1));
@@ -363,6 +364,8 @@
   if (asked.has("beside")) byId("second").value = builds.findIndex((build) => build.name === asked.get("beside"));
   if (asked.has("magnify")) byId("magnify").value = asked.get("magnify");
   byId("forces").checked = asked.has("forces");
+  byId("falling").hidden = !builds.some((build) => build.fall);
+  byId("fall").checked = asked.has("fall");
   drawCharts();
   slider.max = Math.max(...shown().map((build) => build.steps.length)) - 1;
   go(asked.has("step") ? Number(asked.get("step")) - 1 : Number(slider.max));

@@ -9,7 +9,6 @@ import numpy as np
 from scipy import linalg, sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.engines.interface import one_thread
 from seqopt.errors import MechanismError
 from seqopt.network._mechanics import (
     Statics,
@@ -21,6 +20,7 @@ from seqopt.network._mechanics import (
     spring_maps,
 )
 from seqopt.network.network import Network
+from seqopt.work._threads import one_thread
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -31,7 +31,6 @@ from seqopt.engines.interface import (
     grip_columns,
     keep_wanted,
     names_wanted,
-    one_thread,
     require_finite,
 )
 from seqopt.engines.rigid._grip_equations import Pairs, grip_forces, pairs_of, share_pairs, trusted
@@ -42,6 +41,7 @@ from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder
 from seqopt.engines.rigid._refinement import Refinement
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
+from seqopt.work._threads import one_thread
 
 _CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's cache
 ACCURACY = 1e-9  # largest error of fields over the largest of each

@@ -1,0 +1,134 @@
+"""Where builds of a scene fail: what ``assess --map`` answers."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from seqopt._cli.answer import Answer, Status
+from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
+from seqopt._cli.outputs import figure_notes, require_out, write_outputs
+from seqopt._cli.terminal import wrapped
+from seqopt._cli.values import number_word
+from seqopt._files import csv_text
+from seqopt.engines.registry import USUAL, make_engine, versions
+from seqopt.errors import ProblemError
+from seqopt.network.build import build_network
+from seqopt.report._failures import AXIS_WORDS, Builds, cure_words, failure_page, usual_builds
+from seqopt.report._pages import PAGE
+from seqopt.scene.scene import Scene
+from seqopt.stability.failure_map import AXES, FailureMap, failure_map
+
+MAP = {
+    "--map AXIS": "map where builds fail, over what holds their joints and over friction or tilt "
+    "(degrees), with values of your own as tilt=0,2,5: of the fixed methods, a loop and a free "
+    "schedule, or of --method or --plan alone",
+    "--holds NAMES": "with --map: what holds the joints, of dry, bond=STRENGTH (Pa) and epoxy, "
+    "with commas between them (default: dry,epoxy)",
+}
+STEEPEST = 45.0  # degrees
+NAME = 26  # columns of a build with what holds it
+
+
+def answer_map(options: argparse.Namespace) -> Answer:
+    """Answer where builds of a scene fail."""
+    scene = asked_scene(options)
+    axis, values = _asked_axis(options.map)
+    holds = (options.holds or "dry,epoxy").split(",")
+    require_out(options)
+    builds, notes = _asked_builds(options, scene)
+    found = failure_map(scene, builds, holds, axis, values, options.tell)
+    written = write_outputs(options, lambda: _files(scene, builds, found))
+    blocks = ["\n".join(block) for block in (_table(scene, found), _cures(found)) if block]
+    if written:
+        where = f"written to {options.out}; {options.out / PAGE} shows how steps fall"
+        notes += [*figure_notes()]
+    else:
+        where = "--out DIR writes tables, a picture and a page that shows how steps fall"
+    falls = found.cases["fall"].any()
+    return Answer(
+        facts={
+            "scene": scene_facts(scene),
+            "versions": versions(),
+            "cases": found.cases,
+            "steps": found.steps,
+        },
+        text="\n\n".join([*blocks, wrapped(where)]),
+        headings=tuple(block.splitlines()[0] for block in blocks),
+        written=written,
+        notes=tuple(notes),
+        status=Status.DOES_NOT_HOLD if falls else Status.DONE,
+    )
+
+
+def _asked_axis(text: str) -> tuple[str, tuple[float, ...]]:
+    """Return the axis of a map, and its values; none where the usual ones are meant."""
+    axis, _, values = text.partition("=")
+    if axis not in AXES:
+        raise ProblemError(
+            f"--map {text}: give {' or '.join(AXES)}, with values as friction=0.3,0.6"
+        )
+    numbers = [
+        number_word(value, f"--map {text}", zero=True) for value in values.split(",") if values
+    ]
+    if wrong := [number for number in numbers if axis == "tilt" and number > STEEPEST]:
+        raise ProblemError(
+            f"--map {text}: {wrong[0]:g} is no {axis}; give 0 or more, tilt up to 45"
+        )
+    return axis, tuple(sorted({*numbers}))
+
+
+def _asked_builds(options: argparse.Namespace, scene: Scene) -> tuple[Builds, list[str]]:
+    """Return the builds that are asked for, by name, and why others are not possible."""
+    if options.method is None and options.plan is None:
+        return usual_builds(scene, options.tell)
+    name = options.method or Path(options.plan).stem
+    return {name: asked_steps(options, scene)}, []
+
+
+def _files(scene: Scene, builds: Builds, found: FailureMap) -> dict[str, bytes | str]:
+    """Return tables, page and picture by file name."""
+    engine = make_engine(USUAL, build_network(scene), None)
+    files: dict[str, bytes | str] = {
+        "map.csv": csv_text(found.cases),
+        "map_steps.csv": csv_text(found.steps),
+        PAGE: failure_page(engine, builds, found),
+    }
+    if figure_notes():
+        return files
+    from seqopt.report._failure_chart import failure_figure  # noqa: PLC0415
+    from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
+
+    return files | picture_files("map", failure_figure(found))
+
+
+def _table(scene: Scene, found: FailureMap) -> Iterator[str]:
+    """Yield how many steps fall, a line for every build and what holds it."""
+    cases = found.cases
+    axis = AXIS_WORDS[str(cases["axis"].iloc[0])]
+    yield f"{scene.name}: steps that fall, by {axis}"
+    values = cases["value"].unique()
+    yield f"{'':{NAME}}{'steps':>5}" + "".join(f"{value:8.3g}" for value in values)
+    for (build, holds), rows in cases.groupby(["build", "holds"], sort=False):
+        falls = zip(rows["fall"], rows["undecided"], strict=True)
+        counts = "".join(f"{f'{fall} ({open_}?)' if open_ else fall:>8}" for fall, open_ in falls)
+        yield f"{f'{build}, {holds}':{NAME}}{rows['steps'].iloc[0]:5}{counts}"
+
+
+def _cures(found: FailureMap) -> Sequence[str]:
+    """Return what fails first in every build, and what would cure it."""
+    value = found.usual
+    axis = AXIS_WORDS[str(found.cases["axis"].iloc[0])]
+    here = found.cases[(found.cases["value"] == value) & (found.cases["fall"] > 0)]
+    lines = [wrapped(_first_words(case)) for case in here.to_dict(orient="records")]
+    title = f"What falls first, {axis} {value:.3g}, and what would cure it"
+    return [title, *lines] if lines else []
+
+
+def _first_words(case: Mapping[Any, Any]) -> str:
+    """Return what falls first in a case, and what would cure it."""
+    joint = f", joint {case['joint']} {case['motion']}" if case["joint"] else ""
+    where = f"step {case['first_step']}, brick {case['brick']}{joint}"
+    return f"{case['build']}, {case['holds']}: {where}; {cure_words(case)}"

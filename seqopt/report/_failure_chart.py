@@ -1,0 +1,91 @@
+"""A map of failure as a picture (extra ``plot``)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from seqopt.report._failures import AXIS_WORDS
+from seqopt.report._style import GRAY, SKY, SMALL, VERMILION, new_figure, styled
+from seqopt.stability.assessment import Verdict
+from seqopt.stability.failure_map import FailureMap
+
+_ROW = 0.27  # inches of a build
+_COLORS = {
+    "not a step": "#ffffff",
+    Verdict.STANDS.value: SKY,
+    Verdict.UNDECIDED.value: GRAY,
+    Verdict.FALLS.value: VERMILION,
+}  # of a step
+
+
+@styled
+def failure_figure(found: FailureMap) -> Figure:
+    """Return which share of steps falls in every case, and where along the builds they do."""
+    names = [f"{build}, {holds}" for build, holds in _rows(found.cases)]
+    figure = new_figure(1.1 + 2 * _ROW * len(names))
+    over, along = figure.subplots(2, 1)
+    axis = AXIS_WORDS[str(found.cases["axis"].iloc[0])]
+    _shares(over, found, names)
+    over.set(title="steps that fall, of all steps", xlabel=axis)
+    value = found.usual
+    _along(along, found.steps[found.steps["value"] == value], names)
+    along.set(title=f"along the build, {axis} {value:.3g}", xlabel="bricks placed")
+    return figure
+
+
+def _rows(table: pd.DataFrame) -> list[tuple[str, str]]:
+    """Return every build with what holds it, in order."""
+    return [*dict.fromkeys(zip(table["build"], table["holds"], strict=True))]
+
+
+def _shares(axes: Axes, found: FailureMap, names: list[str]) -> None:
+    """Draw how many steps of how many fall, a row for every build."""
+    cases, values = found.cases, [*found.cases["value"].unique()]
+    share = (cases["fall"] / cases["steps"]).to_numpy().reshape(len(names), len(values))
+    axes.pcolormesh(share, cmap="OrRd", vmin=0.0, vmax=1.0, edgecolors="white", linewidth=1.0)
+    for i, row in enumerate(share):
+        for k, each in enumerate(row):
+            case = cases.iloc[i * len(values) + k]
+            color = "white" if each > 0.6 else "black"
+            said = f"{case['fall']} of {case['steps']}"
+            axes.text(k + 0.5, i + 0.5, said, ha="center", va="center", fontsize=SMALL, color=color)
+    axes.set_xticks(np.arange(len(values)) + 0.5, [f"{value:.3g}" for value in values])
+    _name(axes, names)
+
+
+def _along(axes: Axes, steps: pd.DataFrame, names: list[str]) -> None:
+    """Draw the worst verdict at every number of bricks, a row for every build."""
+    order: dict[Any, int] = {verdict: i for i, verdict in enumerate(_COLORS)}
+    rank = steps["verdict"].map(order)
+    most = int(steps["bricks"].max())
+    picture = np.zeros((len(names), most))
+    for i, (build, holds) in enumerate(_rows(steps)):
+        mine = (steps["build"] == build) & (steps["holds"] == holds)
+        worst = rank[mine].groupby(steps["bricks"][mine]).max()
+        picture[i, worst.index.to_numpy() - 1] = worst.to_numpy()
+    edges = np.arange(most + 1) + 0.5
+    colors = ListedColormap([*_COLORS.values()])
+    axes.pcolormesh(
+        edges, np.arange(len(names) + 1), picture, cmap=colors, vmin=-0.5, vmax=3.5,
+        edgecolors="white", linewidth=0.5,
+    )  # fmt: skip
+    words = {"every step stands": Verdict.STANDS, "some step falls": Verdict.FALLS}
+    if (steps["verdict"] == Verdict.UNDECIDED.value).any():
+        words["some step is undecided"] = Verdict.UNDECIDED
+    marks = [Patch(color=_COLORS[verdict.value], label=word) for word, verdict in words.items()]
+    axes.legend(handles=marks, loc="upper right", bbox_to_anchor=(1.0, 1.25), ncols=len(marks))
+    _name(axes, names)
+
+
+def _name(axes: Axes, names: list[str]) -> None:
+    axes.set_yticks(np.arange(len(names)) + 0.5, names)
+    axes.tick_params(length=0)
+    axes.invert_yaxis()
+    axes.spines[:].set_visible(False)

@@ -1,0 +1,125 @@
+"""Where builds fail, on a page: what is mapped, and how steps fall in the viewer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from seqopt.engines.interface import Engine
+from seqopt.errors import SeqoptError
+from seqopt.network.build import build_network
+from seqopt.report.page import Build, report_page
+from seqopt.responses.table import analyze
+from seqopt.scene.scene import Scene
+from seqopt.sequence.rules import FREE
+from seqopt.sequence.steps import Step
+from seqopt.sequence.two_robots import METHODS
+from seqopt.stability._builds import BuildVerdicts
+from seqopt.stability.assessment import Verdict
+from seqopt.stability.failure_map import FailureMap
+from seqopt.work.progress import Tell
+from seqopt.workflow import optimize
+
+AXIS_WORDS = {"friction": "friction", "tilt": "tilt, degrees"}
+SHOWN = {
+    "first_step": "first step",
+    "bond_needed_Pa": "bond for all steps, kPa",
+    "friction_needed": "friction for all steps",
+    "grip_node": "grip for the first step, node",
+}
+Builds = Mapping[str, Sequence[Step]]
+
+
+def usual_builds(
+    scene: Scene, progress: Tell = lambda _: None
+) -> tuple[dict[str, Sequence[Step]], list[str]]:
+    """Return the steps of the fixed methods, of a loop and of a free schedule.
+
+    The plans are those of `seqopt.optimize` without options. Results: ``builds`` by name, and
+    ``notes``: why others are not possible.
+    """
+    network, builds = build_network(scene), dict[str, Sequence[Step]]()
+    notes = []
+    for name, method in METHODS.items():
+        try:
+            builds[name] = method(network)
+        except SeqoptError as error:
+            notes.append(f"{name}: {error}")
+    for schedule in (None, FREE):
+        try:
+            plan = optimize(scene, schedule, progress=progress)
+            builds[plan.method] = plan.steps
+        except SeqoptError as error:
+            notes.append(f"{schedule or 'loop'}: {error}")
+    return builds, notes
+
+
+def failure_page(engine: Engine, builds: Builds, found: FailureMap) -> str:
+    """Return the page of a map: its table, and every build with how its steps fall.
+
+    ``engine``: of the scene; ``builds``: those mapped.
+    """
+    scene, value = engine.network.scene, found.usual
+    shown = [
+        Build(
+            name,
+            steps,
+            analyze(engine, steps),
+            _verdicts(found, name, value),
+            falls=found.motions.get(name),
+        )
+        for name, steps in builds.items()
+    ]
+    axis = AXIS_WORDS[str(found.cases["axis"].iloc[0])]
+    fall = found.cases["fall"].gt(0).groupby(found.cases["build"], sort=False).any()
+    ways = f"{len(shown)} way{'s' * (len(shown) != 1)} to build {scene.name}"
+    sentence = (
+        f"Where {ways} fail{'s' * (len(shown) == 1)}: {int(fall.sum())} of them somewhere on the "
+        f"map. Step by step, with {axis} {value:.3g}: a step that falls can be shown as it falls."
+    )
+    return report_page(engine, shown, sentence, [(_caption(axis), cases_shown(found, axis))])
+
+
+def _caption(axis: str) -> str:
+    return f"Steps that fall, by what holds the joints and by {axis}; a click shows the build"
+
+
+def cases_shown(found: FailureMap, axis: str) -> pd.DataFrame:
+    """Return the cases of a map as people read them: only what is known."""
+    table = found.cases.assign(bond_needed_Pa=found.cases["bond_needed_Pa"] / 1e3)
+    falls = table["fall"] > 0
+    for name in ("bond_needed_Pa", "friction_needed"):
+        table[name] = table[name].where(falls & np.isfinite(table[name]))
+    table["first_step"] = table["first_step"].where(falls)
+    undecided = ["undecided"] * int(not table["undecided"].any())
+    table = table.drop(columns=["axis", "bricks", *undecided])
+    return table.rename(columns={**SHOWN, "value": axis})
+
+
+def _verdicts(found: FailureMap, build: str, value: float) -> tuple[BuildVerdicts, ...]:
+    """Return the verdicts of a build at a value of the axis, what is first said to hold last."""
+    steps, cases = (
+        table[(table["build"] == build) & (table["value"] == value)]
+        for table in (found.steps, found.cases)
+    )
+    out = []
+    for case in cases.to_dict(orient="records"):
+        verdicts = map(Verdict, steps["verdict"][steps["holds"] == case["holds"]])
+        first = case["first_step"], case["brick"], case["joint"]
+        out.append(BuildVerdicts(case["holds"], tuple(verdicts), *first))
+    return tuple(out[::-1])  # the last one marks steps
+
+
+def cure_words(case: Mapping[Any, Any]) -> str:
+    """Return what would let a case of a map stand, in words."""
+    bond, friction, node = case["bond_needed_Pa"], case["friction_needed"], case["grip_node"]
+    enough = [f"a bond of {bond / 1e3:.3g} kPa"] if np.isfinite(bond) else []
+    enough += [f"friction {friction:.3g}"] if np.isfinite(friction) else []
+    all_ = (
+        f"every step stands with {' or '.join(enough)}" if enough else "no bond or friction helps"
+    )
+    one = "" if pd.isna(node) else f"; one more robot at node {int(node)} would hold this step"
+    return f"{all_}{one}"
