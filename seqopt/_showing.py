@@ -27,6 +27,7 @@ DISPLAYS = {
     "gantt_picture": "seqopt.report._pictures",
     "Film": "seqopt.report._pictures",
     "build_page": "seqopt.report._pages",
+    "failure_figure": "seqopt.report._failure_chart",
 }
 """The functions that draw, by name, and the module of each."""
 

@@ -75,7 +75,7 @@ def _asked_axis(text: str) -> tuple[str, tuple[float, ...]]:
     ]
     if wrong := [number for number in numbers if axis == "tilt" and number > STEEPEST]:
         raise ProblemError(
-            f"--map {text}: {wrong[0]:g} is no {axis}; give 0 or more, tilt up to 45"
+            f"--map {text}: {wrong[0]:g} is too much; give tilt from 0 to {STEEPEST:g}"
         )
     return axis, tuple(sorted({*numbers}))
 

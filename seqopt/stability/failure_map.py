@@ -11,10 +11,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
+from seqopt._showing import display
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar, find_mortar
@@ -28,6 +30,9 @@ from seqopt.stability._step_verdicts import each_verdict
 from seqopt.stability.assessment import Stability, Verdict, assess
 from seqopt.work.progress import Tell, with_progress
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 AXES = {"friction": (0.2, 0.3, DRY.friction, 0.6, 0.8), "tilt": (0.0, 1.0, 2.0, 4.0, 8.0)}
 _TILTED = 8  # directions, evenly spread
 _SURE = 1e-3  # share by which more is taken than a step is proven to need
@@ -35,7 +40,7 @@ _TRIED = 24  # nodes where one more grip is tried, the fastest ones first
 _HINGE = 0.5  # share of the opening that turning brings about, from which on it is a turn
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FailureMap:
     """What falls, where, and what would cure it.
 
@@ -62,6 +67,19 @@ class FailureMap:
     steps: pd.DataFrame
     motions: Mapping[str, Floats]
     usual: float
+
+    def __repr__(self) -> str:
+        fall, steps = self.cases["fall"].sum(), self.cases["steps"].sum()
+        return f"<FailureMap: {len(self.cases)} cases, {fall} of {steps} steps fall>"
+
+    def plot(self) -> Figure:
+        """Draw which share of steps falls in every case, and where along the builds.
+
+        Result: a notebook shows it; ``savefig`` writes it to a file. Raises `ExtraError` if
+        matplotlib is not installed (extra ``plot``).
+        """
+        figure: Figure = display("failure_figure")(self)
+        return figure
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,7 @@ STARTS = (  # of lines on standard error
         "engine: ",
         "robots: ",
         "payload: ",
+        "kept: ",
         "stresses in joints are not checked: ",
         "stability: not proven; ",
     ),

@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> Answer:
     steps = asked_steps(options, scene)
     rows = _found(options, network, steps, mortar)
     table = pd.DataFrame(rows.rows)
-    went_on = f"{rows.taken_up} of {len(table)} steps were found before: {rows.path}"
+    went_on = f"kept: {rows.taken_up} of {len(table)} steps, found before, from {rows.path}"
     answer = put_table(options.out, table, f"{format_rows(table)};")
     rows.done()
     found = {verdict: table["verdict"] == verdict.value for verdict in Verdict}

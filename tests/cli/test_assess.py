@@ -1,0 +1,117 @@
+"""The command ``assess``: rows that are kept, chosen margins, and the map."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pandas as pd
+import pytest
+
+from seqopt._cli.main import main
+from seqopt._cli.rows import Rows
+from seqopt.errors import FileError
+
+ARCH = "arch:span=1,rise=0.4,pattern=VLR"
+WORDS = ["assess", ARCH, "--method", "sequential", "--mortar", "dry"]
+
+
+def contents(path):
+    return path.read_text(encoding="utf-8")
+
+
+def test_a_run_goes_on_where_it_was_ended(capsys, tmp_path, monkeypatch):
+    whole, out = tmp_path / "whole.csv", tmp_path / "out.csv"
+    assert main([*WORDS, "--out", str(whole)]) == 1
+    add, end = Rows.add, 5
+
+    def until(self, row):
+        if len(self.rows) == end:
+            raise KeyboardInterrupt
+        add(self, row)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Rows, "add", until)
+        assert main([*WORDS, "--out", str(out)]) == 130
+    part = tmp_path / "out.csv.part"
+    said = f"seqopt: interrupted; 5 of 17 steps are in {part}; the same command goes on from there"
+    assert capsys.readouterr().err == f"{said}\n"
+    assert not out.exists()
+    with part.open("a", encoding="utf-8") as stream:
+        stream.write('{"step": 6, "ty')  # cut short
+    asked = []
+    monkeypatch.setattr(Rows, "add", lambda self, row: asked.append(row) or add(self, row))
+    assert main([*WORDS, "--out", str(out)]) == 1
+    assert capsys.readouterr().err == f"kept: 5 of 17 steps, found before, from {part}\n"
+    assert len(asked) == 12
+    own, other = (pd.read_csv(path) for path in (out, whole))
+    pd.testing.assert_frame_equal(own.drop(columns="proof"), other.drop(columns="proof"))
+    assert not part.exists()
+
+
+def test_rows_of_something_else_are_not_taken_up(tmp_path):
+    out = tmp_path / "out.csv"
+    Rows(out, "one thing").add({"step": 1})
+    assert Rows(out, "one thing").rows == [{"step": 1}]
+    assert Rows(out, "another").rows == []
+    (tmp_path / "out.csv.part").write_text("", encoding="utf-8")
+    assert Rows(out, "one thing").rows == []
+    with pytest.raises(FileError, match="cannot write"):
+        Rows(tmp_path / "none" / "out.csv", "one thing").add({"step": 1})
+
+
+@pytest.mark.parametrize(("words", "known"), [("4:6", [4, 5, 6]), ("16:", [16, 17]), ("3", [3])])
+def test_margins_of_some_steps(capsys, tmp_path, words, known):
+    out = tmp_path / "out.csv"
+    assert main([*WORDS, "--steps", words, "--margins", "bond", "--out", str(out)]) == 1
+    table = pd.read_csv(out)
+    assert table["step"][table["bond_needed_Pa"].notna()].tolist() == known
+    assert table["friction_needed"].isna().all()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--steps", "5:3"], "--steps 5:3: the first is after the last; exchange them"),
+        (["--steps", "0:3"], "--steps 0:3: give numbers from 1 to 17, as 3:7"),
+        (["--steps", "a"], "--steps a: give numbers from 1 to 17, as 3:7"),
+        (["--margins", "tillt"], "margin 'tillt' (did you mean tilt?): give all, or some of"),
+        (["--workers", "0"], "--workers 0: give a whole number from 1"),
+        (["--map", "wind"], "--map wind: give friction or tilt, with values as friction=0.3,0.6"),
+        (["--map", "tilt=60"], "--map tilt=60: 60 is too much; give tilt from 0 to 45"),
+        (["--map", "friction=x"], "--map friction=x: 'x' is not a positive number or zero"),
+        (["--map", "friction", "--holds", "glue"], "mortar 'glue': give a Mortar, or one of"),
+    ],
+)
+def test_what_cannot_be_meant_is_a_line(capsys, words, said):
+    assert main([*WORDS, *words]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_a_map_of_one_method(capsys, tmp_path):
+    words = ["--map", "friction=0.2,0.6", "--holds", "dry,bond=1e5"]
+    assert main([*WORDS, *words, "--json", "--out", str(tmp_path / "map")]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert [case["value"] for case in found["cases"]] == [0.2, 0.6, 0.2, 0.6]
+    assert {case["build"] for case in found["cases"]} == {"sequential"}
+    folder = {path.name for path in (tmp_path / "map").iterdir()}
+    assert folder >= {"map.csv", "map_steps.csv", "report.html"}
+    table = pd.read_csv(tmp_path / "map" / "map.csv")
+    assert table["fall"].tolist() == [case["fall"] for case in found["cases"]]
+    page = contents(tmp_path / "map" / "report.html")
+    data = json.loads(re.search(r'type="application/json">(.*?)</script>', page)[1])
+    (build,) = data["builds"]
+    assert build["fall"]["width"] == 6 * 9
+    assert "falls dry" in " ".join(build["marks"])
+
+
+@pytest.mark.slow
+def test_a_map_of_all_methods_reads_in_80_columns(capsys):
+    assert main(["assess", ARCH, "--map", "tilt=0,5"]) == 1
+    out = capsys.readouterr().out
+    assert max(map(len, out.splitlines())) <= 80
+    for name in ("sequential, dry", "cantilever, epoxy", "three-robot, dry", "free, epoxy"):
+        assert name in out
+    assert "every step stands with a bond of" in " ".join(out.split())

@@ -1,0 +1,123 @@
+"""A map of failure: its counts are verdicts, and what it says would cure a build does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt.contact.mortar import DRY, Mortar, bond_mortar
+from seqopt.errors import SceneError
+from seqopt.sequence.steps import Step, StepKind
+from seqopt.stability._step_verdicts import step_verdicts
+from seqopt.stability.assessment import Verdict
+from seqopt.stability.failure_map import failure_map
+
+FRICTIONS = (0.15, 0.45)
+
+
+@pytest.fixture(scope="module")
+def network():
+    return seqopt.build_network(seqopt.load_scene("arch:span=1,rise=0.4,pattern=VLR"))
+
+
+@pytest.fixture(scope="module")
+def builds(network):
+    return {"sequential": seqopt.sequential(network), "cantilever": seqopt.cantilever(network)}
+
+
+@pytest.fixture(scope="module")
+def found(network, builds):
+    return failure_map(network.scene, builds, ["dry", "bond=2e3"], values=FRICTIONS)
+
+
+def falls(network, steps, mortar):
+    return [verdict is Verdict.FALLS for verdict in step_verdicts(network, steps, mortar)]
+
+
+def test_counts_are_those_of_the_verdicts(network, builds, found):
+    assert len(found.cases) == 8
+    for case in found.cases.to_dict(orient="records"):
+        tension = {"dry": 0.0, "bond=2e3": 2e3}[case["holds"]]
+        bond = bond_mortar(2e3).cohesion if tension else 0.0
+        mortar = Mortar(friction=case["value"], tensile_strength=tension, cohesion=bond)
+        own = falls(network, builds[case["build"]], mortar)
+        assert (case["steps"], case["fall"]) == (len(own), sum(own))
+        assert case["first_step"] == (own.index(True) + 1 if any(own) else 0)
+    counted = found.steps.groupby(["build", "holds", "value"])["verdict"]
+    fall = counted.agg(lambda each: (each == Verdict.FALLS.value).sum())
+    assert fall.sum() == found.cases["fall"].sum() > 0
+
+
+def test_the_least_bond_is_enough_and_less_is_not(network, builds, found):
+    dry = found.cases[(found.cases["holds"] == "dry") & (found.cases["fall"] > 0)]
+    assert len(dry)
+    for case in dry.to_dict(orient="records"):
+        steps, friction = builds[case["build"]], case["value"]
+        assert not any(falls(network, steps, bond_mortar(case["bond_needed_Pa"], friction)))
+        assert any(falls(network, steps, bond_mortar(0.98 * case["bond_needed_Pa"], friction)))
+
+
+def test_the_least_friction_is_enough_and_less_is_not():
+    """Bricks along the arch slide alone; those across it tip, and no friction helps."""
+    network = seqopt.build_network(seqopt.load_scene("arch:span=1,rise=0.4"))
+    steps = seqopt.cantilever(network)
+    (case,) = failure_map(network.scene, {"": steps}, ["dry"], values=[0.05]).cases.itertuples()
+    assert case.fall > 0
+    least = case.friction_needed
+    assert not any(falls(network, steps, Mortar(friction=least)))
+    assert any(falls(network, steps, Mortar(friction=0.98 * least)))
+
+
+def test_no_friction_holds_what_tips(found):
+    tips = found.cases[(found.cases["fall"] > 0) & (found.cases["holds"] == "dry")]
+    assert np.isinf(tips["friction_needed"]).all()
+
+
+def test_one_more_robot_holds_the_first_step(network, builds, found):
+    scene = network.scene
+    more = replace(scene.robots[0], name="more")
+    helped = seqopt.build_network(replace(scene, robots=(*scene.robots, more)))
+    held = found.cases[found.cases["grip_node"].notna()].to_dict(orient="records")
+    assert held
+    for case in held:
+        step = builds[case["build"]][case["first_step"] - 1]
+        step = replace(step, grips=(*step.grips, int(case["grip_node"])))
+        mortar = Mortar(friction=case["value"])
+        if case["holds"] == "dry":
+            assert step_verdicts(helped, [step], mortar) == (Verdict.STANDS,)
+
+
+def test_motions_are_of_the_steps_that_fall(builds, found):
+    dry = found.steps[(found.steps["holds"] == "dry") & (found.steps["value"] == found.usual)]
+    assert found.usual == 0.45
+    for build, motion in found.motions.items():
+        assert motion.shape[0] == len(builds[build])
+        fall = dry["verdict"][dry["build"] == build] == Verdict.FALLS.value
+        assert (np.abs(motion).max(axis=(1, 2)) > 0).tolist() == fall.tolist()
+
+
+def test_no_tilt_is_the_friction_of_the_mortar_and_more_tilt_fells_no_less(network, builds):
+    one = {"sequential": builds["sequential"]}
+    upright = failure_map(network.scene, one, ["dry"], values=[DRY.friction]).cases
+    tilted = failure_map(network.scene, one, ["dry"], "tilt", [0.0, 20.0]).cases
+    assert tilted["fall"].iloc[0] == upright["fall"].iloc[0]
+    assert tilted["fall"].iloc[1] > tilted["fall"].iloc[0]
+
+
+@pytest.mark.parametrize(("friction", "word"), [(0.05, "slides"), (5.0, "turns")])
+def test_how_a_leaning_brick_falls(friction, word):
+    """A steep joint: with little friction the second brick slides; with much it turns over."""
+    scene = seqopt.load_scene("arch:span=1,rise=0.4,pattern=VLR")
+    bare = [Step(1, StepKind.PLACE, 8, (None,) * len(scene.robots))]
+    case = failure_map(scene, {"bare": bare}, ["dry"], values=[friction]).cases.iloc[0]
+    assert (case["fall"], case["motion"]) == (1, word)
+
+
+def test_wrong_words(network, builds):
+    with pytest.raises(SceneError, match="axis 'wind': give one of friction, tilt"):
+        failure_map(network.scene, builds, axis="wind")
+    with pytest.raises(SceneError, match="mortar 'glue'"):
+        failure_map(network.scene, builds, ["glue"])

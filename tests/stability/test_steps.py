@@ -1,0 +1,84 @@
+"""Verdicts of steps apart from their margins: what is asked for is found, nothing else changes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt.contact.faces import step_assembly
+from seqopt.contact.mortar import DRY, EPOXY
+from seqopt.errors import SceneError
+from seqopt.stability import assess
+from seqopt.stability._step_verdicts import each_stability, stability_row
+from seqopt.stability.assessment import MARGINS
+from seqopt.stability.steps import assess_steps
+from tests.builders import six_bricks
+
+NUMBERS = {"bond": "bond", "friction": "friction", "tilt": "tilt", "payload": "grip"}
+
+
+@pytest.fixture(scope="module")
+def network():
+    return seqopt.build_network(seqopt.load_scene("arch25"))
+
+
+@pytest.fixture(scope="module")
+def steps(network):
+    return seqopt.cantilever(network)[24:28]
+
+
+@pytest.mark.parametrize("margin", MARGINS)
+def test_a_margin_is_found_alone_as_with_all_others(network, steps, margin):
+    for step, found in zip(steps, assess_steps(network, steps, DRY, [margin]), strict=True):
+        whole = assess(step_assembly(network, step.bricks, step.grips), DRY)
+        assert found.verdict is whole.verdict
+        for name, number in NUMBERS.items():
+            own, other = getattr(found, number), getattr(whole, number)
+            if name == margin:
+                assert own == pytest.approx(other, rel=2e-3, abs=1e-6, nan_ok=True)
+            else:
+                assert np.isnan(own)
+
+
+def test_margins_of_chosen_steps_alone(network, steps):
+    chosen = [steps[1].number]
+    found = [*each_stability(network, steps, DRY, MARGINS, chosen)]
+    assert [np.isnan(each.bond) for each in found] == [True, False, True, True]
+    plain = assess_steps(network, steps, DRY)
+    assert [each.verdict for each in found] == [each.verdict for each in plain]
+    assert {each.jammed for each in plain} == {None}
+
+
+def test_what_fails_first_is_known_without_margins(network, steps):
+    for found in assess_steps(network, steps, DRY):
+        falls = found.verdict is not seqopt.stability.Verdict.STANDS
+        assert bool(found.first_block) == bool(found.motion.any()) == falls
+
+
+@pytest.mark.slow
+def test_shared_steps_have_the_same_rows(network):
+    steps = seqopt.sequential(network)[:20]
+    alone = [*each_stability(network, steps, EPOXY)]
+    shared = [*each_stability(network, steps, EPOXY, shared=(None, 2))]
+    verdicts = [[found.verdict for found in each] for each in (alone, shared)]
+    assert verdicts[0] == verdicts[1]
+    rows = [stability_row(*pair) for pair in zip(steps, shared, strict=True)]
+    assert [row["step"] for row in rows] == [step.number for step in steps]
+
+
+def test_no_steps_and_no_such_margin():
+    network = seqopt.build_network(six_bricks())
+    assert assess_steps(network, (), DRY) == ()
+    assert [*each_stability(network, (), DRY, shared=(None, 2))] == []
+    with pytest.raises(SceneError, match=r"margin 'tillt' \(did you mean tilt\?\): give all"):
+        assess_steps(network, (), DRY, ["tillt"])
+
+
+def test_a_step_that_touches_nothing_is_not_called_standing(network, steps):
+    """The control: verdicts follow the step, and not the ones before it."""
+    bare = [replace(step, grips=(None,) * 3) for step in steps]
+    found = assess_steps(network, [*steps[:2], *bare], DRY)
+    assert {each.verdict for each in found[2:]} == {seqopt.stability.Verdict.FALLS}
