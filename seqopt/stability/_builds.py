@@ -24,9 +24,11 @@ from seqopt.work.progress import Tell, with_progress
 
 SHOWN = {"dry": DRY, "epoxy": EPOXY}  # with which it is said what stands
 SCREENED = 60  # bricks up to which a program for all grips at once is quickly solved
+_SETS = 6  # grips of as many bricks, in the mean, from which on such a program pays
 _State = tuple[int, Grips]  # bricks that stand, and nodes held
 _Found = Iterator[tuple[_State, Verdict]]
 _Told = Callable[[], Iterator[Step]]  # steps, told as they are asked
+_Way = Callable[[Network, Sequence[Step], Mortar, _Told], _Found]
 WORDS = {Verdict.STANDS: "stands", Verdict.FALLS: "falls", Verdict.UNDECIDED: "is undecided"}
 _MANY = {Verdict.FALLS: "fall", Verdict.UNDECIDED: "are undecided"}
 
@@ -94,7 +96,6 @@ class BuildProver:
     ) -> None:
         self._network, self._mortars, self._progress = network, mortars, progress
         self._known: dict[str, dict[_State, Verdict]] = {name: {} for name in mortars}
-        self._prove = _screened if len(network.inner) <= SCREENED else _one_by_one
         self.refusal = ""
 
     def of_tables(self, tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[BuildVerdicts, ...]]:
@@ -131,7 +132,13 @@ class BuildProver:
             new.sort(key=attrgetter("bricks"))
             what = f"proving what stands, {name}"
             tell = partial(with_progress, what, new, self._progress)
-            known.update(self._prove(self._network, new, mortar, tell))
+            known.update(self._way(new)(self._network, new, mortar, tell) if new else ())
+
+    def _way(self, steps: Sequence[Step]) -> _Way:
+        """Return what proves most quickly which of some steps stand."""
+        counts = {step.bricks for step in steps}
+        many = len(steps) > _SETS * len(counts) and len(self._network.inner) <= SCREENED
+        return _screened if many else _one_by_one
 
     def _of_build(self, steps: Sequence[Step], name: str) -> BuildVerdicts:
         verdicts = tuple(self._known[name][_state(step)] for step in steps)

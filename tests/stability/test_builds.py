@@ -50,11 +50,10 @@ def test_they_are_those_of_every_step_on_its_own(flat, builds, found):
     assert counts == {"sequential": [18, 0], "cantilever": [20, 0]}
 
 
-@pytest.mark.parametrize("how", ["one by one", "left open"])
+@pytest.mark.parametrize("how", ["one by one", "many at once", "left open"])
 def test_every_way_says_the_same(flat, builds, found, monkeypatch, how):
-    if how == "one by one":
-        monkeypatch.setattr(_builds, "SCREENED", 0)
-    else:
+    monkeypatch.setattr(_builds, "SCREENED" if how == "one by one" else "_SETS", 0)
+    if how == "left open":
         nothing = lambda self, bricks, held, payload: np.zeros(len(held), np.int8)  # noqa: E731
         monkeypatch.setattr(_builds.Screen, "stands", nothing)
     assert BuildProver(flat).of_builds(builds) == found
@@ -88,6 +87,7 @@ def test_what_is_not_known_has_a_reason(arch25, tmp_path, capsys):
 @pytest.mark.parametrize("most", [0, 60])
 def test_progress_is_told_as_verdicts_are_found(flat, builds, monkeypatch, most):
     monkeypatch.setattr(_builds, "SCREENED", most)
+    monkeypatch.setattr(_builds, "_SETS", 0)
     known = []
     prover = BuildProver(flat, SHOWN, lambda _: known.append(len(prover._known["dry"])))
     prover.of_builds(builds)
@@ -98,7 +98,8 @@ def test_progress_is_told_as_verdicts_are_found(flat, builds, monkeypatch, most)
 def test_equal_structures_are_asked_once(flat, builds, found, monkeypatch):
     prover = BuildProver(flat)
     prover.of_builds(builds)
-    monkeypatch.setattr(_builds.Screen, "stands", None)
+    monkeypatch.setattr(_builds, "_screened", None)
+    monkeypatch.setattr(_builds, "_one_by_one", None)
     assert prover.of_builds(builds) == found
 
 
