@@ -201,7 +201,8 @@ def tabulate(engine: ComplianceEngine, name: str, steps: tuple[Step, ...]) -> pd
     table = analyze(engine, steps)
     robots = [force_column(robot) for robot in net.scene.robots]
     largest = table[robots].abs().max(axis=1).fillna(0.0)
-    dry, bound = (stability_table(steps, assess_steps(net, steps, m, MARGINS)) for m in (DRY, EPOXY))
+    found = (assess_steps(net, steps, mortar, MARGINS) for mortar in (DRY, EPOXY))
+    dry, bound = (stability_table(steps, each) for each in found)
     own = {name: f"dry{end}" for name, end in ENDS.items()}
     other = {name: f"epoxy{end}" for name, end in ENDS.items()}
     out = dry.rename(columns=own).join(bound[[*ENDS]].rename(columns=other))
