@@ -89,6 +89,7 @@ def stated() -> dict[str, str]:
         | _outside(stored("outside_assemblies"))
         | _composing(stored("composing"))
         | {"free_formulations_table": _free_formulations(stored("free_formulations"))}
+        | {"classical_table": _classical(stored("classical"))}
     )
 
 
@@ -124,6 +125,13 @@ def _free_formulations(table: pd.DataFrame) -> str:
             cells = part.set_index("bricks")["cell"].reindex(counts, fill_value="not asked")
             rows.append([f"`{name}`", part["kind"].iloc[0], str(aim), *cells])
     return markdown(["formulation", "kind", "aim", *(f"{n} bricks" for n in counts)], rows)
+
+
+def _classical(table: pd.DataFrame) -> str:
+    off = (100 * table["off"]).map("{:.2f} %".format).where(table["known"].notna(), "–")
+    numbers = [table[name].map("{:.4g}".format).replace("nan", "–") for name in ("known", "ours")]
+    rows = zip(table["result"], table["source"], *numbers, off, strict=True)
+    return markdown(["result", "by", "known", "ours", "difference"], [*rows])
 
 
 def _outside(table: pd.DataFrame) -> dict[str, str]:

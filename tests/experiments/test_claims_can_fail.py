@@ -30,7 +30,7 @@ from experiments.placement import (
     speed_accuracy,
     staged_construction,
 )
-from experiments.stability import dry_map, witnesses
+from experiments.stability import classical, dry_map, witnesses
 from experiments.study import criteria_variants, paper_counterparts
 from experiments.study.parts.paper_items import ITEMS
 from seqopt.study.published import printed
@@ -62,6 +62,11 @@ CHECKS = {
         calibration.holds,
         ("calibration_fits", "calibration_comparison"),
         *("paper_percent", 10.0, {"what": calibration_spread.IN_SAMPLE}, 1),
+    ),
+    "classical": Check(
+        lambda table: not classical.faults(table),
+        ("classical",),
+        *("off", 0.01, {"source": "Milankovitch (1907)"}),
     ),
     "contact_steps": Check(
         contact_steps.holds,

@@ -65,18 +65,46 @@ def touching(centroid: Floats, weight: Floats, contacts: Sequence[Contact]) -> A
 def stack(offsets: Sequence[float], size: Sequence[float] = (1.0, 1.0, 1.0)) -> Blocks:
     """Return boxes on the ground, one on another, each shifted along x against the one below."""
     length, width, height = size
-    at = np.concatenate([[0.0], np.cumsum(offsets)])
-    flat = np.array([[0, 0, 0], [length, 0, 0], [length, width, 0], [0, width, 0]])
-    up = np.array([0, 0, height])
+    return courses([[(x, length)] for x in np.cumsum([0.0, *offsets])], height, width)
+
+
+def courses(
+    rows: Sequence[Sequence[tuple[float, float]]], height: float, depth: float = 1.0
+) -> Blocks:
+    """Return boxes in courses from the ground up, each by its left end and its length."""
+    boxes = [(x, x + long, row) for row, course in enumerate(rows) for x, long in course]
     vertex, contacts = [], []
-    for i, x in enumerate(at):
-        base = flat + np.array([x, 0, i * height])
-        vertex.append(np.concatenate([base, base + up]))
-        before = at[i - 1] if i else x
-        low, high, z = max(x, before), min(x, before) + length, i * height
-        face = np.array([[low, 0, z], [high, 0, z], [high, width, z], [low, width, z]])
-        contacts.append(Contact((i - 1, i) if i else (GROUND, 0), face))
+    for i, (left, right, row) in enumerate(boxes):
+        base = _level(left, right, row * height, depth)
+        vertex.append(np.concatenate([base, base + np.array([0, 0, height])]))
+        if row == 0:
+            contacts.append(Contact((GROUND, i), base))
+        for k, (start, end, below) in enumerate(boxes[:i]):
+            low, high = max(left, start), min(right, end)
+            if row - below == 1 and low < high:
+                contacts.append(Contact((k, i), _level(low, high, row * height, depth)))
+            if row == below and np.isclose(end, left):
+                contacts.append(Contact((k, i), vertex[i][[0, 3, 7, 4]]))
     return Blocks(np.array(vertex), tuple(contacts))
+
+
+def _level(left: float, right: float, z: float, depth: float) -> Floats:
+    """Return the corners of a level face."""
+    return np.array([[left, 0, z], [right, 0, z], [right, depth, z], [left, depth, z]])
+
+
+def voussoirs(section: Floats, width: Floats | float = 1.0) -> Blocks:
+    """Return the blocks of an arch that stands on the ground at both ends.
+
+    ``section`` (n + 1, 2, 2): inner and outer points of the joints in x and z; ``width``: there.
+    """
+    half = np.multiply.outer(np.broadcast_to(width, section.shape[:2]) / 2, [0.0, 1.0, 0.0])
+    middle = np.insert(section, 1, 0.0, axis=2)
+    faces = np.concatenate([middle - half, (middle + half)[:, ::-1]], axis=1)
+    last = len(faces) - 1
+    contacts = [Contact((i - 1, i), faces[i]) for i in range(1, last)]
+    ends = [Contact((GROUND, 0), faces[0]), Contact((GROUND, last - 1), faces[-1])]
+    return Blocks(np.concatenate([faces[:-1], faces[1:]], axis=1), (*ends, *contacts))
 
 
 def ring(blocks: int, radius: float, thickness: float, half_angle: float = np.pi / 2) -> Blocks:
@@ -85,13 +113,8 @@ def ring(blocks: int, radius: float, thickness: float, half_angle: float = np.pi
     The radius is that of the middle line; the half angle is measured from the crown.
     """
     angle = np.linspace(-half_angle, half_angle, blocks + 1)
-    out = np.stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)], axis=1)
-    inner, outer = (radius - thickness / 2) * out, (radius + thickness / 2) * out
-    depth = np.array([0.0, 1.0, 0.0])
-    faces = np.stack([inner, outer, outer + depth, inner + depth], axis=1)
-    contacts = [Contact((i - 1, i), faces[i]) for i in range(1, blocks)]
-    ends = [Contact((GROUND, 0), faces[0]), Contact((GROUND, blocks - 1), faces[-1])]
-    return Blocks(np.concatenate([faces[:-1], faces[1:]], axis=1), (*ends, *contacts))
+    size = [radius - thickness / 2, radius + thickness / 2]
+    return voussoirs(np.einsum("s,dn->nsd", size, [np.sin(angle), np.cos(angle)]))
 
 
 def _normal(face: Floats) -> Floats:
