@@ -119,9 +119,11 @@ def limits(
 def violation(assembly: Assembly, case: Case, answer: Answer, own: Floats | None = None) -> float:
     """Return by how much the forces of an answer violate a case at most, over the force scale.
 
-    Infinite where the answer is not finite. ``own``: as of `limits`.
+    Infinite where the answer is not finite, or of other shapes. ``own``: as of `limits`.
     """
     z, force, grip = answer.value, answer.contact_force, answer.grip_force
+    if (force.shape, grip.shape) != ((len(assembly.corner), 3), (len(assembly.payload), 3)):
+        return np.inf
     residual = assembly.contact_map @ force.ravel() + assembly.grip_map @ grip.ravel()
     residual += assembly.load() + z * assembly.load(case.pull)
     tension, cohesion, payload = limits(assembly, case, z, own)
