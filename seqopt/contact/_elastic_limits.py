@@ -7,10 +7,11 @@ moment, and checked at the corners, where the stress is largest.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import Mortar
@@ -104,14 +105,19 @@ class ElasticLimits(FrozenValue):
     def exceeded(self, wrench: Floats) -> Bools:
         """Return which grip sets (S,) leave the elastic limits anywhere, beyond rounding."""
         margin, mortar = _STRESS_MARGIN * self.assembly.stress_scale, self.mortar
-        most, least = wrench.max(axis=0, initial=0.0), wrench.min(axis=0, initial=0.0)
-        largest = np.maximum(most, -least)[self.assembly.contact]
-        stress = (np.abs(self.stress) @ largest[:, :, None])[:, :, 0]
-        shear = np.linalg.norm(stress[:, 1:], axis=1) + mortar.friction * stress[:, 0]
-        beyond = np.maximum(stress[:, 0] - mortar.tensile_strength, shear - mortar.cohesion)
+        most = np.einsum("qji,ji->qj", self._largest, np.abs(wrench).max(axis=0, initial=0.0))
+        beyond = most - [[mortar.tensile_strength], [mortar.cohesion]]
         if beyond.max() <= margin:  # by the largest of all; as a rule, and a tenth of the work
             return np.zeros(len(wrench), dtype=bool)
         return np.asarray(self.excess(wrench).max(axis=1, initial=-np.inf) > margin)
+
+    @cached_property
+    def _largest(self) -> Floats:
+        """Tension, and shear with friction, at any corner for the parts of wrenches, (2, J, 6)."""
+        tension, shear = np.abs(self.stress[:, 0]), np.linalg.norm(self.stress[:, 1:], axis=1)
+        each = np.stack([tension, shear + self.mortar.friction * tension])
+        starts = first_points(self.assembly.contact, len(self.assembly.bodies))
+        return frozen(np.maximum.reduceat(each, starts, axis=1))
 
 
 def find_elastic_limits(network: Network, mortar: Mortar) -> ElasticLimits:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from seqopt.arrays import Bools
 from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
-from seqopt.engines._planar import PlanarEngine, find_plane, off_plane
+from seqopt.engines._planar import find_plane, off_plane
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import (
     Fields,
@@ -56,6 +56,40 @@ _OFF_PLANE = LevelChoice(Level.RIGID, "a grip lies outside the plane of the bric
 _BEYOND = LevelChoice(Level.DISCRETE, "a joint would leave its elastic limits")
 
 
+class _RigidBricks(NamedEngine):
+    """Bricks on springs that never break, in the plane for the grip sets that lie in it.
+
+    ``in_space``: of grip sets that do not, the level and why.
+    """
+
+    def __init__(self, network: Network | Scene) -> None:
+        super().__init__(network)
+        self._space = ComplianceEngine(self.network)
+        plane, self.in_space = find_plane(self.network), _OFF_PLANE
+        self._flat: Bools = np.zeros(2 * len(self.network.inner), dtype=bool)  # by node
+        if isinstance(plane, str):
+            self.in_space = LevelChoice(Level.RIGID, plane)
+        else:
+            self._plane = ComplianceEngine(self.network, plane.basis)
+            self._flat = off_plane(self.network, plane) == 0
+
+    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+        """Return the fields of a partial structure for grip sets (S, r)."""
+        if not self._flat.any():
+            return self._space.solve(bricks, grips, want)
+        if self._flat.all():
+            return self._plane.solve(bricks, grips, want)
+        flat, sets = self.lies_flat(bricks, grips), np.asarray(grips)
+        inside = self._plane.solve(bricks, sets[flat], want)
+        return merge_sets(flat, inside, self._space.solve(bricks, sets[~flat], want))
+
+    def lies_flat(self, bricks: int, grips: ArrayLike) -> Bools:
+        """Return which grip sets (S,) lie in the plane of the structure."""
+        if not self._flat.any() or self._flat.all():
+            return np.full(len(np.asarray(grips)), self._flat[0])
+        return np.asarray(self._flat[grip_columns(self.network, bricks, grips)].all(axis=1))
+
+
 class AutoEngine(NamedEngine):
     """Computes every grip set at the cheapest level whose condition it meets.
 
@@ -66,13 +100,10 @@ class AutoEngine(NamedEngine):
 
     def __init__(self, network: Network | Scene, mortar: Mortar = EPOXY) -> None:
         super().__init__(network)
-        self.rigid = ComplianceEngine(self.network)
+        self.rigid = _RigidBricks(self.network)
         self._discrete = DiscreteEngine(self.network, mortar)
         self._limits: ElasticLimits | None = None
         self.tally, self.unchecked = Counter[LevelChoice](), ""
-        plane = find_plane(self.network)
-        self._planar = None if isinstance(plane, str) else PlanarEngine(self.network, plane)
-        self._in_space = LevelChoice(Level.RIGID, plane) if isinstance(plane, str) else _OFF_PLANE
         try:
             self._limits = find_elastic_limits(self.network, mortar)
         except SceneError as error:
@@ -80,21 +111,15 @@ class AutoEngine(NamedEngine):
 
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
-        columns = grip_columns(self.network, bricks, grips)
-        sets = np.asarray(grips).reshape(columns.shape)
         asked = want if self._limits is None else want | Want.JOINTS
-        flat: Bools = np.zeros(len(columns), dtype=bool)
-        if self._planar is not None:
-            flat = np.asarray(~off_plane(self.network, self._planar.plane, columns).any(axis=1))
-        fields = self.rigid.solve(bricks, sets[~flat], asked)
-        if self._planar is not None and flat.any():
-            fields = merge_sets(flat, self._planar.solve(bricks, sets[flat], asked), fields)
-        beyond = np.zeros(len(sets), dtype=bool)
+        fields, flat = self.rigid.solve(bricks, grips, asked), self.rigid.lies_flat(bricks, grips)
+        beyond = np.zeros(len(flat), dtype=bool)
         if self._limits is not None:
             beyond = self._limits.exceeded(fields.joint_wrench)
         if beyond.any():
-            found = self._discrete.solve(bricks, sets[beyond], asked)
+            found = self._discrete.solve(bricks, np.asarray(grips)[beyond], asked)
             fields = merge_sets(beyond, keep_wanted(found, asked), select_sets(fields, ~beyond))
-        levels = (_IN_PLANE, flat & ~beyond), (self._in_space, ~flat & ~beyond), (_BEYOND, beyond)
+        in_space = self.rigid.in_space
+        levels = (_IN_PLANE, flat & ~beyond), (in_space, ~flat & ~beyond), (_BEYOND, beyond)
         self.tally.update({level: int(mine.sum()) for level, mine in levels if mine.any()})
         return keep_wanted(fields, want)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.arrays import Floats, FrozenValue
 from seqopt.engines.interface import Basis, Fields, NamedEngine, Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, SceneError
@@ -50,16 +50,17 @@ def find_plane(network: Network) -> _Plane | str:
     springs = network.springs
     points = np.vstack([network.centroid, springs.position, springs.anchor])
     normal = _normal(network, points - points.mean(axis=0))
-    plane = _Plane(points.mean(axis=0), normal, plane_axes(normal)[1:])
+    up = np.array(network.scene.up)
+    plane = _Plane(points.mean(axis=0), normal, np.array([np.cross(up, normal), up]))
     return _points_outside(network, plane) or _turned_springs(network, normal) or plane
 
 
-def off_plane(network: Network, plane: _Plane, columns: Ints) -> Floats:
-    """Return how far grips (S, r) lie from a plane, m; zero if it is within rounding."""
+def off_plane(network: Network, plane: _Plane) -> Floats:
+    """Return how far inner nodes (2B,) lie from a plane, m; zero if it is within rounding."""
     inner = network.node_position[network.inner.ravel()]
     away = plane.distance(inner)
     away[away <= _FLAT * np.ptp(inner, axis=0).max()] = 0.0
-    return np.asarray(away[columns])
+    return away
 
 
 def _normal(network: Network, spread: Floats) -> Floats:
@@ -120,21 +121,20 @@ _ELSE = "use the compliance engine"
 class PlanarEngine(NamedEngine):
     """Computes any batch of grip sets on any partial structure of a planar scene.
 
-    ``plane``: the structure's, if it is known; by default it is found. Raises `SceneError` if
-    bricks, springs or gravity leave the scene's plane.
+    Raises `SceneError` if bricks, springs or gravity leave the scene's plane.
     """
 
-    def __init__(self, network: Network | Scene, plane: _Plane | None = None) -> None:
+    def __init__(self, network: Network | Scene) -> None:
         super().__init__(network)
-        found = find_plane(self.network) if plane is None else plane
-        if isinstance(found, str):
-            raise SceneError(f"{found}; {_ELSE}")
-        self.plane = found
-        self._engine = ComplianceEngine(self.network, found.basis)
+        plane = find_plane(self.network)
+        if isinstance(plane, str):
+            raise SceneError(f"{plane}; {_ELSE}")
+        self._away = off_plane(self.network, plane)
+        self._engine = ComplianceEngine(self.network, plane.basis)
 
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
-        away = off_plane(self.network, self.plane, grip_columns(self.network, bricks, grips))
+        away = self._away[grip_columns(self.network, bricks, grips)]
         if away.any():
             node = np.asarray(grips).ravel()[away.argmax()]
             far = f"{1e3 * away.max():.3g} mm outside the scene's plane"
