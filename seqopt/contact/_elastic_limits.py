@@ -104,12 +104,18 @@ class ElasticLimits(FrozenValue):
 
     def exceeded(self, wrench: Floats) -> Bools:
         """Return which grip sets (S,) leave the elastic limits anywhere, beyond rounding."""
-        margin, mortar = _STRESS_MARGIN * self.assembly.stress_scale, self.mortar
-        most = np.einsum("qji,ji->qj", self._largest, np.abs(wrench).max(axis=0, initial=0.0))
-        beyond = most - [[mortar.tensile_strength], [mortar.cohesion]]
-        if beyond.max() <= margin:  # by the largest of all; as a rule, and a tenth of the work
-            return np.zeros(len(wrench), dtype=bool)
-        return np.asarray(self.excess(wrench).max(axis=1, initial=-np.inf) > margin)
+        margin, size = _STRESS_MARGIN * self.assembly.stress_scale, np.abs(wrench)
+        may = np.zeros(len(wrench), dtype=bool)
+        if self._may_exceed(size.max(axis=0, initial=0.0)[None], margin).any():  # as a rule not
+            may = self._may_exceed(size, margin)
+            may[may] = self.excess(wrench[may]).max(axis=1, initial=-np.inf) > margin
+        return may
+
+    def _may_exceed(self, size: Floats, margin: float) -> Bools:
+        """Return which wrenches with parts up to a size (S, J, 6) may: a tenth of the work."""
+        most = np.einsum("qji,sji->qsj", self._largest, size).max(axis=2, initial=-np.inf)
+        strength = np.array([[self.mortar.tensile_strength], [self.mortar.cohesion]])
+        return np.asarray((most - strength > margin).any(axis=0))
 
     @cached_property
     def _largest(self) -> Floats:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -64,7 +65,6 @@ class _RigidBricks(NamedEngine):
 
     def __init__(self, network: Network | Scene) -> None:
         super().__init__(network)
-        self._space = ComplianceEngine(self.network)
         plane, self.in_space = find_plane(self.network), _OFF_PLANE
         self._flat: Bools = np.zeros(2 * len(self.network.inner), dtype=bool)  # by node
         if isinstance(plane, str):
@@ -72,6 +72,11 @@ class _RigidBricks(NamedEngine):
         else:
             self._plane = ComplianceEngine(self.network, plane.basis)
             self._flat = off_plane(self.network, plane) == 0
+
+    @cached_property
+    def _space(self) -> ComplianceEngine:
+        """Where all grips lie in the plane, none is needed."""
+        return ComplianceEngine(self.network)
 
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""

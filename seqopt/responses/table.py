@@ -38,6 +38,7 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import holds
 from seqopt.sequence.steps import Step, require_steps
 
+_MEASURED = Want.BRICKS | Want.JOINTS | Want.SCREEN  # limits are no sharper than six digits
 _TURN = 0.1  # rad; sine and angle differ by 0.2 %, cosine and one by 0.5 %
 _STRAIN = 0.1  # of a joint, over its thickness; true strain differs by 5 %
 _STRESSED = (
@@ -135,7 +136,7 @@ class LinearRange:
         for key in keys:  # in order: engines grow with the build
             if key not in self._known:
                 asked = np.array([key[1]], dtype=np.int64).reshape(1, -1)
-                found = self._engine.solve(key[0], asked, Want.BRICKS | Want.JOINTS)
+                found = self._engine.solve(key[0], asked, _MEASURED)
                 self._known[key] = self._of(found)
         return np.array([self._known[key] for key in keys])
 
