@@ -54,13 +54,30 @@ class Held(FrozenValue):
         return bool(np.abs(state.motion).max(initial=0.0) > FAR * self.system.length)
 
     @cached_property
+    def across(self) -> sparse.csr_array:
+        """Twists across the beds for the free motions, (6J, m)."""
+        return frozen(sparse.csr_array(self.system.gap @ self.free))
+
+    @cached_property
+    def _unbroken(self) -> sparse.csr_array:
+        """What layers and grips that give way resist the free motions by, (m, m)."""
+        return frozen(sparse.csr_array(self.free.T @ (self.system.layers + self.pads) @ self.free))
+
+    def stiffness(self, slope: Floats) -> sparse.csr_array:
+        """Return the stiffness (m, m) in the free motions.
+
+        ``slope`` (P, 3, 3): how fast the forces of the points fall, N/m.
+        """
+        across = self.across
+        return sparse.csr_array(across.T @ self.system.beds(slope) @ across + self._unbroken)
+
+    @cached_property
     def diagonal(self) -> Floats:
         """The diagonal of the unbroken stiffness in the free motions, (m,)."""
         points = self.system.points
         none = np.zeros((len(points.area), 3))
         _, slope = points.forces(none, none[:, 1:], np.zeros(len(none), bool))
-        matrix = self.free.T @ (self.system.stiffness(slope) + self.pads) @ self.free
-        return frozen(np.asarray(matrix.diagonal()))
+        return frozen(np.asarray(self.stiffness(slope).diagonal()))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -152,7 +169,7 @@ def _newton(held: Held, state: Settled, share: float, resistance: float) -> Sett
     drag = np.maximum(resistance, _LENT_STIFFNESS) * held.diagonal
     step, best = np.zeros_like(motion), np.inf
     for _ in range(_ITERATIONS):
-        opening = system.openings(held.free @ motion)
+        opening = system.openings(held.across @ motion)
         force, slope = system.points.forces(opening, state.slip, state.broken)
         left = held.free.T @ held.reaction(motion, force, share * system.load)
         missing = left - resistance * held.diagonal * (motion - state.motion)
@@ -166,7 +183,6 @@ def _newton(held: Held, state: Settled, share: float, resistance: float) -> Sett
             motion, shorter = motion - step, shorter + 1
             continue
         best, shorter = float(size), 0
-        matrix = held.free.T @ (system.stiffness(slope) + held.pads) @ held.free
-        step = splu((matrix + sparse.diags_array(drag)).tocsc()).solve(missing)
+        step = splu((held.stiffness(slope) + sparse.diags_array(drag)).tocsc()).solve(missing)
         motion = motion + step
     return None

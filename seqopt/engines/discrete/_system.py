@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy import linalg, sparse
@@ -116,19 +117,19 @@ class System(FrozenValue):
         each = np.einsum("pij,pi->pj", self.maps, force)
         return np.asarray(np.add.reduceat(each, self._starts, axis=0))
 
-    def stiffness(self, slope: Floats) -> sparse.csr_array:
-        """Return the stiffness of layers and beds for twists over ``unit``, (6n, 6n).
+    def beds(self, slope: Floats) -> sparse.csr_array:
+        """Return the stiffness of the beds for twists across them, (6J, 6J).
 
         ``slope`` (P, 3, 3): how fast the forces of the points fall, N/m.
         """
-        each = self.maps.transpose(0, 2, 1) @ slope @ self.maps
-        joints = _diagonal(np.add.reduceat(each, self._starts, axis=0))
-        return sparse.csr_array(self.gap.T @ joints @ self.gap + self.layers)
+        falls = (slope @ self.maps).reshape(-1, 6)
+        maps, ends = self.maps.reshape(-1, 6), [*3 * self._starts, None]
+        parts = [slice(*part) for part in pairwise(ends)]
+        return _diagonal(np.array([maps[part].T @ falls[part] for part in parts]))
 
-    def openings(self, twist: Floats) -> Floats:
-        """Return the openings (P, 3) of the points for twists (6n,) of the bodies."""
-        across = (self.gap @ twist).reshape(-1, 6)
-        return np.asarray(np.einsum("pij,pj->pi", self.maps, across[self.face]))
+    def openings(self, across: Floats) -> Floats:
+        """Return the openings (P, 3) of the points for twists (6J,) across the beds."""
+        return np.asarray(np.einsum("pij,pj->pi", self.maps, across.reshape(-1, 6)[self.face]))
 
     @cached_property
     def scale(self) -> float:
