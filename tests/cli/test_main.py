@@ -136,13 +136,16 @@ def test_full_fields_on_request(capsys, tmp_path, engine25, arch25):
         assert archive["support_point"].tolist() == [list(g.anchor) for g in arch25.grounds]
 
 
-def ends_in_step(number):
-    """Return what is told of every step, and ends as a time limit does: in the midst of one."""
+def ends_in_step(number, how=TimeoutError):
+    """Return what is told of every step, and ends as a time limit does: in the midst of one.
+
+    ``how``: or as somebody does who interrupts.
+    """
     told = iter(range(1, number))
 
     def tell(_):
         if next(told, None) is None:
-            raise TimeoutError
+            raise how
 
     return tell
 
@@ -161,6 +164,20 @@ def test_a_time_limit_of_analyze_leaves_the_rows_so_far(tmp_path):
     with np.load(fields) as archive:
         assert {name.split("_")[0] for name in archive} > {"step1", "step2", "step3"}
         assert "step4_support" not in archive
+
+
+def test_an_interrupt_of_analyze_leaves_the_rows_so_far(tmp_path):
+    """Dry steps take discrete elements, and it is said that these take long."""
+    path = tmp_path / "rows.csv"
+    words = ["analyze", "wall:columns=2,courses=2", "--method", "sequential", "--out", str(path)]
+    options = parser("analyze").parse_args([*words, "--engine", "auto", "--mortar", "dry"])
+    options.tell = ends_in_step(3, KeyboardInterrupt)
+    answer = analyze_command.run(options)
+    assert answer.status == 130
+    (said,) = answer.failures
+    assert said.startswith("seqopt: interrupted; 2 of ")
+    assert said.endswith("steps computed, 2 by discrete elements, which are what takes long")
+    assert pd.read_csv(path)["step"].tolist() == [1, 2]
 
 
 def test_a_time_limit_of_analyze_before_the_first_row_is_one_line(capsys, tmp_path):

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import (
@@ -31,6 +30,7 @@ from seqopt._cli.outputs import keep_apart, put_table
 from seqopt._cli.values import parse_time_limit
 from seqopt._files import write_bytes
 from seqopt._interrupts import ending
+from seqopt.engines._auto import AutoEngine, Level
 from seqopt.engines.interface import Engine, Fields
 from seqopt.engines.registry import provenance
 from seqopt.errors import SceneError
@@ -85,13 +85,12 @@ def run(options: argparse.Namespace) -> Answer:
     network = build_network(scene)
     engine, steps = asked_engine(options, network), asked_steps(options, scene)
     limit = parse_time_limit(options.time_limit)
-    answers: Iterable[tuple[Step, Fields]] = _timely(_step_answers(options, engine, steps), limit)
-    if options.fields is not None:
-        answers = list(answers)
+    in_time = _InTime(_step_answers(options, engine, steps), limit)
+    answers = in_time if options.fields is None else list(in_time)
     table = response_table(network, answers)
-    late = _late(options, len(table), len(steps))
+    late, ended = _late(options, len(table), len(steps), engine, in_time)
     if table.empty:
-        return Answer(facts={"steps": ()}, failures=late, status=Status.FAILED)
+        return Answer(facts={"steps": ()}, failures=late, status=ended)
     within, computed = LinearRange(engine), steps[: len(table)]
     staged = None if options.staged is None else staged_fields(network, computed, options.staged)
     outside = within.departures(table, staged)
@@ -104,20 +103,27 @@ def run(options: argparse.Namespace) -> Answer:
         facts={"scene": scene_facts(scene), "units": UNITS, "steps": table, **provenance(engine)},
         notes=(*level_notes(engine), *within.unchecked, *idle_notes(scene, steps)),
         failures=late,
-        status=Status.FAILED if late else Status.DONE,
+        status=ended,
         **said,
     )
     return strictly(answer, options, exceeded(scene, table), outside)
 
 
-def _late(options: argparse.Namespace, computed: int, steps: int) -> tuple[str, ...]:
-    """Return a line if the time limit came before the last step, else none."""
+def _late(
+    options: argparse.Namespace, computed: int, steps: int, engine: Engine, in_time: _InTime
+) -> tuple[tuple[str, ...], Status]:
+    """Return a line if steps ended before the last one, else none, and the status of that."""
     if computed == steps:
-        return ()
-    so_far = f"{computed} of {steps} steps" if computed else "no step"
-    return (
-        f"seqopt: error: --time-limit {options.time_limit}: {so_far} computed; give more seconds",
-    )
+        return (), Status.DONE
+    so_far = f"{computed} of {steps} steps computed" if computed else "no step computed"
+    levels = engine.tally if isinstance(engine, AutoEngine) else {}
+    dear = sum(sets for choice, sets in levels.items() if choice.level is Level.DISCRETE)
+    if dear:
+        so_far += f", {dear} by discrete elements, which are what takes long"
+    if in_time.interrupted:
+        return (f"seqopt: interrupted; {so_far}",), Status.INTERRUPTED
+    said = f"seqopt: error: --time-limit {options.time_limit}: {so_far}; give more seconds"
+    return (said,), Status.FAILED
 
 
 def _step_answers(
@@ -135,15 +141,26 @@ def _step_answers(
     return zip(each, staged_fields(engine.network, steps, options.staged), strict=True)
 
 
-def _timely(
-    answers: Iterator[tuple[Step, Fields]], seconds: float
-) -> Iterator[tuple[Step, Fields]]:
-    """Yield the answers that come in time, from the first one that is asked for."""
-    end = time.perf_counter() + seconds
-    with suppress(TimeoutError):
-        while True:
-            with ending(end - time.perf_counter()):
-                answer = next(answers, None)
-            if answer is None:
-                return
+class _InTime:
+    """Answers that come in time, from the first one that is asked for.
+
+    ``interrupted``: whether somebody ended them; those that were there by then are not lost.
+    """
+
+    def __init__(self, answers: Iterator[tuple[Step, Fields]], seconds: float) -> None:
+        self._answers, self._seconds, self.interrupted = answers, seconds, False
+
+    def __iter__(self) -> Iterator[tuple[Step, Fields]]:
+        end = time.perf_counter() + self._seconds
+        while (answer := self._next(end - time.perf_counter())) is not None:
             yield answer
+
+    def _next(self, seconds: float) -> tuple[Step, Fields] | None:
+        try:
+            with ending(seconds):
+                return next(self._answers, None)
+        except TimeoutError:
+            return None
+        except KeyboardInterrupt:
+            self.interrupted = True
+            return None
