@@ -99,28 +99,29 @@ class AutoEngine(NamedEngine):
     """Computes every grip set at the cheapest level whose condition it meets.
 
     ``tally``: how many grip sets of all calls were answered at which level, and why. ``unchecked``:
-    why elastic limits are not checked; empty if they are. ``rigid``: the engine of rigid bricks on
-    springs that never break: for what need not be the last word.
+    why elastic limits are not checked; empty if they are. ``limits``: those; none if they are not
+    known. ``rigid``: the engine of rigid bricks on springs that never break: for what need not be
+    the last word.
     """
 
     def __init__(self, network: Network | Scene, mortar: Mortar = EPOXY) -> None:
         super().__init__(network)
         self.rigid = _RigidBricks(self.network)
         self._discrete = DiscreteEngine(self.network, mortar)
-        self._limits: ElasticLimits | None = None
+        self.limits: ElasticLimits | None = None
         self.tally, self.unchecked = Counter[LevelChoice](), ""
         try:
-            self._limits = find_elastic_limits(self.network, mortar)
+            self.limits = find_elastic_limits(self.network, mortar)
         except SceneError as error:
             self.unchecked = f"elastic limits are not checked: {error}"
 
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
-        asked = want if self._limits is None else want | Want.JOINTS
+        asked = want if self.limits is None else want | Want.JOINTS
         fields, flat = self.rigid.solve(bricks, grips, asked), self.rigid.lies_flat(bricks, grips)
         beyond = np.zeros(len(flat), dtype=bool)
-        if self._limits is not None:
-            beyond = self._limits.exceeded(fields.joint_wrench)
+        if self.limits is not None:
+            beyond = self.limits.exceeded(fields.joint_wrench)
         if beyond.any():
             found = self._discrete.solve(bricks, np.asarray(grips)[beyond], asked)
             fields = merge_sets(beyond, keep_wanted(found, asked), select_sets(fields, ~beyond))

@@ -18,7 +18,6 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, SceneError
 from seqopt.network.network import GROUND, Network
 from seqopt.scene.scene import Scene
-from seqopt.scene.shape import plane_axes
 
 _FLAT = 1e-9  # distance from the plane that counts as none, over the size of the structure
 

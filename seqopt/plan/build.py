@@ -11,6 +11,7 @@ import pandas as pd
 from seqopt._showing import Page, Shown, display
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
+from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses.table import Departure, LinearRange, grips_table
 from seqopt.sequence.steps import Step
 from seqopt.stability._step_verdicts import step_verdicts
@@ -61,7 +62,16 @@ class ShownBuild(Shown):
     @cached_property
     def departures(self) -> tuple[Departure, ...]:
         """The limits of the linear range that steps leave: there the responses mean nothing."""
-        return LinearRange(self.engine).departures(self.responses())
+        return self._within.departures(self.responses())
+
+    @cached_property
+    def _within(self) -> LinearRange:
+        return LinearRange(self.engine)
+
+    @property
+    def enough(self) -> Enough:
+        """Which model was enough for the steps, what dearer ones would change, what is left out."""
+        return what_was_enough(self._within, {"": self.responses()})
 
     def grips(self) -> pd.DataFrame:
         """Return every grip of the build, for as long as it lasts.

@@ -359,7 +359,8 @@ class Plan(ShownBuild):
         unit would save; ``limits``, ``rules``, ``scenarios``, what ``stands``; how it ``ended`` and
         what ``stopped`` it; ``steps``, ``steps_before_release`` without those that let all go at
         the end, ``regrips``, ``idle_robots``, which never grip; limits of the linear range that are
-        left and payloads that are exceeded; ``models_evaluated``, ``states_in_proof``, ``seconds``;
+        left, which model was ``enough``, and payloads that are exceeded; ``models_evaluated``,
+        ``states_in_proof``, ``seconds``;
         of criteria of ranks the sums under both ``objectives`` and of heuristics ``gap_parts``; of
         an order that was sought ``order``, ``orders`` (among which), ``order_status``,
         ``order_bound`` (on the first aim, of any order), ``order_bound_proven``,
@@ -394,6 +395,7 @@ def _summarized(plan: Plan) -> dict[str, object]:
         "regrips": plan.regrips,
         "idle_robots": list(idle_robots(scene, plan.steps)),
         "outside_linear_range": [str(departure) for departure in plan.departures],
+        "enough": plan.enough.facts(),
         "payload_exceeded": [str(excess) for excess in plan.overloads],
         "models_evaluated": plan.models,
         "states_in_proof": 0 if proof is None else proof.states,

@@ -25,6 +25,7 @@ from seqopt.plan.solving import solve
 from seqopt.problem.criteria import RankSum, WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion, overloads
+from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
 from seqopt.responses.resources import Resources
 from seqopt.responses.table import Departure, LinearRange, analyze, force_column
@@ -100,6 +101,8 @@ class Comparison(Terse):
     verdicts : mapping of str to tuple of BuildVerdicts
         Which steps stand, by row of ``table``, one for each mortar that was asked for; of these the
         table counts the steps that fall, as ``falls_dry``.
+    enough : Enough
+        Which model was enough for all steps, and what dearer ones would change.
     """
 
     maxima: pd.DataFrame
@@ -112,6 +115,7 @@ class Comparison(Terse):
     departures: Mapping[str, tuple[Departure, ...]]
     criteria: Mapping[str, Criterion]
     verdicts: Mapping[str, tuple[BuildVerdicts, ...]]
+    enough: Enough
 
 
 def compare(
@@ -160,10 +164,11 @@ def compare(
         notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
     verdicts = (prover or BuildProver(engine.network, progress=progress)).of_tables(tables)
-    table = _table(rows, left := LinearRange(engine).of_builds(tables), verdicts)
+    left = (within := LinearRange(engine)).of_builds(tables)
+    table = _table(rows, left, verdicts)
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
     found = (maxima, printed, table, tables, loop, tuple(notes), refusal)
-    return Comparison(*found, left, criteria, verdicts)
+    return Comparison(*found, left, criteria, verdicts, what_was_enough(within, tables))
 
 
 def _table(

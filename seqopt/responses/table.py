@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
-from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
+from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
 from seqopt.engines._auto import AutoEngine
 from seqopt.engines.discrete._equilibrium_path import FAR
@@ -68,23 +68,29 @@ class Departure:
 class LinearRange:
     """Finds the steps of builds in which an engine's results leave the linear range.
 
-    ``unchecked``: why stresses in joints are not checked, if they should be: in a line, or none.
+    ``engine``: which one; ``unchecked``: why stresses in joints are not checked, if they should be:
+    in a line, or none.
     """
 
     def __init__(self, engine: Engine) -> None:
-        self._network = engine.network
+        self.engine, self._network = engine, engine.network
         self._breaks = isinstance(engine, AutoEngine | DiscreteEngine)
         self._engine = engine.rigid if isinstance(engine, AutoEngine) else engine
         self._known: dict[tuple[int, tuple[int, ...]], Floats] = {}
         thickness = engine.network.springs.thickness
         self._thickness = np.where(np.isnan(thickness) | self._breaks, np.inf, thickness)
         self.unchecked: tuple[str, ...] = ()
-        self._limits: ElasticLimits | None = None
+        self._limits = engine.limits if isinstance(engine, AutoEngine) else None
         try:
             if not self._breaks:
                 self._limits = find_elastic_limits(engine.network, EPOXY)
         except SceneError as error:
             self.unchecked = (f"stresses in joints are not checked: {error}",)
+
+    @property
+    def far(self) -> float:
+        """The limit of displacements, m."""
+        return FAR * min(min(brick.dimensions) for brick in self._network.scene.bricks)
 
     def departures(
         self, table: pd.DataFrame, fields: Iterable[Fields] | None = None
@@ -102,10 +108,10 @@ class LinearRange:
         >>> LinearRange(engine).departures(table)
         ()
         """
-        scene, shift = self._network.scene, RESPONSES["D_max"]
-        far = FAR * min(min(brick.dimensions) for brick in scene.bricks)
+        shift, far = RESPONSES["D_max"], self.far
         moved = table[shift.column].to_numpy(float) / shift.scale
-        turned, strained, stressed = self._measured(table, fields).T
+        turned, strained, stressed = self._measured(table, fields)[:, :3].T
+        stressed = np.where(self._breaks, -np.inf, stressed)
         within = f", more than {length_text(far)}, a tenth of the smallest side of a brick"
         deformed = f"{{:.3g}} times its thickness, more than {_STRAIN:g} times".format
         found = (
@@ -124,12 +130,24 @@ class LinearRange:
         """Return the limits that builds leave, for those that leave any, by name."""
         return {name: left for name, each in tables.items() if (left := self.departures(each))}
 
+    def closest(self, table: pd.DataFrame) -> tuple[float, str, int]:
+        """Return which joint comes closest to its elastic limits: Pa below them, name and step.
+
+        Negative beyond them; NaN, without a joint, where that is not known.
+        """
+        excess, joint = self._measured(table, None)[:, 2:].T
+        at = int(excess.argmax())
+        if self._limits is None or not np.isfinite(excess[at]):
+            return np.nan, "", 0
+        name = self._limits.assembly.contact_name[int(joint[at])]
+        return -float(excess[at]), f"joint {name}", int(table["step"].iloc[at])
+
     def _measured(self, table: pd.DataFrame, fields: Iterable[Fields] | None) -> Floats:
-        """Return rotation, strain and excess of stress of every step, (steps, 3)."""
+        """Return rotation, strain, excess of stress and in which joint, of every step, (n, 4)."""
         if fields is not None:
             return np.array([self._of(each) for each in fields])
         if isinstance(self._engine, DiscreteEngine):
-            return np.full((len(table), 3), -np.inf)  # whoever goes far is unstable there
+            return np.full((len(table), 4), -np.inf)  # whoever goes far is unstable there
         nodes = table[[f"{robot.name}_node" for robot in self._network.scene.robots]]
         held = (tuple(int(n) for n in row if pd.notna(n)) for row in nodes.to_numpy(object))
         keys = [*zip(map(int, table["bricks"]), held, strict=True)]
@@ -141,7 +159,7 @@ class LinearRange:
         return np.array([self._known[key] for key in keys])
 
     def _of(self, fields: Fields) -> Floats:
-        """Return rotation, rad, strain, and stress beyond the elastic limit, Pa, of one step."""
+        """Return rotation, rad, strain, stress beyond elastic limits, Pa, and in which joint."""
         springs = self._network.springs
         wrench = fields.joint_wrench[0].reshape(-1, 2, 3) @ springs.axes.transpose(0, 2, 1)
         stiffness = springs.stiffness.reshape(-1, 2, 3)
@@ -149,11 +167,12 @@ class LinearRange:
         shift, turn = lengths(given).T
         turned = np.concatenate([turn, lengths(fields.brick_twist[0][:, 3:])]).max()
         if self._limits is None:
-            return np.array([turned, (shift / self._thickness).max(), -np.inf])
+            return np.array([turned, (shift / self._thickness).max(), -np.inf, 0])
         face = self._limits.assembly.contact
         lever = lengths(self._limits.assembly.corner - springs.position[face])
         strain = (shift[face] + turn[face] * lever) / self._thickness[face]
-        return np.array([turned, strain.max(), self._limits.excess(fields.joint_wrench).max()])
+        excess = self._limits.excess(fields.joint_wrench)[0]
+        return np.array([turned, strain.max(), excess.max(), excess.argmax()])
 
 
 def builds_in_words(departures: Mapping[str, Sequence[Departure]]) -> tuple[str, ...]:

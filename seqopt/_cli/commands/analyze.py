@@ -35,6 +35,7 @@ from seqopt.engines.interface import Engine, Fields
 from seqopt.engines.registry import provenance
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
+from seqopt.responses._enough import what_was_enough
 from seqopt.responses._staged import Placing, staged_fields
 from seqopt.responses.table import LinearRange, archive, response_table, step_fields
 from seqopt.sequence.steps import Step
@@ -99,9 +100,11 @@ def run(options: argparse.Namespace) -> Answer:
     said = put_table(options.out, table, f"{len(table)} steps")
     if options.fields is not None:
         said["written"] = (*said.get("written", ()), options.fields)
+    enough = what_was_enough(within, {"": table}, staged=staged is not None)
+    facts = {"scene": scene_facts(scene), "units": UNITS, "steps": table, **provenance(engine)}
     answer = Answer(
-        facts={"scene": scene_facts(scene), "units": UNITS, "steps": table, **provenance(engine)},
-        notes=(*level_notes(engine), *within.unchecked, *idle_notes(scene, steps)),
+        facts={**facts, "enough": enough.facts()},
+        notes=(*level_notes(engine), *within.unchecked, *enough.lines, *idle_notes(scene, steps)),
         failures=late,
         status=ended,
         **said,

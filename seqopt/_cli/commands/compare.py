@@ -119,7 +119,12 @@ def run(options: argparse.Namespace) -> Answer:
         text="\n\n".join(blocks),
         headings=headings,
         written=written,
-        notes=(*level_notes(engine), *refused(prover), *(figure_notes() if written else ())),
+        notes=(
+            *level_notes(engine),
+            *result.enough.lines,
+            *refused(prover),
+            *(figure_notes() if written else ()),
+        ),
     )
     over = exceeded(scene, *result.tables.values())
     left = builds_in_words(result.departures)
@@ -164,6 +169,7 @@ def _facts(result: Comparison) -> dict[str, object]:
             "published_ranks": loop.ranks,
         },
         "why_no_loop": result.refusal or None,
+        "enough": result.enough.facts(),
         "findings": list(result.notes),
     }
 

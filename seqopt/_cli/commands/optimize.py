@@ -6,6 +6,7 @@ import argparse
 import time
 from dataclasses import dataclass
 from functools import cached_property
+from math import isfinite
 from typing import Any
 
 from seqopt._cli.answer import Answer, Status
@@ -36,6 +37,7 @@ from seqopt._cli.values import parse_options, parse_size, parse_time_limit
 from seqopt.errors import ProblemError
 from seqopt.graph.states.states import States
 from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation, formulation_names
+from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.out_of_sample import Trial, judge_unseen, worst_values
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve, usual
@@ -240,7 +242,11 @@ def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]
     over = () if stopped else exceeded(scene, table)
     lines = [f"{_said(found)}; {written_to(options.out)}"]
     lines += [f"stability, {each}" for each in found.own]
-    facts: dict[str, object] = {"scene": scene_facts(scene), "summary": found.report}
+    facts: dict[str, object] = {
+        "scene": scene_facts(scene),
+        "summary": found.report,
+        "proof": _proof(plan),
+    }
     if plan.order is not None:
         order = plan.order.selection.order
         facts["order"] = order
@@ -251,6 +257,8 @@ def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]
         written=written,
         notes=(
             *_posed_notes(found.asked.problem),
+            *plan.enough.lines,
+            f"proof: {_proof(plan)}",
             *idle_notes(scene, plan.steps),
             *refused(found.prover),
         ),
@@ -287,6 +295,20 @@ def _posed_notes(problem: Problem) -> tuple[str, ...]:
     if not name.endswith(OWN):
         return said
     return (*said, f"criterion: {name}: no fixed method builds this scene to take scales from")
+
+
+def _proof(plan: Plan) -> str:
+    """Return which proof was enough, and what a dearer one could still change."""
+    proof, looked = plan.certificate, f"{plan.models} models"
+    if proof is None or plan.gap is None:
+        return "none; how much better another plan may be is not known"
+    if proof.states:
+        looked += f" and {proof.states} state{'s' * (proof.states > 1)}"
+    other = "no other plan among these" if plan.among else "no other plan"
+    better = (
+        "is better" if plan.gap <= TOLERANCE else f"is better by more than {100 * plan.gap:.3g} %"
+    )
+    return f"{looked} were enough; {other} {better if isfinite(plan.gap) else 'is looked at'}"
 
 
 def _paper_count(plan: Plan) -> dict[str, int] | None:

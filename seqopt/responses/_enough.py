@@ -1,0 +1,108 @@
+"""Which model was enough, what a dearer one would have changed, and what was left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+
+import numpy as np
+import pandas as pd
+
+from seqopt.engines._auto import AutoEngine
+from seqopt.engines._planar import PlanarEngine
+from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.registry import recipe_of
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.responses.quantities import RESPONSES
+from seqopt.responses.table import LinearRange
+
+_KNOWN = AutoEngine, PlanarEngine, ComplianceEngine, DiscreteEngine
+
+
+@dataclass(frozen=True)
+class Enough:
+    """What computed the steps of builds, and what is known of models that were not taken.
+
+    ``engine``: its name; ``dearer``: what dearer engines would change in these steps, in words;
+    ``joint``, ``step``: which joint comes closest to its elastic limits, and where; empty where
+    that is not known; ``below_limit``: by how much it stays below, Pa; negative beyond them;
+    ``left_out``: of the model.
+    """
+
+    engine: str
+    dearer: str
+    joint: str
+    step: str
+    below_limit: float | None
+    left_out: tuple[str, ...]
+
+    def facts(self) -> dict[str, object]:
+        """Return it as numbers and words, for scripts."""
+        said = asdict(self)
+        return said | {"below_limit_Pa": said.pop("below_limit")}
+
+    @property
+    def lines(self) -> tuple[str, str]:
+        """The same in two lines, for people."""
+        return f"enough: {self.engine}; {self.dearer}", f"left out: {'; '.join(self.left_out)}"
+
+
+def what_was_enough(
+    within: LinearRange, builds: Mapping[str, pd.DataFrame], *, staged: bool = False
+) -> Enough:
+    """Return which model was enough for builds, by their tables of responses.
+
+    ``within``: what says where they leave the linear range; ``staged``: whether steps carry what
+    earlier ones lock in; how close joints come to their limits is then not known.
+    """
+    engine, recipe = within.engine, recipe_of(within.engine)
+    each = [(*within.closest(table), name) for name, table in builds.items()]
+    below, joint, number, build = min(each, key=lambda one: np.nan_to_num(one[0], nan=np.inf))
+    known = not (staged or np.isnan(below))
+    step = f"step {number}{f' of {build}' if len(builds) > 1 else ''}" if known else ""
+    return Enough(
+        type(engine).__name__ if recipe is None else recipe.engine,
+        _dearer(within, below if known else np.nan, f"{joint} in {step}"),
+        joint if known else "",
+        step,
+        below if known else None,
+        tuple(_left_out(within, builds, staged=staged)),
+    )
+
+
+def _dearer(within: LinearRange, below: float, where: str) -> str:
+    """Return what dearer engines would change, in words; ``below``: the limits, Pa."""
+    engine = within.engine
+    if isinstance(engine, DiscreteEngine):
+        return "none is dearer"
+    if not isinstance(engine, _KNOWN):
+        return "what another one would change is not known"
+    flat = "compliance would change nothing, as nothing leaves the plane; "
+    said = flat if isinstance(engine, PlanarEngine) else ""
+    if np.isnan(below):
+        why = (
+            within.unchecked or getattr(engine, "unchecked", "") or "of steps that build on others"
+        )
+        return f"{said}what discrete elements would change is not known: {why}"
+    if below >= 0:
+        close = f"{where} comes closest to its elastic limits, {below / 1e6:.3g} MPa below them"
+        return f"{said}discrete elements would change nothing in these steps: {close}"
+    if isinstance(engine, AutoEngine):
+        return "dearer ones would change nothing: discrete elements were taken where joints open"
+    return f"{said}what discrete elements would change is not known: {where} leaves its limits"
+
+
+def _left_out(
+    within: LinearRange, builds: Mapping[str, pd.DataFrame], *, staged: bool
+) -> Iterator[str]:
+    """Yield what the model has not, as far as it could matter in these builds."""
+    robots, moved = within.engine.network.scene.robots, RESPONSES["D_max"]
+    tables = builds.values()
+    if any(table[f"{robot.name}_node"].notna().any() for table in tables for robot in robots):
+        yield "that robots give way"
+    if not staged and any(len(table) > 1 for table in tables):
+        yield "what earlier steps lock in"
+    if not isinstance(within.engine, DiscreteEngine):
+        most = max(float(table[moved.column].max()) / moved.scale for table in tables) / within.far
+        yield f"change of shape (bricks move by up to {100 * most:.2g} % of its limit)"
+    yield "motion in time"
