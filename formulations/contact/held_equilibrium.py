@@ -83,7 +83,8 @@ class _HeldEquilibrium:
         least = np.where(np.arange(len(right)) < self._lines, right, -FREE)
         self._solver.addRows(len(right), least, right, 0, [], [], [])
         case = self._case
-        grows = any((case.tension[1], case.cohesion[1], case.payload[1], *case.pull))
+        grown = (case.tension, case.cohesion, case.payload, case.applied)
+        grows = any((*(growth for _, growth in grown), *case.pull))
         cost, most = (case.sense.value, CAP) if grows else (0.0, 0.0)
         self._add(np.array([cost]), np.array([most]), sparse.csc_array(self._growth()[:, None]))
         self._join(first_directions(self._corners, self._grips))
@@ -103,12 +104,12 @@ class _HeldEquilibrium:
     def _right(self) -> Floats:
         """Return the right-hand side of all lines for the payloads that are held."""
         payload = self._case.payload[0] * self._held / self._assembly.scales[0]
-        balance = self._pressed(self._cut[0]) - self._assembly.load()
+        balance = self._pressed(self._cut[0]) - self._case.loads(self._assembly)[0]
         return np.concatenate([balance, self._disc[0], payload])
 
     def _growth(self) -> Floats:
         """Return the column of z."""
-        balance = self._assembly.load(self._case.pull) - self._pressed(self._cut[1])
+        balance = self._case.loads(self._assembly)[1] - self._pressed(self._cut[1])
         payload = np.full(self._grips, self._case.payload[1])
         return np.concatenate([balance, -self._disc[1], -payload])
 

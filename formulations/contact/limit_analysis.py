@@ -86,14 +86,14 @@ class _Equilibrium:
         start, more = limits(assembly, case, 0.0), limits(assembly, case, 1.0)
         growth = [after - before for before, after in zip(start, more, strict=True)]
         widths = (1, 3, 4)  # of what tension, cohesion and payload bound
-        pulls = assembly.load(case.pull) if any(case.pull) else np.zeros(self._balance.shape[0])
+        loads, pulls = case.loads(assembly)
         grows = [-_first_of(more, rows) for more, rows in zip(growth, widths, strict=True)]
         bounds = [_first_of(most, rows) for most, rows in zip(start, widths, strict=True)]
         contact = sparse.vstack([self._presses, case.friction * self._bears + self._slides])
         none = sparse.csr_array((2, 3 * (corners + self._grips)))
         rest = sparse.vstack([self._balance, none, sparse.block_diag([-contact, -self._holds])])
         z = np.concatenate([pulls, [-1.0, 1.0], *grows])
-        right = np.concatenate([-assembly.load(), [0.0, CAP], *bounds])
+        right = np.concatenate([-loads, [0.0, CAP], *bounds])
         return sparse.csc_array(sparse.hstack([sparse.csc_array(z[:, None]), rest])), right
 
 

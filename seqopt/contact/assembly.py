@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -38,6 +38,9 @@ class Assembly(FrozenValue):
         m.
     payload : (G,) float
         Largest force that each grip can exert, in any direction, N.
+    applied : (B, 6) float
+        Forces and moments about the centroids that act on the blocks beside their weights, N and
+        N m; no rows by default: none do.
 
     Raises
     ------
@@ -56,10 +59,12 @@ class Assembly(FrozenValue):
     grip_block: Ints
     grip_position: Floats
     payload: Floats
+    applied: Floats = field(default_factory=lambda: np.zeros((0, 6)))
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for name in ("centroid", "weight", "normal", "corner", "grip_position", "payload"):
+        numbers = ("centroid", "weight", "normal", "corner", "grip_position", "payload", "applied")
+        for name in numbers:
             values = getattr(self, name)
             if not isinstance(values, np.ndarray) or not np.isfinite(values).all():
                 raise SceneError(f"assembly: {name} holds a number that is not finite")
@@ -161,10 +166,27 @@ class Assembly(FrozenValue):
         return spread(block[real], real, values, (len(self.centroid), len(block)))
 
     def load(self, direction: Vector | None = None) -> Floats:
-        """Return weights, or as much along a direction, as wrenches (6B,) over the force scale."""
+        """Return weights, or as much along a direction, as wrenches (6B,) over the force scale.
+
+        What is applied beside them is not in it.
+        """
         pull = self.weight
         if direction is not None:
             pull = np.linalg.norm(self.weight, axis=1, keepdims=True) * np.array(direction)
         out = np.zeros((len(pull), 6))
         out[:, :3] = pull / self.scales[0]
         return out.ravel()
+
+    @cached_property
+    def applied_load(self) -> Floats:
+        """What is applied beside the weights, as of `load`."""
+        out = np.zeros((len(self.centroid), 6))
+        out[: len(self.applied)] = self.applied
+        return frozen((out / self.scales[0] / np.repeat([1.0, self.scales[1]], 3)).ravel())
+
+    @cached_property
+    def amounts(self) -> tuple[float, float]:
+        """The sizes of all weights in sum, and of all that is applied beside them, N."""
+        applied = np.linalg.norm(self.applied_load.reshape(-1, 2, 3), axis=2).sum()
+        weight = np.linalg.norm(self.weight, axis=1).sum()
+        return float(weight), float(applied * self.scales[0])

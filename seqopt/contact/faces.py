@@ -130,7 +130,14 @@ def step_assembly(
         grip_block=np.array([block[node] for node, _ in held], dtype=np.int64),
         grip_position=np.array([network.scene.node_position(n) for n, _ in held]).reshape(-1, 3),
         payload=np.array([robot.payload for _, robot in held]),
+        applied=_applied_rows(network, bricks),
     )
+
+
+def _applied_rows(network: Network, bricks: int) -> Floats:
+    """Return `Assembly.applied` of a partial structure."""
+    applied = network.applied(bricks)
+    return applied if applied.any() else np.zeros((0, 6))
 
 
 def bare_assembly(network: Network, bricks: int, known: Contacts | None = None) -> Assembly:

@@ -52,7 +52,7 @@ class LevelChoice:
     reason: str  # a clause that goes into a sentence
 
 
-_IN_PLANE = LevelChoice(Level.PLANAR, "bricks, springs, gravity and grips lie in one plane")
+_IN_PLANE = LevelChoice(Level.PLANAR, "bricks, springs, gravity, loads and grips lie in one plane")
 _OFF_PLANE = LevelChoice(Level.RIGID, "a grip lies outside the plane of the bricks")
 _BEYOND = LevelChoice(Level.DISCRETE, "a joint would leave its elastic limits")
 

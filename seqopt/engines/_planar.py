@@ -1,8 +1,8 @@
 """The planar engine: three unknowns per brick, for structures held and loaded in their own plane.
 
-If bricks, springs and gravity lie in one plane and every grip holds a node in it, nothing moves or
-turns out of the plane, and forces across it are zero. Half of the unknowns are then not needed.
-This is exact, not an approximation. Motions out of the plane are not considered.
+If bricks, springs, gravity and loads lie in one plane and every grip holds a node in it, nothing
+moves or turns out of the plane, and forces across it are zero. Half of the unknowns are then not
+needed. This is exact, not an approximation. Motions out of the plane are not considered.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt.arrays import Floats, FrozenValue
+from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.engines.interface import Basis, Fields, NamedEngine, Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, SceneError
@@ -51,7 +51,8 @@ def find_plane(network: Network) -> _Plane | str:
     normal = _normal(network, points - points.mean(axis=0))
     up = np.array(network.scene.up)
     plane = _Plane(points.mean(axis=0), normal, np.array([np.cross(up, normal), up]))
-    return _points_outside(network, plane) or _turned_springs(network, normal) or plane
+    outside = _points_outside(network, plane) or _turned_springs(network, normal)
+    return outside or _pulled_outside(network, normal) or plane
 
 
 def off_plane(network: Network, plane: _Plane) -> Floats:
@@ -105,6 +106,27 @@ def _turned_springs(network: Network, normal: Floats) -> str:
     return ""
 
 
+def _pulled_outside(network: Network, normal: Floats) -> str:
+    """Return which load or movement of the ground leaves the plane; empty if none does."""
+    placed, (brick, _, pull) = network.scene.placed, network.loads
+    length = max(max(each.dimensions) for each in placed)
+    out = _leaves(pull * np.repeat([length, 1.0], 3), normal)
+    if out.any():
+        name = placed[brick[out.argmax()]].name
+        return f"brick {name}: a load on it or the wind is not in the scene's middle plane"
+    out = _leaves(network.springs.movement * np.repeat([1.0, length], 3), normal)
+    if out.any():
+        return f"{_spring(network, int(out.argmax()))}: it moves out of the scene's middle plane"
+    return ""
+
+
+def _leaves(both: Floats, normal: Floats) -> Bools:
+    """Return which forces with moments, or shifts with turns (n, 6), leave a plane."""
+    shift, turn = both[:, :3], both[:, 3:]
+    across = np.linalg.norm(turn - np.outer(turn @ normal, normal), axis=1)
+    return np.asarray(np.abs(shift @ normal) + across > _FLAT * np.linalg.norm(both, axis=1))
+
+
 def _spring(network: Network, index: int) -> str:
     """Return a spring's name for a message."""
     placed = network.scene.placed
@@ -120,7 +142,8 @@ _ELSE = "use the compliance engine"
 class PlanarEngine(NamedEngine):
     """Computes any batch of grip sets on any partial structure of a planar scene.
 
-    Raises `SceneError` if bricks, springs or gravity leave the scene's plane.
+    Raises `SceneError` if bricks, springs, gravity, loads or movements of the ground leave the
+    scene's plane.
     """
 
     def __init__(self, network: Network | Scene) -> None:

@@ -121,6 +121,8 @@ def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> _R
         parts = _moved(twist[body], at[there] - center[body])
         gap[there] += sign * parts.sum(axis=0)
         moved[there] += np.abs(parts).sum(axis=0)
+    ground = _ground_motion(network)[acting]
+    gap, moved = gap - ground, moved + np.abs(ground)
     own = np.einsum("sij,shj->shi", axes, gap.reshape(-1, 2, 3)) * raw.reshape(-1, 2, 3)
     law = np.einsum("sij,shi->shj", axes, own).reshape(-1, 6)  # stiffness times deformation
     size = raw.reshape(-1, 2, 3).max(axis=2)[:, :, None]
@@ -135,6 +137,7 @@ def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> _R
     motion = np.abs(_moved(twist[every], node - center[every])[:, :, :3]).sum(axis=0).max()
     dead = np.hstack([network.weight[:bricks], np.zeros((bricks, 3))])
     outside = [(np.arange(bricks), center, dead), (owner, node[columns], grip)]
+    outside += _loads(network, bricks)
     left, (plain, _) = (
         _balance(center, [*((b, at[t], sign * pull[t]) for t, b, sign in ends), *outside])
         for pull in (wrench, -law)
@@ -144,7 +147,7 @@ def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> _R
         equilibrium=float((rest / np.maximum(most, np.finfo(float).tiny)).max()),
         joints=float((apart / np.maximum(scale, heavy)).max()),
         grips=float(np.abs(still).max(initial=0.0) / max(motion, least)),
-        plain=float(np.linalg.norm(plain[:, :3]) / np.linalg.norm(dead)),
+        plain=float(np.linalg.norm(plain[:, :3]) / (np.linalg.norm(dead) or 1.0)),
     )
 
 
@@ -159,6 +162,36 @@ def _beside_weight(network: Network, bricks: int, stiffness: Floats) -> tuple[Fl
 
 
 _Pull = tuple[Ints, Floats, Floats]  # bricks, points and wrenches about them
+
+
+def _ground_motion(network: Network) -> Floats:
+    """Return how the ground moves at every spring, (S, 6)."""
+    out = np.zeros((len(network.springs.since), 6))
+    for spring, ground in zip(network.springs.support, network.scene.grounds, strict=True):
+        if ground.movement is not None:
+            shift, turn = np.array(ground.movement).reshape(2, 3)
+            arm = np.subtract(ground.position, ground.anchor)
+            out[spring] = *(shift + np.cross(turn, arm)), *turn
+    return out
+
+
+def _loads(network: Network, bricks: int) -> list[_Pull]:
+    """Return what pulls at bricks beside their weight, where it does."""
+    scene, out = network.scene, []
+    pulls = [
+        (load.brick, load.position, load.force)
+        for load in scene.loads
+        if max(scene.since[load.brick], scene.since[load.starts_with]) <= bricks
+    ]
+    size = np.linalg.norm(scene.gravity)
+    if any(scene.wind):
+        blown = np.array(scene.wind) * size
+        pulls += [(brick.name, None, blown * brick.mass) for brick in scene.placed[:bricks]]
+    for name, position, force in pulls:
+        brick = scene.since[name] - 1
+        point = network.centroid[brick] if position is None else np.array(position)
+        out.append((np.array([brick]), point[None], np.append(force, np.zeros(3))[None]))
+    return out
 
 
 def _moved(twist: Floats, arm: Floats) -> Floats:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -55,15 +56,17 @@ def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) ->
     split, deformation, stiffness = _frame(network, bricks, contrast)
     load = np.zeros((deformation.shape[1] // 6, 6))
     load[network.inner[:bricks].ravel(), :3] = network.inner_weight[: 2 * bricks]
+    _add_loads(network, bricks, load)
     held = network.inner.ravel()[columns]
     base = np.flatnonzero(network.node_kind[:nodes] == PartKind.BASE.value)
     free = np.ones(load.shape, dtype=bool)
     free[base] = False
     free[held, :3] = False
-    unknown, motion = np.flatnonzero(free), np.zeros(load.size)
-    reduced = deformation[:, unknown]
+    unknown, motion = np.flatnonzero(free), _moved_ground(network, base, load.shape)
+    reduced, strain = deformation[:, unknown], deformation @ motion
     examine = partial(require_resistance, network, bricks, columns)
-    motion[unknown] = _solve(reduced, stiffness, load.ravel()[unknown], contrast, examine)
+    pull = _Pull(load.ravel()[unknown], strain)
+    motion[unknown] = _solve(reduced, stiffness, pull, contrast, examine)
     stress = stiffness * (deformation @ motion)
     reaction = (deformation.T @ stress).reshape(load.shape) - load
     springs, which = network.springs, network.edge_spring[split]
@@ -82,6 +85,23 @@ def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) ->
         joint_wrench=wrench[None],
         brick_twist=moved[network.inner[:bricks]].mean(axis=1)[None],
     )
+
+
+def _add_loads(network: Network, bricks: int, load: Floats) -> None:
+    """Add to forces and moments at nodes (n, 6) what pulls at bricks beside their weight."""
+    both, applied = network.inner[:bricks], network.applied(bricks)
+    arm = network.centroid[:bricks] - network.node_position[both].mean(axis=1)
+    applied[:, 3:] += np.cross(arm, applied[:, :3])
+    load[both] += 0.5 * applied[:, None]
+
+
+def _moved_ground(network: Network, base: Ints, shape: tuple[int, ...]) -> Floats:
+    """Return the motions (6n,) of nodes of which the base nodes alone move, with the ground."""
+    out, support = np.zeros(shape), network.springs.support.tolist()
+    for node in base:
+        ground = network.scene.grounds[support.index(network.node_spring[node])]
+        out[node] = ground.movement or 0.0
+    return out.ravel()
 
 
 def _frame(network: Network, bricks: int, contrast: float) -> tuple[Ints, sparse.csr_array, Floats]:
@@ -146,10 +166,17 @@ def _rows(nodes: int, pairs: Ints, first: Floats, second: Floats) -> sparse.coo_
     return sparse.coo_array((blocks.ravel(), index), shape=(row.size, 6 * nodes))
 
 
+class _Pull(NamedTuple):
+    """Forces on nodes (n,), and how beams and springs (R,) are deformed where these do not move."""
+
+    load: Floats
+    strain: Floats
+
+
 def _solve(
-    maps: sparse.csr_array, stiffness: Floats, load: Floats, contrast: float, examine: _Examine
+    maps: sparse.csr_array, stiffness: Floats, pull: _Pull, contrast: float, examine: _Examine
 ) -> Floats:
-    """Return the displacements under a load, corrected until they no longer change.
+    """Return the displacements under a pull, corrected until they no longer change.
 
     ``maps``: to deformations. A matrix that looks singular is examined: ``examine`` raises if the
     structure is a mechanism.
@@ -166,6 +193,7 @@ def _solve(
     except RuntimeError as error:  # SuperLU met an exactly zero pivot
         examine()
         raise failure from error
+    load = pull.load - maps.T @ (stiffness * pull.strain)
     vector = np.random.default_rng(0).standard_normal(len(load))
     for _ in range(4):  # inverse iteration, for the smallest eigenvalue
         vector = factor.solve(vector / np.linalg.norm(vector))
@@ -173,7 +201,7 @@ def _solve(
         examine()
     answer = scale * factor.solve(scale * load)
     for _ in range(_FRAME_CORRECTIONS):
-        residual = load - maps.T @ (stiffness * (maps @ answer))
+        residual = pull.load - maps.T @ (stiffness * (maps @ answer + pull.strain))
         correction = scale * factor.solve(scale * residual)
         answer += correction
     last, most = (np.abs(part / scale).max() for part in (correction, answer))

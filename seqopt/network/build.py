@@ -153,6 +153,7 @@ def _arrays(
             translational_stiffness=np.array([s.translational_stiffness for s, _ in springs]),
             rotational_stiffness=np.array([s.rotational_stiffness for s, _ in springs]),
             support=support,
+            movement=np.array([_movement(spring) for spring, _ in springs]),
             thickness=np.array([s.thickness for s, _ in springs], dtype=float),  # None is NaN
             face=tuple(np.array(s.corners or (), dtype=float).reshape(-1, 3) for s, _ in springs),
         ),
@@ -168,8 +169,18 @@ def _arrays(
         edge_since=np.array([edge.since for edge in edges]),
         edge_brick=np.array([edge.brick for edge in edges]),
         edge_spring=np.array([edge.spring for edge in edges]),
-        weight=np.array([brick.mass for brick in scene.placed])[:, None] * np.array(scene.gravity),
+        weight=np.array([brick.mass for brick in scene.placed])[:, None]
+        * (scene.weight_factor * np.array(scene.gravity)),
     )
+
+
+def _movement(spring: Joint | Ground) -> Floats:
+    """Return how the ground moves at a spring, (6,)."""
+    if isinstance(spring, Joint) or spring.movement is None:
+        return np.zeros(6)
+    out = np.array(spring.movement)
+    out[:3] += np.cross(out[3:], np.subtract(spring.position, spring.anchor))
+    return out
 
 
 def _axes(springs: _Springs, index_of: dict[int, int]) -> Floats:

@@ -78,6 +78,8 @@ class Springs(FrozenValue):
         N/m, N m/rad.
     support : (G,) int
         Indices of the springs that are ground ends, in the scene's order.
+    movement : (S, 6) float
+        How the ground moves at the position of a ground end, m and rad; zero for joints.
     thickness : (S,) float
         Of joints that say so, m; NaN for others.
     face : tuple of (m, 3) float
@@ -94,6 +96,7 @@ class Springs(FrozenValue):
     translational_stiffness: Floats
     rotational_stiffness: Floats
     support: Ints
+    movement: Floats
     thickness: Floats
     face: tuple[Floats, ...]
 
@@ -185,6 +188,58 @@ class Network(Shown, FrozenValue):
             if brick.node_offsets is not None:
                 half[2 * i : 2 * i + 2] = _shared_weight(brick, self.weight[i])
         return frozen(half)
+
+    @cached_property
+    def loads(self) -> tuple[Ints, Ints, Floats]:
+        """Bricks (L,) that loads and wind pull at, from which counts on (L,), wrenches (L, 6)."""
+        scene, index = self.scene, {name: since - 1 for name, since in self.scene.since.items()}
+        brick = np.array([index[load.brick] for load in scene.loads], dtype=np.int64)
+        last = np.array([index[load.starts_with] for load in scene.loads], dtype=np.int64)
+        force = np.array([load.force for load in scene.loads]).reshape(-1, 3)
+        arm = np.zeros_like(force)
+        for i, load in enumerate(scene.loads):
+            if load.position is not None:
+                arm[i] = load.position - self.centroid[brick[i]]
+        wrench = np.hstack([force, np.cross(arm, force)])
+        if any(scene.wind):
+            every = np.arange(len(scene.placed))
+            mass = np.array([each.mass for each in scene.placed])[:, None]
+            blown = mass * np.linalg.norm(scene.gravity) * np.array(scene.wind)
+            brick, last = np.concatenate([brick, every]), np.concatenate([last, every])
+            wrench = np.vstack([wrench, np.hstack([blown, np.zeros_like(blown)])])
+        return frozen((brick, 1 + np.maximum(brick, last), wrench))
+
+    def applied(self, bricks: int, before: int = 0) -> Floats:
+        """Return what loads and wind apply to the bricks of a partial structure.
+
+        ``before``: only what did not act yet on as many bricks. Result (b, 6): force and moment
+        about the centroid, N and N m.
+        """
+        brick, since, wrench = self.loads
+        now, out = (since > before) & (since <= bricks), np.zeros((bricks, 6))
+        np.add.at(out, brick[now], wrench[now])
+        return out
+
+    def inner_load(self, bricks: int) -> Floats:
+        """Return what of weight and loads every inner node bears, (2b, 3), N.
+
+        Of a load half each, as of a weight; its moments send nothing along the inner edges.
+        """
+        half = 0.5 * self.applied(bricks)[:, :3]
+        return np.asarray(self.inner_weight[: 2 * bricks] + np.repeat(half, 2, axis=0))
+
+    def ground_motion(self, bricks: int) -> Floats:
+        """Return how nodes move with the ground while no brick does, (n, 3), m.
+
+        A base node moves with the ground, the joint node before it half as far as the ground there.
+        """
+        out, springs = np.zeros((self.count_nodes(bricks), 3)), self.springs
+        for s in np.flatnonzero((springs.since <= bricks) & springs.movement.any(axis=1)):
+            at, turn = springs.movement[s, :3], springs.movement[s, 3:]
+            out[springs.node[s]] = 0.5 * at
+            base = (self.node_kind == PartKind.BASE.value) & (self.node_spring == s)
+            out[np.flatnonzero(base)] = at + np.cross(turn, springs.anchor[s] - springs.position[s])
+        return out
 
     @cached_property
     def edge_axis(self) -> Floats:

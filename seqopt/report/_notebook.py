@@ -111,6 +111,7 @@ def _scene(value: Scene) -> _Card:
         "mass, kg": f"{sum(brick.mass for brick in value.bricks):.4g}",
         "robots": "; ".join(teams),
         "nodes that may be held": 2 * len(value.bricks) - len(value.blocked_nodes),
+        **({"beside the weight": value.loading} if value.loading else {}),
     }
     return _Card(
         f"Scene {value.name}", rows, lambda: [display("scene_picture")(value, width=WIDTH)]

@@ -259,9 +259,11 @@ def report_page(
     True
     """
     data = json.dumps(_data(engine, builds, scatter), separators=(",", ":"))
+    scene = engine.network.scene
+    loading = f" Counted, and not drawn: {scene.loading}." if scene.loading else ""
     return _filled(
-        title=f"{escape(engine.network.scene.name)}, step by step",
-        sentence=escape(sentence),
+        title=f"{escape(scene.name)}, step by step",
+        sentence=escape(sentence + loading),
         tables="".join(_table(caption, table) for caption, table in tables),
         data=data.replace("<", "\\u003c"),  # so that it cannot end the script it stands in
     )

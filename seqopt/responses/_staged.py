@@ -3,8 +3,9 @@
 From scratch, a step knows nothing of the steps before it: all weight acts at once, and every robot
 holds its node where the plan has it. Here the build goes through its steps. A brick comes without
 stress onto the structure as it has deformed, and its weight acts from then on; a grip closes
-without force where it finds its node, and holds it there; a release lets its force go. Every change
-is a linear increment on the structure as it then stands, and all of them are added up.
+without force where it finds its node, and holds it there; a release lets its force go. A load comes
+with the brick that it begins with, and a ground end moves when it closes. Every change is a linear
+increment on the structure as it then stands, and all of them are added up.
 """
 
 from __future__ import annotations
@@ -133,7 +134,7 @@ def next_state(parts: Ungripped, before: StagedState, step: Step, placing: Placi
     for grip in set(before.grips) - set(held):
         load[grip] -= before.grips[grip]
     state = replace(state, grips={grip: before.grips.get(grip, np.zeros(3)) for grip in held})
-    return _loaded(parts, state, load) if load.any() else state
+    return _loaded(parts, state, load, before.bricks)
 
 
 def state_fields(parts: Ungripped, state: StagedState) -> Fields:
@@ -141,7 +142,8 @@ def state_fields(parts: Ungripped, state: StagedState) -> Fields:
     force = np.array(list(state.grips.values())).reshape(1, -1, 3)
     return Fields(
         edge_force=state.carried[None].copy(),
-        displacement=(parts.motion @ state.twist).reshape(1, -1, 3),
+        displacement=(parts.motion @ state.twist).reshape(1, -1, 3)
+        + parts.network.ground_motion(state.bricks),
         grip_force=force,
         support=reactions(parts.network, parts.statics, state.wrench[None]),
         joint_wrench=state.wrench[None].copy(),
@@ -149,13 +151,22 @@ def state_fields(parts: Ungripped, state: StagedState) -> Fields:
     )
 
 
-def _loaded(parts: Ungripped, state: StagedState, load: Floats) -> StagedState:
-    """Return a state with a further load (2b, 3) at the inner nodes, those held kept still."""
-    network = parts.network
+def _loaded(parts: Ungripped, state: StagedState, load: Floats, before: int) -> StagedState:
+    """Return a state with a further load (2b, 3) at the inner nodes, those held kept still.
+
+    What loads it, and which ground end moves, since there were ``before`` bricks, is added.
+    """
+    network, applied = parts.network, parts.network.applied(state.bricks, before)
+    new = np.repeat(network.springs.since[parts.acting] > before, 6)
+    moved = np.where(new, parts.moved, 0.0)
+    if not (load.any() or applied.any() or moved.any()):
+        return state
     columns: Ints = np.array(list(state.grips), dtype=np.int64)
     inner = (3 * network.inner[: state.bricks].ravel()[:, None] + np.arange(3)).ravel()
     pull = parts.motion[inner].T @ load.ravel() * parts.twist_unit / parts.unit
-    solution = solve_load(parts, columns, pull)
+    pull += applied.ravel() * parts.twist_unit / parts.unit
+    solution = solve_load(parts, columns, pull, moved)
+    load += np.repeat(0.5 * applied[:, :3], 2, axis=0)
     force = solution.force.copy()
     load[columns] += force[0]
     carried = edge_forces(network, parts.statics, solution.wrench, load[None])

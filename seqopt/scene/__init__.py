@@ -13,9 +13,11 @@ An arch of your own from the angles of its bricks, with robots beside it that re
 >>> [robot.reach.covers(scene.node_position(9)) for robot in scene.robots]
 [True, True, True]
 
-Make any other scene from `Brick`, `Joint`, `Ground` and `Robot`; `save_scene` writes it to a file.
+Make any other scene from `Brick`, `Joint`, `Ground` and `Robot`, and `Load` where something else
+than its weight loads it; `save_scene` writes it to a file.
 """
 
+from seqopt.scene._loads import Load
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.scene import Scene
@@ -26,6 +28,7 @@ __all__ = [
     "Brick",
     "Ground",
     "Joint",
+    "Load",
     "Robot",
     "Scene",
     "arch_scene",

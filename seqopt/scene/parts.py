@@ -53,6 +53,14 @@ def _unit_axes(value: object, where: str, first: str, second: str) -> None:
     settle(value, **{first: a, second: b})
 
 
+def _six(where: str, given: Iterable[float]) -> tuple[float, ...]:
+    """Return a translation and a rotation; three numbers are a translation."""
+    numbers = rows(where, given, "three or six numbers")
+    if len(numbers) not in (3, 6):
+        raise SceneError(f"{where} is {short(given)}; give three or six numbers")
+    return (*vector(where, numbers[:3]), *vector(where, numbers[3:] or (0.0, 0.0, 0.0)))
+
+
 def _two_points(where: str, given: Iterable[Iterable[float]]) -> tuple[Vector, Vector]:
     """Return where the nodes of a block are if they are two places."""
     found = [vector(where, row) for row in rows(where, given)]
@@ -344,6 +352,9 @@ class Ground(Spring):
         The fixed point, m: reaction and moment are taken here.
     closes_with : int, optional
         The brick whose placing closes this end; ``brick`` by default. The others as of `Spring`.
+    movement : tuple of 6 float, optional
+        How the fixed point and its stub move while this end acts: translation, m, and rotation,
+        rad, in the scene's axes; three numbers are a translation.
 
     Raises
     ------
@@ -354,11 +365,12 @@ class Ground(Spring):
     brick: int
     anchor: Vector
     closes_with: int | None = None
+    movement: tuple[float, ...] | None = None
 
     def __post_init__(self) -> None:
         check(self, "ground end", brick=whole)
         where = self.label
-        check(self, where, closes_with=unless_none(whole))
+        check(self, where, closes_with=unless_none(whole), movement=unless_none(_six))
         self._check(where)
         check(self, where, anchor=vector)
         if self.anchor == self.position:

@@ -1,7 +1,8 @@
 """Scenarios: random variations of a scene, reproducible by a seed.
 
-Stiffnesses, weights and positions vary; topology, names, build order and robots stay, so the
-choices of a schedule mean the same in all scenarios.
+Stiffnesses, weights and positions vary; topology, names, build order, robots, forces of loads and
+movements of ground ends stay, so the choices of a schedule mean the same in all scenarios. Wind
+varies as weights do.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ def weighed(scene: Scene, factors: Floats) -> Scene:
 def shifted(scene: Scene, size: float, rng: np.random.Generator) -> Scene:
     """Return a scene moved up to a size along every axis, m, uniformly and piece by piece.
 
-    A brick takes its nodes with it, a ground end its fixed point.
+    A brick takes its nodes and loads with it, a ground end its fixed point.
     """
 
     def moved(part: _Part) -> _Part:
@@ -63,7 +64,17 @@ def shifted(scene: Scene, size: float, rng: np.random.Generator) -> Scene:
 
     grounds = tuple(map(moved, scene.grounds))  # the first to draw
     bricks, joints = tuple(map(moved, scene.bricks)), tuple(map(moved, scene.joints))
-    return replace(scene, bricks=bricks, joints=joints, grounds=grounds)
+    steps = {
+        old.name: np.subtract(new.position, old.position)
+        for old, new in zip(scene.bricks, bricks, strict=True)
+    }
+    loads = tuple(
+        replace(load, position=as_vector(np.array(load.position) + steps[load.brick]))
+        if load.position
+        else load
+        for load in scene.loads
+    )
+    return replace(scene, bricks=bricks, joints=joints, grounds=grounds, loads=loads)
 
 
 MOST = 100_000  # scenarios; more are a slip of the finger

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, TypeVar
 from seqopt._showing import Shown, display
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import check, printable, short, vector, wholes
+from seqopt.scene._checks import check, not_negative, printable, short, vector, wholes
+from seqopt.scene._loads import Load
 from seqopt.scene.parts import Brick, Ground, Joint, Reach, Robot
 
 if TYPE_CHECKING:
@@ -88,7 +89,18 @@ def _check_edges(spring: Joint | Ground, brick: Brick) -> None:
         )
 
 
-_KINDS = {"bricks": Brick, "joints": Joint, "grounds": Ground, "robots": Robot}
+def _check_loads(loads: Sequence[Load], bricks: Mapping[int, Brick]) -> None:
+    """Require forces that can be computed with. ``bricks``: by name."""
+    for load in loads:
+        if math.hypot(*load.force) > _HEAVY:
+            raise SceneError(f"{load.label}: force is {list(load.force)}; give N, at most 1e100")
+        brick = bricks[load.brick]
+        if load.position and max(map(abs, load.position)) > _FAR * max(brick.dimensions):
+            where = list(load.position)
+            raise SceneError(f"{load.label}: position is {where}; move it to its brick")
+
+
+_KINDS = {"bricks": Brick, "joints": Joint, "grounds": Ground, "robots": Robot, "loads": Load}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,6 +122,13 @@ class Scene(Shown):
         Inner nodes that no robot may hold.
     gravity : Vector
         Acceleration, m/s².
+    loads : tuple of Load
+        Forces on bricks beside their weight.
+    wind : Vector
+        A force on every brick at its centroid, over its mass times the size of gravity: wind, an
+        earthquake, a lean.
+    weight_factor : float
+        By which all weights are multiplied; not the wind.
 
     Raises
     ------
@@ -135,11 +154,15 @@ class Scene(Shown):
     blocked_nodes: tuple[int, ...] = ()
     gravity: Vector = (0.0, 0.0, -9.81)
     provenance: str = ""
+    loads: tuple[Load, ...] = ()
+    wind: Vector = (0.0, 0.0, 0.0)
+    weight_factor: float = 1.0
 
     def __post_init__(self) -> None:
         check(self, "scene", **{name: partial(_parts, kind=kind) for name, kind in _KINDS.items()})
         where = f"scene {printable('scene', self.name)}"
         check(self, where, build_order=wholes, blocked_nodes=wholes, gravity=vector)
+        check(self, where, wind=vector, weight_factor=not_negative)
         if not self.bricks:
             raise SceneError(f"{where}: it has no bricks; give at least one")
         if not self.grounds:
@@ -149,7 +172,9 @@ class Scene(Shown):
         _unique(f"{where}: robot", (robot.name for robot in self.robots))
         self._check_references(where)
         _check_bricks(self.bricks, self.gravity)
-        _check_springs((*self.joints, *self.grounds), {brick.name: brick for brick in self.bricks})
+        by_name = {brick.name: brick for brick in self.bricks}
+        _check_springs((*self.joints, *self.grounds), by_name)
+        _check_loads(self.loads, by_name)
 
     def __repr__(self) -> str:
         counts = (
@@ -165,6 +190,8 @@ class Scene(Shown):
         for ground in self.grounds:
             closes = ground.brick if ground.closes_with is None else ground.closes_with
             _known(ground.label, "brick", (ground.brick, closes), names)
+        for load in self.loads:
+            _known(load.label, "brick", (load.brick, load.starts_with), names)
         if Counter(self.build_order) != Counter(names):
             raise SceneError(
                 f"{where}: build_order is {list(self.build_order)}; "
@@ -211,6 +238,19 @@ class Scene(Shown):
     def since(self) -> dict[int, int]:
         """From which brick count on each brick stands, by name."""
         return {name: count for count, name in enumerate(self.build_order, start=1)}
+
+    @property
+    def loading(self) -> str:
+        """What loads and moves it beside its weight, in words; empty if nothing does."""
+        largest = max((math.hypot(*load.force) for load in self.loads), default=0.0)
+        moved = sum(any(ground.movement or ()) for ground in self.grounds)
+        said = {
+            f"{len(self.loads)} forces on bricks, up to {largest:g} N": self.loads,
+            f"wind of {list(self.wind)} times the weight": any(self.wind),
+            f"weights times {self.weight_factor:g}": self.weight_factor != 1,
+            f"{moved} ground ends that move": moved,
+        }
+        return ", ".join(text for text, counts in said.items() if counts)
 
     def with_robots(self, *robots: Robot) -> Scene:
         """Return the same scene with other robots.

@@ -24,6 +24,7 @@ from seqopt._files import read_text, write_text
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import cut, reading_json, short
+from seqopt.scene._loads import Load
 from seqopt.scene.library.arch_form import ArchForm, arch, barrel_vault, chain
 from seqopt.scene.library.dome import DomeShape, dome
 from seqopt.scene.library.vault import VaultShape, herringbone_vault
@@ -78,14 +79,15 @@ def _of_places(scene: Scene) -> Iterator[str]:
 
 
 def _of_joints(scene: Scene) -> Iterator[str]:
-    """Yield joints and ground ends that lie far from their bricks."""
+    """Yield joints, ground ends and loads that lie far from their bricks."""
     bricks = {brick.name: brick for brick in scene.bricks}
     springs: tuple[Joint | Ground, ...] = (*scene.joints, *scene.grounds)
-    for spring in springs:
-        for brick in (bricks[end] for end in spring.ends):
-            away = _distance(brick, spring.position)
-            if away > _FAR_AWAY * max(brick.dimensions):
-                yield f"{spring.label}: it lies {away:.4g} m from brick {brick.name}"
+    placed = [(spring.label, spring.position, end) for spring in springs for end in spring.ends]
+    placed += [(load.label, load.position, load.brick) for load in scene.loads if load.position]
+    for label, position, end in placed:
+        away = _distance(bricks[end], position)
+        if away > _FAR_AWAY * max(bricks[end].dimensions):
+            yield f"{label}: it lies {away:.4g} m from brick {end}"
 
 
 def _distance(brick: Brick, point: Vector) -> float:
@@ -100,7 +102,9 @@ def _named(bricks: list[Brick]) -> str:
 
 
 _VERSION = 1
-_UNSAID = ("thickness", "face", "shape", "node_offsets")  # left out of a file where there is none
+_UNSAID = ("thickness", "face", "shape", "node_offsets", "movement", "position", "since")
+"""Left out of a file where there is none."""
+_UNLOADED = {"loads": (), "wind": (0.0, 0.0, 0.0), "weight_factor": 1.0}  # not said either
 _REACHES: dict[str, type[Reach]] = {"anywhere": Anywhere, "side": Side, "sphere": Sphere}
 _DATA = resources.files("seqopt").joinpath("data")
 
@@ -308,6 +312,7 @@ def _scene_from_dict(document: dict[str, Any]) -> Scene:
     content["bricks"] = [Brick(**_with_shape(brick)) for brick in content["bricks"]]
     content["joints"] = [Joint(**joint) for joint in content["joints"]]
     content["grounds"] = [Ground(**ground) for ground in content["grounds"]]
+    content["loads"] = [Load(**load) for load in content.get("loads", ())]
     content["robots"] = [
         Robot(**{**robot, "reach": _reach(robot.get("reach", {"kind": "anywhere"}))})
         for robot in content["robots"]
@@ -328,7 +333,11 @@ def _with_shape(entry: dict[str, Any]) -> dict[str, Any]:
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
     """Return a scene as a document that obeys the schema."""
     document = {"format": "seqopt-scene", "version": _VERSION, **asdict(scene)}
-    for part in (*document["bricks"], *document["joints"], *document["grounds"]):
+    for key, usual in _UNLOADED.items():
+        if document[key] == usual:
+            del document[key]
+    kinds = ("bricks", "joints", "grounds", "loads")
+    for part in (part for kind in kinds for part in document.get(kind, ())):
         for key in _UNSAID:
             if part.get(key, "") is None:
                 del part[key]

@@ -13,11 +13,24 @@ An assembly of blocks is assessed with the mortar in its joints. Every verdict i
 
 `assess_steps` asks the same of every step of a build, and `stability_table` lays the answers out.
 `Screen` says which of many grip sets stand, and `Margins` by how much: most of them unsolved.
+`load_factors` says what multiple of the scene's loads every step bears.
 """
 
+from seqopt.stability._load_factor import LoadFactor, load_factor_table, load_factors
 from seqopt.stability._margins import Margins
 from seqopt.stability._screens import Screen
 from seqopt.stability.assessment import Stability, Verdict, assess
 from seqopt.stability.steps import assess_steps, stability_table
 
-__all__ = ["Margins", "Screen", "Stability", "Verdict", "assess", "assess_steps", "stability_table"]
+__all__ = [
+    "LoadFactor",
+    "Margins",
+    "Screen",
+    "Stability",
+    "Verdict",
+    "assess",
+    "assess_steps",
+    "load_factor_table",
+    "load_factors",
+    "stability_table",
+]

@@ -172,8 +172,8 @@ class _Known:
             return []
         flat = np.ldexp(motion, -np.frexp(size)[1]).ravel()
         ((low, _), (high, _)), opening = contact_work(assembly, case, flat, (0.0, 1.0))
-        work = float(assembly.load() @ flat) - low
-        growth = float(assembly.load(case.pull) @ flat) - (high - low)
+        by_load, by_growth = (float(load @ flat) for load in case.loads(assembly))
+        work, growth = by_load - low, by_growth - (high - low)
         closing = LARGEST_FORCE * float(np.maximum(-opening, 0).sum())
         speed = np.linalg.norm((assembly.grip_map.T @ flat).reshape(-1, 3), axis=1)
         return [_FallingMotion(work, growth, closing, speed)]
@@ -217,11 +217,12 @@ class _Known:
         """Return the value of z that a motion proves for every row."""
         own, common = self._case.payload
         force = self._assembly.scales[0]
-        weights = np.linalg.norm(self._assembly.weight, axis=1).sum()
+        loads, more = self._case.amounts(self._assembly)
         speed = np.append(motion.speed, 0.0)[places]
         work = motion.work - own * (payload * speed).sum(axis=1) / force
-        work -= motion.closing * (weights + payload.sum(axis=1)) / force
+        work -= motion.closing * (loads + payload.sum(axis=1)) / force
         growth = motion.growth - common * (speed * (payload > 0)).sum(axis=1)
+        growth -= motion.closing * more / force
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.abs(work / growth)
         if self._case.sense is Sense.SMALLEST:

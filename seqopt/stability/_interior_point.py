@@ -149,7 +149,7 @@ def _refined(matrix: Floats | sparse.csc_array, solve: _Solve) -> _Solve:
 
 class _Search:
     def __init__(self, assembly: Assembly, case: Case) -> None:
-        self._load, self._corners = assembly.load(), len(assembly.corner)
+        self._load, self._corners = case.loads(assembly)[0], len(assembly.corner)
         self._balance, self._cones = _Balance(assembly), _Cones(assembly, case)
 
     @np.errstate(all="ignore")

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import bare_assembly
+from seqopt.contact.faces import _applied_rows, bare_assembly
 from seqopt.network.network import GROUND, Network
 
 
@@ -59,6 +59,7 @@ class PartialAssemblies:
                 "grip_block": np.array([self._block[node] for node, _ in held], dtype=np.int64),
                 "grip_position": np.array([scene.node_position(n) for n, _ in held]).reshape(-1, 3),
                 "payload": np.array([payload for _, payload in held]),
+                "applied": _applied_rows(self.network, bricks),
                 "corner_area": whole.corner_area[:corners],
                 "area": whole.area[:contacts],
                 "axes": whole.axes[:contacts],

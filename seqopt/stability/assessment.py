@@ -57,8 +57,8 @@ class Stability(Shown, FrozenValue):
     friction : float
         Least coefficient of friction with which it stands at the mortar's bond; inf if none is.
     pull : (8,) float
-        Largest sideways acceleration that it survives in each direction, relative to gravity; NaN
-        if it does not stand.
+        Largest sideways acceleration that it survives in each direction, relative to gravity, under
+        all loads; NaN if it does not stand.
     tilt : float
         Tilt survived in every direction, rad: a safe bound by forces; NaN if it does not stand.
         Gravity turned by atan(a) mixes no load with gravity and a sideways a, all survived. It is
@@ -274,7 +274,7 @@ def _is_jammed(prove: Prover, mortar: Mortar, least: float) -> bool:
         return False
     assembly, case = prove.assembly, bonded(prove.assembly, mortar)
     proven = prove(replace(case, friction=min(_LITTLE, mortar.friction)))
-    total = np.linalg.norm(assembly.weight, axis=1).sum() + assembly.payload.sum()
+    total = case.amounts(assembly)[0] + assembly.payload.sum()
     most = proven.answer.contact_force[:, 0].max(initial=0.0) * assembly.scales[0]
     return bool(proven.held <= EXACT and most > LARGEST_FORCE * total)
 

@@ -28,7 +28,7 @@ from seqopt.errors import plugins
 EXACT = 1e-6  # largest violation of an accepted proof, over the force scale and max(1, z)
 GAP = 1e-3  # largest difference between the two proofs, relative to max(1, z)
 ROUNDING = 1e-12  # work in a motion treated as zero, over the largest entry of the motion
-LARGEST_FORCE = 10.0  # of a corner, over total weight and payloads: prices motions that violate
+LARGEST_FORCE = 10.0  # of a corner, over all loads and payloads: prices motions that violate
 _CLOSING = 1e-4  # by which a motion that proves may close a corner, over its largest entry
 CAP = 1e5  # z is sought between 0 and this
 
@@ -46,7 +46,8 @@ class Case:
 
     ``tension``, ``cohesion``, ``payload``: value at z = 0 and growth with z. A payload is a
     multiple of every grip's own and an amount that all have in common; ``pull``: acceleration that
-    grows with z, over that of gravity.
+    grows with z, over that of gravity; ``applied``: multiple of what the assembly has applied
+    beside the weights at z = 0, and its growth.
     """
 
     sense: Sense
@@ -55,6 +56,20 @@ class Case:
     cohesion: tuple[float, float]
     payload: tuple[float, float] = (1.0, 0.0)
     pull: Vector = (0.0, 0.0, 0.0)
+    applied: tuple[float, float] = (1.0, 0.0)
+
+    def loads(self, assembly: Assembly) -> tuple[Floats, Floats]:
+        """Return all loads at z = 0 and their growth with z, (6B,), as of `Assembly.load`."""
+        start, growth = assembly.load(), assembly.load(self.pull)
+        if len(assembly.applied):
+            start = start + self.applied[0] * assembly.applied_load
+            growth = growth + self.applied[1] * assembly.applied_load
+        return start, growth
+
+    def amounts(self, assembly: Assembly) -> tuple[float, float]:
+        """Return the sizes of all loads in sum at z = 0, and the growth of what is applied, N."""
+        weight, applied = assembly.amounts
+        return weight + self.applied[0] * applied, self.applied[1] * applied
 
     def fixed(self, z: float = 0.0) -> Case:
         """Return the case with strengths as they are at a z, which do not grow."""
@@ -125,7 +140,8 @@ def violation(assembly: Assembly, case: Case, answer: Answer, own: Floats | None
     if (force.shape, grip.shape) != ((len(assembly.corner), 3), (len(assembly.payload), 3)):
         return np.inf
     residual = assembly.contact_map @ force.ravel() + assembly.grip_map @ grip.ravel()
-    residual += assembly.load() + z * assembly.load(case.pull)
+    start, growth = case.loads(assembly)
+    residual += start + z * growth
     tension, cohesion, payload = limits(assembly, case, z, own)
     excess = (
         np.abs(residual),
@@ -153,7 +169,7 @@ def bound(assembly: Assembly, case: Case, answer: Answer) -> float:
 
     A motion proves nothing, 0 or `CAP`, if the load does less work in it than is taken up, or if
     a corner closes by more than `_CLOSING`. Less than that is charged with a corner force of
-    `LARGEST_FORCE` times the sum of weights and payloads.
+    `LARGEST_FORCE` times the sum of weights, of what is applied beside them, and of payloads.
     """
     nothing = 0.0 if case.sense is Sense.SMALLEST else CAP
     if not is_finite(assembly, answer):
@@ -162,12 +178,14 @@ def bound(assembly: Assembly, case: Case, answer: Answer) -> float:
     motion = np.ldexp(answer.motion, -size).ravel()
     at_grip = np.linalg.norm((assembly.grip_map.T @ motion).reshape(-1, 3), axis=1)
     contact, opening = contact_work(assembly, case, motion, (answer.value, 0.0, 1.0))
-    total = np.linalg.norm(assembly.weight, axis=1).sum() + assembly.payload.sum()
+    loads, more = case.amounts(assembly)
     most = LARGEST_FORCE if -opening.min(initial=0.0) <= _CLOSING else np.inf
-    closing = most * total / assembly.scales[0] * np.maximum(-opening, 0).sum()
+    closed = np.maximum(-opening, 0).sum()
+    closing = most * (loads + assembly.payload.sum()) / assembly.scales[0] * closed
     _, low, high = (float(work + payload @ at_grip + closing) for work, payload in contact)
-    start = float(assembly.load() @ motion) - low
-    growth = float(assembly.load(case.pull) @ motion) - (high - low)
+    by_load, by_growth = (float(load @ motion) for load in case.loads(assembly))
+    start = by_load - low
+    growth = by_growth - (high - low) - (most * more / assembly.scales[0] * closed if more else 0.0)
     if case.sense is Sense.SMALLEST:
         if not start > ROUNDING:
             return nothing

@@ -71,6 +71,7 @@ def _network_facts(network: Network) -> dict[str, object]:
         "nodes": network.count_nodes(count),
         "edges": network.count_edges(count),
         "weight_N": float(np.linalg.norm(network.weight.sum(axis=0))),
+        "loading": scene.loading,
         "payloads_N": {robot.name: robot.payload for robot in scene.robots},
         "reaches": {robot.name: type(robot.reach).__name__.lower() for robot in scene.robots},
         "provenance": scene.provenance,
@@ -103,5 +104,7 @@ def _described(scene: Scene, facts: dict[str, Any]) -> Iterator[str]:
         reach = facts["reaches"][robot.name]
         yield f"{robot.name}: payload {robot.payload:g} N, reach {reach}"
     yield f"weight: {facts['weight_N']:.1f} N"
+    if scene.loading:
+        yield f"beside the weight: {scene.loading}"
     for i, line in enumerate(scene.provenance.splitlines()):
         yield line if i else f"provenance: {line}"

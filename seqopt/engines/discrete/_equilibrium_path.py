@@ -169,7 +169,7 @@ def _newton(held: Held, state: Settled, share: float, resistance: float) -> Sett
     drag = np.maximum(resistance, _LENT_STIFFNESS) * held.diagonal
     step, best = np.zeros_like(motion), np.inf
     for _ in range(_ITERATIONS):
-        opening = system.openings(held.across @ motion)
+        opening = system.openings(held.across @ motion, share)
         force, slope = system.points.forces(opening, state.slip, state.broken)
         left = held.free.T @ held.reaction(motion, force, share * system.load)
         missing = left - resistance * held.diagonal * (motion - state.motion)

@@ -109,6 +109,7 @@ class System(FrozenValue):
     gap: sparse.csr_array  # (6J, 6n); twists across the beds for unit twists of the n bodies
     layers: sparse.csr_array  # (6n, 6n); stiffness of the elastic layers
     load: Floats  # (6n,)
+    moved: Floats  # (6J,); how the ground moves where beds lie on it
     unit: Floats  # (6n,)
     length: float  # of a brick, m
 
@@ -127,9 +128,13 @@ class System(FrozenValue):
         parts = [slice(*part) for part in pairwise(ends)]
         return _diagonal(np.array([maps[part].T @ falls[part] for part in parts]))
 
-    def openings(self, across: Floats) -> Floats:
-        """Return the openings (P, 3) of the points for twists (6J,) across the beds."""
-        return np.asarray(np.einsum("pij,pj->pi", self.maps, across.reshape(-1, 6)[self.face]))
+    def openings(self, across: Floats, share: float) -> Floats:
+        """Return the openings (P, 3) of the points for twists (6J,) across the beds.
+
+        ``share``: of its way that the ground has gone.
+        """
+        across = (across - share * self.moved).reshape(-1, 6)
+        return np.asarray(np.einsum("pij,pj->pi", self.maps, across[self.face]))
 
     @cached_property
     def scale(self) -> float:
@@ -163,10 +168,12 @@ def build_system(network: Network, bricks: int, mortar: Mortar, bed: BedStiffnes
     gap, layers, unit = _joined(network, bricks, length, own)
     # plates weigh nothing
     load = np.pad(network.weight[:bricks], ((0, len(unit) // 6 - bricks), (0, 3)))
+    load[:bricks] += network.applied(bricks)
+    moved = network.springs.movement[acting].ravel()
     normal, tangential = (area * moduli[face, i] for i in (0, 1))
     points = _Points(area, normal, tangential, mortar, assembly.stress_scale)
     pull = load.ravel() * unit
-    return System(bricks, acting, points, face, maps, gap, layers, pull, unit, length)
+    return System(bricks, acting, points, face, maps, gap, layers, pull, moved, unit, length)
 
 
 def _joined(

@@ -81,9 +81,10 @@ _MOST = 0.95  # share of all pairs of motions in space whose asymmetry counts as
 class Growth:
     """The answers of a growing structure to its weight and to unit wrenches on its bricks.
 
-    Row 0 is the weight of the bricks that stand, row ``1 + kb + i`` a unit of component ``i`` of k
-    on brick b at its centroid. Of the arrays, which have room for all bricks of the tree, the rows
-    and columns of bricks and springs that are there count.
+    Row 0 is the weight of the bricks that stand with all else that loads and moves them, row
+    ``1 + kb + i`` a unit of component ``i`` of k on brick b at its centroid. Of the arrays, which
+    have room for all bricks of the tree, the rows and columns of bricks and springs that are there
+    count.
 
     ``tree``: on which the bricks hang. ``basis``: k directions in which bricks are loaded and move;
     all by default. ``twist`` (1 + kB, kB): of the bricks, m and rad; ``wrench`` (1 + kB, kS): of
@@ -99,6 +100,7 @@ class Growth:
         # how many springs act on as many bricks
         self._acting = np.searchsorted(network.springs.since, counts, side="right").tolist()
         self._compliance = compliances(network, self._acting[-1], basis)
+        self._shift = network.springs.movement[: self._acting[-1]] @ basis.wrench.T
         center = network.centroid[: len(tree.spring)]
         self._own_arm = self._carried(center - network.springs.position[tree.spring])
         self._along = self._carried(center - center[tree.parent])
@@ -176,13 +178,23 @@ class Growth:
             self.twist[rows, : k * brick], self.twist[old, mine] = 0.0, 0.0
             self._stressed(rows)[:] = 0.0
             self.loss[brick] = 1.0
+            if self._shift[spring].any():
+                self.twist[0, mine] = own @ self._shift[spring]
         self.twist[rows, mine] = flexibility
         self.wrench[rows, k * spring : k * spring + k] = -own
         weight = self._basis.force @ self._network.weight[brick]
         forces = slice(after, after + len(weight))
-        self.twist[0, : k * brick + k] += weight @ self.twist[forces, : k * brick + k]
-        self._stressed(0)[:] += weight @ self._stressed(forces)
+        self._load(weight, forces)
+        begun = self._network.applied(brick + 1, before=brick)
+        for other in np.flatnonzero(begun.any(axis=1)):
+            first = 1 + k * int(other)
+            self._load(self._basis.wrench @ begun[other], slice(first, first + k))
         self._tie(np.array([spring]), self._ties)
+
+    def _load(self, pull: Floats, rows: slice) -> None:
+        """Add what a pull at some rows does to what the weight does."""
+        self.twist[0, : self._moves] += pull @ self.twist[rows, : self._moves]
+        self._stressed(0)[:] += pull @ self._stressed(rows)
 
     def _close(self, springs: Ints) -> None:
         """Let springs act that close loops."""
@@ -213,12 +225,13 @@ class Growth:
     def _sum_again(self) -> None:
         """Sum all twists anew, from what springs give on the shortest way from the ground."""
         k, springs, center = self._size, self._network.springs, self._network.centroid
-        ways = []
+        ways, shift = [], np.zeros((self.bricks, k))  # the ground's, where bricks hang on it
         for parent, brick, spring, sign in self._ways(GROUND):
             at_spring = self._carried(center[brick] - springs.position[spring])
             given = self._compliance[spring] @ at_spring.T
             arm = center[brick] - center[parent] if parent != GROUND else np.zeros(3)
             ways.append((brick, parent, spring, -sign * given, self._carried(arm).T))
+            shift[brick] = at_spring @ self._shift[spring]
         step = max(1, _SUMMED // self._moves)
         for start in range(0, 1 + self._moves, step):
             part = slice(start, min(start + step, 1 + self._moves))
@@ -228,6 +241,8 @@ class Growth:
                 twist[:, brick] = wrench[:, spring] @ given
                 if parent != GROUND:
                     twist[:, brick] += twist[:, parent] @ along
+                elif start == 0:
+                    twist[0, brick] += shift[brick]
         # by how many last digits what should be symmetric is not: that is rounding
         some = np.linspace(0, self._moves - 1, min(self._moves, _SAMPLE)).astype(int)
         matrix, root = self.twist[np.ix_(1 + some, some)], np.sqrt(np.abs(self._own()[some]))
@@ -248,8 +263,11 @@ class Growth:
                 break
         while body != first:
             body, s, sign = trail[body]
-            turn = self._compliance[s] @ self._carried(at - springs.position[s]).T
+            carried = self._carried(at - springs.position[s])
+            turn = self._compliance[s] @ carried.T
             out -= self.wrench[: len(out), k * s : k * s + k] @ (sign * turn)
+            out[0] += sign * carried @ self._shift[s]
+        out[0] -= self._shift[spring]
         return out
 
     def _tie(self, springs: Ints, ties: dict[int, dict[int, int]] | None = None) -> None:

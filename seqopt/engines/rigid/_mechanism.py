@@ -19,7 +19,7 @@ from seqopt.network._mechanics import (
     spread,
     spring_maps,
 )
-from seqopt.network.network import Network
+from seqopt.network.network import Network, Springs
 from seqopt.work._threads import one_thread
 
 
@@ -44,9 +44,10 @@ class Ungripped(FrozenValue):
     ``inner`` (6b, 6b): those of the inner nodes for scaled twists, in the order of
     ``network.inner``, m; ``statics``: of the network; ``deformation`` (6s, 6b): scaled deformation
     of the acting springs, in their own axes, for scaled twists; ``stiffness`` (6s,): over ``unit``;
-    ``matrix`` (6s + 6b,): the system without grips; ``load`` (6b,): the weight, scaled; ``acting``
-    (s,); ``twist_unit``, ``wrench_unit`` (6b,), (6s,): what turns scaled twists into m and rad,
-    scaled wrenches into N and N m; ``unit``: N/m.
+    ``matrix`` (6s + 6b,): the system without grips; ``load`` (6b,): weight and loads, scaled;
+    ``moved`` (6s,): what the ground's movement adds to the joints' equations; ``acting`` (s,);
+    ``twist_unit``, ``wrench_unit`` (6b,), (6s,): what turns scaled twists into m and rad, scaled
+    wrenches into N and N m; ``unit``: N/m.
     """
 
     network: Network
@@ -57,6 +58,7 @@ class Ungripped(FrozenValue):
     stiffness: Floats
     matrix: sparse.csc_array
     load: Floats
+    moved: Floats
     acting: Ints
     twist_unit: Floats
     wrench_unit: Floats
@@ -94,6 +96,7 @@ def ungripped_system(network: Network, bricks: int, shared: Shared | None = None
     nodes = shared.inner.data[: 36 * bricks] * twist_unit[own], own, shared.inner.indptr[: size + 1]
     inner: sparse.csr_array = sparse.csr_array(nodes, shape=(size, size))
     weight = network.inner_weight[: 2 * bricks].ravel()
+    applied = network.applied(bricks).ravel()
     return Ungripped(
         network=network,
         bricks=bricks,
@@ -102,12 +105,20 @@ def ungripped_system(network: Network, bricks: int, shared: Shared | None = None
         deformation=gap,
         stiffness=stiffness,
         matrix=_side_by_side(gap, stiffness),
-        load=inner.T @ weight / unit,
+        load=inner.T @ weight / unit + applied * twist_unit / unit,
+        moved=_moved(springs, acting, stiffness, lever),
         acting=acting,
         twist_unit=twist_unit,
         wrench_unit=unit * np.tile(lever, len(acting)),
         unit=unit,
     )
+
+
+def _moved(springs: Springs, acting: Ints, stiffness: Floats, lever: Floats) -> Floats:
+    """Return what acting springs would bear if the ground alone moved, scaled as their rows."""
+    own = np.einsum("sij,shj->shi", springs.axes, springs.movement.reshape(-1, 2, 3))[acting]
+    row = stiffness / np.maximum(1.0, stiffness)
+    return np.asarray(row * (own.reshape(-1, 6) * lever).ravel())
 
 
 def _scaled_gap(shared: Shared, acting: Ints, unit: Floats, lever: Floats) -> sparse.csr_array:

@@ -63,13 +63,14 @@ def respond(
     """Return the fields of grip sets, of which ``motion`` is as `node_motion` returns it."""
     twist, wrench, force = solution.twist, solution.wrench, solution.force.copy()
     sets, bricks = len(twist), twist.shape[1] // 6
-    load = np.tile(network.inner_weight[: 2 * bricks], (sets, 1, 1))
+    load = np.tile(network.inner_load(bricks), (sets, 1, 1))
     load[np.arange(sets)[:, None], columns] += force
     carried = edge_forces(network, statics, wrench, load)
     split_pairs(network, columns, force, carried)
+    moved = (motion @ twist.T).T.reshape(sets, motion.shape[0] // 3, 3)
     return Fields(
         edge_force=carried,
-        displacement=(motion @ twist.T).T.reshape(sets, motion.shape[0] // 3, 3),
+        displacement=moved + network.ground_motion(bricks),
         grip_force=force,
         support=reactions(network, statics, wrench),
         joint_wrench=wrench,
@@ -188,23 +189,25 @@ def solve_mixed(network: Network, bricks: int, columns: Ints) -> Fields:
     parts = ungripped_system(network, bricks)
     answers = [no_sets(network, bricks, columns.shape[1])]
     for grips in columns:
-        solution = solve_load(parts, grips, parts.load)
+        solution = solve_load(parts, grips, parts.load, parts.moved)
         answers.append(respond(network, parts.statics, parts.motion, grips[None], solution))
     return join_sets(answers)
 
 
-def solve_load(parts: Ungripped, grips: Ints, pull: Floats) -> Solution:
+def solve_load(
+    parts: Ungripped, grips: Ints, pull: Floats, moved: Floats | float = 0.0
+) -> Solution:
     """Return how a partial structure answers to a load while a grip set holds its nodes still.
 
-    ``pull`` (6b,): the load, scaled as ``parts.load``. Raises `MechanismError` if a motion that the
-    load excites meets no resistance; `SolverError` if the answer still changes by more than
-    `LAST_CORRECTION`.
+    ``pull`` (6b,), ``moved`` (6s,): as ``load`` and ``moved`` of the parts. Raises `MechanismError`
+    if a motion that the load excites meets no resistance; `SolverError` if the answer still changes
+    by more than `LAST_CORRECTION`.
     """
     network, bricks = parts.network, parts.bricks
     system = mixed_system(parts, grips)
     joints, last = len(parts.wrench_unit), len(parts.wrench_unit) + len(parts.twist_unit)
     load = np.zeros(system.matrix.shape[0])
-    load[joints:last] = pull
+    load[:joints], load[joints:last] = moved, pull
     try:
         factors = splu(system.matrix)
     except RuntimeError as error:
@@ -264,6 +267,9 @@ def _solve_one_dense(network: Network, parts: RigidStructure, grips: Ints) -> Fi
     """Return the fields of one grip set."""
     bricks = len(parts.matrix) // 6
     pull = parts.inner_motion.T @ network.inner_weight[: 2 * bricks].ravel()
+    pull += network.applied(bricks).ravel()
+    moved = network.springs.movement[parts.acting]
+    pull += np.einsum("sij,sik,sk->j", parts.gap, parts.stiffness, moved)
     forbidden = parts.forbidden(grips)
     values, vectors, motions = resisting_modes(parts.matrix, forbidden)
     if lost_to_rounding(values):
@@ -277,6 +283,7 @@ def _solve_one_dense(network: Network, parts: RigidStructure, grips: Ints) -> Fi
     twist = motions @ answer
     wrench = np.zeros((len(network.springs.since), 6))
     wrench[parts.acting] = -np.einsum("sij,sjk,k->si", parts.stiffness, parts.gap, twist)
+    wrench[parts.acting] += np.einsum("sij,sj->si", parts.stiffness, moved)
     missing = parts.matrix @ twist - pull
     force = np.asarray(np.linalg.lstsq(forbidden.T, missing, rcond=None)[0].reshape(-1, 3))
     solution = Solution(twist[None], wrench[None], force[None])

@@ -34,7 +34,8 @@ class ComplianceOperator(FrozenValue):
 
     Row ``dm + i`` is a unit force in direction ``i`` of d at the ``m``-th inner node
     (`Network.inner`) of the h bricks that are loaded, l = 2dh loads in all: d = 3 in space, 2 in a
-    plane. One more row at the end of all but the first two arrays is the weight of the b bricks.
+    plane. One more row at the end of all but the first two arrays is the weight of the b bricks,
+    with what else loads them and how the ground moves.
 
     ``held`` (h,): the bricks that are loaded, ascending. ``flexibility`` (l, l): displacements of
     their inner nodes, m/N. ``dead_displacement`` (l,): displacements of these under the weight with
@@ -138,6 +139,8 @@ class ComplianceOperator(FrozenValue):
         for start in range(0, len(index), step):
             part = slice(start, start + step)
             self.maps.apply(name, self.loads(index[part], force[part]).sum(states), out[part])
+        if name == "displacement" and self.maps.ground.any():
+            out += self.maps.ground
         if name == "edge_force":
             out[:, self.inner_edge] += self.at_second
             self._add_grips(index, force, out)
@@ -162,6 +165,8 @@ class ComplianceOperator(FrozenValue):
                 out[-1, self.inner_edge] += self.at_second
                 rows = 2 * width * np.arange(len(self.held))[:, None] + width + np.arange(width)
                 out[rows, self.inner_edge[self.held][:, None]] += self.axis[self.held]
+            if name == "displacement":
+                out[-1] += self.maps.ground
             self._made[name] = frozen(out)
         return self._made[name]
 

@@ -180,7 +180,10 @@ def _softness(flexibility: Floats, reach: Floats, resistance: Floats, unit: floa
 def _operator(
     parts: Ungripped, states: Floats, flexibility: Floats, softness: float
 ) -> ComplianceOperator:
-    """Return the operator whose loads and loose motions lead to scaled states (l + m, n)."""
+    """Return the operator whose loads and loose motions lead to scaled states (l + m, n).
+
+    Its last row is the weight alone: corrections add what else there is.
+    """
     network, bricks = parts.network, parts.bricks
     loads = 6 * bricks
     weight = np.zeros(len(states))
@@ -327,6 +330,7 @@ class _Corrector:
         pulled = loads_of(at, force, 6 * self.bricks + 1).matrix @ self.pulls
         missing = -(parts.matrix @ states.T).T
         missing[:, joints:] += pulled
+        missing[:, :joints] += parts.moved
         answer, pull = self.held.solve(missing)
         moved = (self.inner @ (states + answer)[:, joints:].T).T
         loose = -operator.softness * pull  # how far what is missing moves loose parts

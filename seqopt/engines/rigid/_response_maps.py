@@ -61,6 +61,11 @@ class ResponseMaps(FrozenValue):
     bricks: int  # how many stand
 
     @cached_property
+    def ground(self) -> Floats:
+        """How nodes move with the ground alone, (3n,), m."""
+        return frozen(self.scene.network.ground_motion(self.bricks).ravel())
+
+    @cached_property
     def edge(self) -> sparse.csr_array:
         """What edges carry of wrenches, (E, ks)."""
         network = self.scene.network
@@ -165,11 +170,11 @@ def inner_edges(network: Network, bricks: int) -> tuple[Ints, Floats, Floats]:
     """Return the inner edges of bricks, and what weighs on their second nodes.
 
     Results: ``edge`` (b,); ``axis`` (b, 3): unit vectors to the second nodes; ``weight`` (b,):
-    there, along the edge, N.
+    there, with that of loads, along the edge, N.
     """
     edge = np.flatnonzero(network.edge_spring[: network.count_edges(bricks)] < 0)
     axis = network.edge_axis[edge]
-    return edge, axis, np.einsum("bi,bi->b", axis, network.inner_weight[1 : 2 * bricks : 2])
+    return edge, axis, np.einsum("bi,bi->b", axis, network.inner_load(bricks)[1::2])
 
 
 def inner_motions(network: Network, basis: Basis) -> Floats:

@@ -1,0 +1,180 @@
+"""How much load a step bears: the largest multiple of a scene's loads with which it stands.
+
+Weights stay as they are; forces on bricks and wind grow together. Forces that hold prove that a
+multiple is borne, a motion in which the structure gives way that no larger one is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from seqopt.arrays import Floats, FrozenValue
+from seqopt.contact.assembly import Assembly
+from seqopt.contact.faces import Contacts, step_assembly
+from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.errors import SceneError
+from seqopt.network.build import network_of
+from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Step, require_steps
+from seqopt.stability._prover import Prover
+from seqopt.stability.assessment import Verdict, _first_to_fail, _verdict_of, bonded
+from seqopt.stability.limit_analysis import CAP, GAP, Compile, Sense, compile_equilibrium
+from seqopt.work.progress import Tell, with_progress
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LoadFactor(FrozenValue):
+    """The largest multiple of its loads with which a partial structure stands, weights as they are.
+
+    Attributes
+    ----------
+    factor : float
+        Proven on both sides; inf if no multiple makes it fall, NaN if nothing is proven, no load
+        acts yet, or it stands with no multiple.
+    bound : float
+        What the motion alone proves: no larger multiple is borne.
+    unloaded : Verdict
+        Whether it stands without its loads.
+    load : float
+        Sum of the sizes of the forces that act, N; zero if none does yet.
+    motion : (B, 6) float
+        How it gives way at the factor, as of `seqopt.stability.assessment.Stability`.
+    first_block, first_contact : str
+        The fastest block and the contact that parts fastest in that motion; empty if unknown.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> from seqopt.stability import load_factors
+    >>> scene = seqopt.load_scene("arch25")
+    >>> network = seqopt.build_network(replace(scene, wind=(0.1, 0.0, 0.0)))
+    >>> load_factors(network, seqopt.sequential(network)[-1:], seqopt.EPOXY)[0].unloaded.value
+    'stands'
+    """
+
+    factor: float
+    bound: float
+    unloaded: Verdict
+    load: float
+    motion: Floats
+    first_block: str
+    first_contact: str
+
+    def __repr__(self) -> str:
+        first = f", block {self.first_block} fails first" if self.first_block else ""
+        return f"<LoadFactor: {self.factor:.6g} times {self.load:.6g} N{first}>"
+
+
+def load_factor(
+    assembly: Assembly, mortar: Mortar, compiled: Compile = compile_equilibrium
+) -> LoadFactor:
+    """Return the largest multiple of what is applied to an assembly with which it stands."""
+    size = float(np.abs(assembly.applied_load).max())
+    force = float(np.linalg.norm(assembly.applied[:, :3], axis=1).sum())
+    scaled = replace(assembly, applied=assembly.applied / (size or 1.0))  # so that z is no share
+    prove, lacking = Prover(scaled, compiled), bonded(assembly, mortar)
+    unloaded = _verdict_of(prove(replace(lacking, applied=(0.0, 0.0))))
+    motion = np.zeros((len(assembly.centroid), 6))
+    if not size:
+        return LoadFactor(np.nan, np.nan, unloaded, 0.0, motion, "", "")
+    found = prove(replace(lacking.fixed(), sense=Sense.LARGEST, applied=(0.0, 1.0)))
+    if found.value < (1 - GAP) * CAP:
+        motion = found.answer.motion / (np.abs(found.answer.motion).max() or 1.0)
+    first = _first_to_fail(assembly, motion)
+    most, value = ((z if z < (1 - GAP) * CAP else np.inf) for z in (found.bound, found.value))
+    value = found.value if np.isnan(found.value) else value
+    motion = motion / np.repeat([1.0, assembly.scales[1]], 3)
+    return LoadFactor(value / size, most / size, unloaded, force, motion, *first)
+
+
+def load_factors(
+    network: Network | Scene,
+    steps: Sequence[Step],
+    mortar: Mortar | str,
+    progress: Tell | None = None,
+) -> tuple[LoadFactor, ...]:
+    """Return how much load every step bears.
+
+    Parameters
+    ----------
+    network : Network or Scene
+    steps : sequence of Step
+    mortar : Mortar or str
+        The mortar of all joints, or its name.
+    progress : callable, optional
+        Told as a `seqopt.work.Stage` how far it is, step by step.
+
+    Returns
+    -------
+    tuple of LoadFactor
+
+    Raises
+    ------
+    SceneError
+        If the scene has neither loads nor wind, or bricks that share a joint do not touch.
+    """
+    network, mortar = network_of(network), find_mortar(mortar)
+    if not network.applied(len(network.inner)).any():
+        raise SceneError(
+            f"scene {network.scene.name}: no load acts on it; give it loads or wind to learn how "
+            "much of them it bears"
+        )
+    known = Contacts(network)
+    return tuple(
+        load_factor(step_assembly(network, step.bricks, step.grips, known), mortar)
+        for step in with_progress("finding load factors", require_steps(steps), progress)
+    )
+
+
+def load_factor_table(steps: Sequence[Step], results: Sequence[LoadFactor]) -> pd.DataFrame:
+    """Return one row per step; an empty cell is a number that is not proven.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+    results : sequence of LoadFactor
+        Of the steps.
+
+    Returns
+    -------
+    pandas.DataFrame
+        ``step``, ``type``, ``bricks``, ``load_N``, ``load_factor``, ``not_above``, ``unloaded``,
+        ``first_brick`` and ``first_joint``, as in `LoadFactor`.
+    """
+    rows = [
+        {
+            "step": step.number,
+            "type": step.kind.value,
+            "bricks": step.bricks,
+            "load_N": result.load,
+            "load_factor": result.factor,
+            "not_above": result.bound,
+            "unloaded": result.unloaded.value,
+            "first_brick": result.first_block,
+            "first_joint": result.first_contact,
+        }
+        for step, result in zip(steps, results, strict=True)
+    ]
+    return pd.DataFrame(rows)
+
+
+def format_load_factors(steps: Sequence[Step], results: Sequence[LoadFactor]) -> str:
+    """Return in a line the least load factor of all steps, and how many are not proven."""
+    pairs = [*zip(steps, results, strict=True)]
+    known = [(result.factor, step.number) for step, result in pairs if not np.isnan(result.factor)]
+    loaded = sum(result.load > 0 for result in results)
+    said = "none proven"
+    if known:
+        factor, number = min(known)
+        where = f", of step {number}" if np.isfinite(factor) else ""
+        said = f"the least load factor is {factor:.6g}{where}"
+    bare = sum(result.unloaded is Verdict.FALLS for result in results)
+    more = f"; {bare} do not stand without their loads" if bare else ""
+    return (
+        f"{loaded} of {len(steps)} steps are loaded: {said}, {loaded - len(known)} unproven{more}"
+    )
