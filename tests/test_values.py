@@ -34,6 +34,7 @@ from seqopt.scene.library._joints import overlaps
 from seqopt.scene.shape import Surface
 from seqopt.sequence.two_robots import sequential
 from seqopt.stability._held_states import _HoldingForces, _Known, first_directions
+from seqopt.stability._load_factor import load_factor
 from seqopt.stability._prover import Prover
 from seqopt.stability._step_verdicts import each_verdict
 from seqopt.stability.assessment import assess, bonded
@@ -69,6 +70,7 @@ def values(arch25):
         *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points, held),
         *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),
         *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, EPOXY)),
+        load_factor(assembly, EPOXY),
         *_Known(assembly, bonded(assembly, EPOXY)).motions_of(np.ones((2, 6))),
         *(_HoldingForces(0.0, np.zeros(1)), first_directions(4, 1)),
         *each_verdict(network, sequential(network)[:1], EPOXY),

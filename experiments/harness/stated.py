@@ -88,9 +88,21 @@ def stated() -> dict[str, str]:
         | _shapes(stored("program_shapes"))
         | _outside(stored("outside_assemblies"))
         | _composing(stored("composing"))
+        | {"vault_loads_table": _vault_loads(stored("vault_loads"))}
         | {"free_formulations_table": _free_formulations(stored("free_formulations"))}
         | {"classical_table": _classical(stored("classical"))}
     )
+
+
+def _vault_loads(table: pd.DataFrame) -> str:
+    """Return a row per tested vault: what it weighs, and the line load that it bears, kN."""
+    head = ["test", "weight", "line load", "weight with fill", "line load with fill"]
+    columns = ["bare_weight", "bare", "filled_weight", "filled"]
+    rows = [
+        [f"{row['test']:.0f}", *("falls" if np.isnan(row[c]) else f"{row[c]:.3g}" for c in columns)]
+        for row in table.to_dict("records")
+    ]
+    return markdown(head, rows)
 
 
 PLAIN = r"^(?:[a-z ]+ )?[^ ]+: |^[^ ]+ (?=finds|is )"  # what a reason is about

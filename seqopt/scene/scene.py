@@ -243,12 +243,12 @@ class Scene(Shown):
     def loading(self) -> str:
         """What loads and moves it beside its weight, in words; empty if nothing does."""
         largest = max((math.hypot(*load.force) for load in self.loads), default=0.0)
-        moved = sum(any(ground.movement or ()) for ground in self.grounds)
+        forces, moved = len(self.loads), sum(any(g.movement or ()) for g in self.grounds)
         said = {
-            f"{len(self.loads)} forces on bricks, up to {largest:g} N": self.loads,
+            f"{forces} force{'s' * (forces != 1)}, up to {largest:g} N": forces,
             f"wind of {list(self.wind)} times the weight": any(self.wind),
             f"weights times {self.weight_factor:g}": self.weight_factor != 1,
-            f"{moved} ground ends that move": moved,
+            f"movement of {moved} ground end{'s' * (moved != 1)}": moved,
         }
         return ", ".join(text for text, counts in said.items() if counts)
 

@@ -74,7 +74,7 @@ def load_factor(
     assembly: Assembly, mortar: Mortar, compiled: Compile = compile_equilibrium
 ) -> LoadFactor:
     """Return the largest multiple of what is applied to an assembly with which it stands."""
-    size = float(np.abs(assembly.applied_load).max())
+    size = float(np.abs(assembly.applied_load).max())  # over the force scale
     force = float(np.linalg.norm(assembly.applied[:, :3], axis=1).sum())
     scaled = replace(assembly, applied=assembly.applied / (size or 1.0))  # so that z is no share
     prove, lacking = Prover(scaled, compiled), bonded(assembly, mortar)

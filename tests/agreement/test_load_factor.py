@@ -10,13 +10,17 @@ from scipy.optimize import linprog
 
 import seqopt
 from experiments.stability.parts.blocks import ring
+from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.errors import SceneError
 from seqopt.scene import Load
 from seqopt.scene.library import WallShape, wall
 from seqopt.sequence.steps import Step, StepKind
-from seqopt.stability import Verdict, load_factor_table, load_factors
+from seqopt.stability import Margins, Screen, Verdict, load_factor_table, load_factors
+from seqopt.stability._builds import BuildProver
 from seqopt.stability._load_factor import format_load_factors, load_factor
+from seqopt.stability._partial_assemblies import PartialAssemblies
+from seqopt.stability._step_verdicts import each_verdict
 from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import CAP, EXACT, Sense, bound, compile_equilibrium, violation
 from tests.builders import block
@@ -218,3 +222,23 @@ def test_what_acts_since_a_later_brick_and_what_does_not():
     assert f"{acts.sum()} of {len(steps)} steps are loaded" in format_load_factors(steps, results)
     with pytest.raises(SceneError, match="no load acts on it"):
         load_factors(replace(late, loads=()), steps, DRY)
+
+
+@pytest.mark.parametrize(("share", "sign"), [(0.99, 1), (1.01, -1)])
+def test_every_way_to_a_verdict_counts_the_loads(share, sign):
+    scene = pushed_wall(2, 2, (10.0, 0.0, 0.0))
+    expected = Verdict.STANDS if sign > 0 else Verdict.FALLS
+    factor = share * plane_collapse(scene, DRY.friction)
+    pushed = replace(scene, loads=(Load(brick=3, force=(10.0 * factor, 0.0, 0.0)),))
+    network, steps = seqopt.build_network(pushed), last_step(pushed)
+    assert seqopt.assess_steps(network, steps, DRY)[0].verdict is expected
+    assert next(each_verdict(network, steps, DRY)).verdict is expected
+    assert Screen(network, DRY).stands(4, [[0, 0, 0]]).tolist() == [sign]
+    assert (Margins(network, DRY).bond(4, [[0, 0, 0]])[0, 0] > 0) == (sign < 0)
+    (builds,) = BuildProver(network, {"dry": DRY}).of_builds({"own": steps})["own"]
+    assert builds.verdicts == (expected,)
+    whole, part = step_assembly(network, 4, steps[0].grips), PartialAssemblies(network, 4)
+    assert np.array_equal(whole.applied, part(4, steps[0].grips).applied)
+    assert not len(part(2, steps[0].grips).applied)
+    light = seqopt.build_network(scene)
+    assert Screen(light, DRY).stands(4, [[0, 0, 0]]).tolist() == [1]

@@ -11,7 +11,7 @@ import pytest
 
 from experiments import figures
 from experiments.__main__ import STORE
-from experiments.calibration import calibration
+from experiments.calibration import calibration, vault_loads
 from experiments.calibration.parts import arch_numbers, calibration_spread
 from experiments.discrete import contact_steps, discrete_arches
 from experiments.engines import engine_speed, fidelity_ladder, frame_contrast, parallel
@@ -192,6 +192,11 @@ CHECKS = {
         lambda *tables: all(staged_construction.holds(*tables).values()),
         ("staged_construction", "staged_choice"),
         *("imbalance_N", 1e-3, {"step": 40}),
+    ),
+    "vault_loads": Check(
+        lambda table: all(vault_loads.holds(table).values()),
+        ("vault_loads",),
+        *("bare_thrust", 38.0318, {"test": 3}),
     ),
     "witnesses": Check(
         lambda table: not witnesses.faults(table, ["rbe", "lmgc90"], sooner(table)),

@@ -8,6 +8,7 @@ import pytest
 
 from seqopt.contact.mortar import Mortar, bond_mortar, find_mortar
 from seqopt.errors import SceneError
+from seqopt.scene import Load
 from seqopt.scene.arch import ArchShape
 from seqopt.scene.imports import Given, import_scene
 from seqopt.scene.library import ArchForm, DomeShape, JointLaw, VaultShape, WallShape
@@ -33,11 +34,12 @@ VALUES = {
     "robot": Robot(name="left", payload=100.0),
     "reach beside": Side(toward=(0.0, 1.0, 0.0), point=(0.0, 0.0, 0.0)),
     "reach around": Sphere(center=(0.0, 0.0, 0.0), radius=1.0),
+    "load": Load(brick=1, force=(0.0, 0.0, -1.0)),
     "scene": SCENE,
 }
 CASES = [(what, field.name) for what, value in VALUES.items() for field in fields(value)]
 OPEN = {("scene", "name"), ("scene", "provenance"), ("robot", "name"), ("arch", "closed")}
-EMPTY = {"joints", "robots", "blocked_nodes"}  # what a scene need not have
+EMPTY = {"joints", "robots", "blocked_nodes", "loads"}  # what a scene need not have
 ODD = ["x", "", [], {}, object(), {"x"}, float("nan"), -float("inf"), 10**400, [[1.0], 2.0], b"x"]
 
 

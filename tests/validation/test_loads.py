@@ -188,7 +188,7 @@ def test_engines_agree(kind, part):
 
 def test_discrete_elements_within_their_limits():
     network = build_network(loaded(SCENES["arch"](), way=1e-6, size=20.0))
-    for grips in ([], [21]):
+    for grips in ([20], [21]):
         columns = grip_columns(network, 11, np.array([grips], dtype=int))
         found = seqopt.make_engine("discrete", network).solve(11, [grips], Want.ALL)
         assert far(found, solve_mixed(network, 11, columns)) < 1e-8
@@ -221,7 +221,7 @@ def test_weight_loads_and_movements_add_up(kind):
                 total = combined(total, other)
             together = ComplianceEngine(scene).solve(bricks, [grips], Want.ALL)
             assert far(together, total) < 1e-9
-            assert all(np.abs(answer.brick_twist).max() > 1e-6 for answer in answers)
+            assert all(np.abs(answer.brick_twist).max() > 1e-12 for answer in answers)
 
 
 def test_a_factor_on_weight_is_a_factor_on_answers():

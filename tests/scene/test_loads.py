@@ -1,0 +1,149 @@
+"""Loads, wind and movements in scenes: files, refusals, scenarios, and what is told of them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt._cli.main import main
+from seqopt.engines.registry import Recipe
+from seqopt.errors import SceneError, SceneWarning
+from seqopt.report.page import Build, report_page
+from seqopt.scene import Load, load_scene, save_scene
+from seqopt.scene.scene_file import dump_scene, scene_to_dict
+from tests.builders import six_bricks
+
+
+def loaded():
+    scene = six_bricks()
+    first, second = scene.grounds
+    return replace(
+        scene,
+        loads=(
+            Load(brick=2, force=(1.0, 2.0, -30.0)),
+            Load(brick=3, force=(0.0, 0.0, -5.0), position=scene.bricks[2].position, since=6),
+        ),
+        wind=(0.1, 0.0, 0.0),
+        weight_factor=1.35,
+        grounds=(first, replace(second, movement=(0.0, 0.0, -0.002))),
+    )
+
+
+def test_a_file_keeps_all_of_it(tmp_path):
+    scene = loaded()
+    save_scene(scene, tmp_path / "own.json")
+    assert load_scene(tmp_path / "own.json") == scene
+    assert scene.grounds[1].movement == (0.0, 0.0, -0.002, 0.0, 0.0, 0.0)
+
+
+def test_a_file_without_says_nothing_of_it():
+    document = scene_to_dict(six_bricks())
+    assert not {"loads", "wind", "weight_factor"} & {*document}
+    assert not any("movement" in ground for ground in document["grounds"])
+    assert [*scene_to_dict(loaded())["loads"][0]] == ["brick", "force"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"loads": (Load(brick=9, force=(0, 0, 1)),)}, "load on brick 9: there is no brick 9"),
+        ({"loads": (Load(brick=1, force=(0, 0, 1), since=8),)}, "there is no brick 8"),
+        ({"loads": (Load(brick=1, force=(0, 0, 1e101)),)}, "give N, at most 1e100"),
+        (
+            {"loads": (Load(brick=1, force=(0, 0, 1), position=(0, 0, 1e10)),)},
+            "load on brick 1: position is .*; move it to its brick",
+        ),
+        ({"loads": ((0, 0, 1),)}, r"loads: give each as Load\(...\)"),
+        ({"wind": (0.1, 0.2)}, "wind is .*; give three numbers"),
+        ({"weight_factor": -1.0}, "weight_factor is -1.0; give a number that is not negative"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(change, message):
+    with pytest.raises(SceneError, match=message):
+        replace(six_bricks(), **change)
+
+
+@pytest.mark.parametrize(
+    ("movement", "message"),
+    [
+        ((0, 0), "movement is .*; give three or six numbers"),
+        ((0, 0, np.nan), "movement is .*; give three finite numbers"),
+        (0.1, "movement is 0.1; give three or six numbers"),
+    ],
+)
+def test_a_movement_that_is_none_is_refused(movement, message):
+    with pytest.raises(SceneError, match=f"ground end of brick 1: {message}"):
+        replace(six_bricks().grounds[0], movement=movement)
+    with pytest.raises(SceneError, match="give three finite numbers"):
+        Load(brick=1, force=(0, 0, np.inf))
+
+
+def test_a_file_that_breaks_the_schema_is_refused(tmp_path):
+    document = json.loads(dump_scene(loaded()))
+    for change in ({"loads": [{"brick": 1}]}, {"weight_factor": -1}, {"wind": [0, 1]}):
+        (tmp_path / "own.json").write_text(json.dumps({**document, **change}), encoding="utf-8")
+        with pytest.raises(SceneError, match=next(iter(change))):
+            load_scene(tmp_path / "own.json")
+
+
+def test_a_load_far_from_its_brick_is_doubted(tmp_path):
+    far = replace(six_bricks(), loads=(Load(brick=1, force=(0, 0, -1), position=(0, 0, 9.0)),))
+    save_scene(far, tmp_path / "own.json")
+    with pytest.warns(SceneWarning, match=r"load on brick 1: it lies 8\.\d+ m from brick 1"):
+        load_scene(tmp_path / "own.json")
+
+
+def test_answers_are_known_by_their_loads():
+    keys = {
+        Recipe("compliance", replace(loaded(), **change)).key
+        for change in (
+            {},
+            {"loads": ()},
+            {"wind": (0.0, 0.0, 0.0)},
+            {"weight_factor": 1.0},
+            {"grounds": six_bricks().grounds},
+        )
+    }
+    assert len(keys) == 5
+
+
+def test_scenarios_take_loads_along():
+    scene = loaded()
+    for each in seqopt.scenarios(scene, count=3).scenes:
+        step = np.subtract(each.bricks[2].position, scene.bricks[2].position)
+        assert np.abs(step).max() > 1e-5
+        assert each.loads[1].position == pytest.approx(step + scene.loads[1].position)
+        assert each.loads[0] == scene.loads[0]
+        assert each.grounds[1].movement == scene.grounds[1].movement
+
+
+def test_what_acts_depends_on_what_stands():
+    scene = loaded()
+    network = seqopt.build_network(replace(scene, wind=(0.0, 0.0, 0.0)))
+    acting = [np.flatnonzero(network.applied(b).any(axis=1)).tolist() for b in range(1, 7)]
+    assert acting == [[], [1], [1], [1], [1], [1, 2]]
+    backward = seqopt.build_network(scene.with_robots(*scene.robots), "reversed")
+    assert np.flatnonzero(backward.loads[1]).size == 8
+    assert backward.loads[1][:2].tolist() == [5, 4]
+    assert network.applied(6, before=5)[:, 2].tolist() == [0, 0, -5, 0, 0, 0]
+
+
+def test_it_is_told(tmp_path, capsys):
+    scene = loaded()
+    said = "2 forces, up to 30.0832 N, wind of [0.1, 0.0, 0.0] times the weight"
+    assert scene.loading.startswith(said)
+    assert scene.loading.endswith("weights times 1.35, movement of 1 ground end")
+    assert six_bricks().loading == ""
+    assert "2 forces, up to" in scene._repr_html_()
+    assert "beside the weight" not in six_bricks()._repr_html_()
+    save_scene(scene, tmp_path / "own.json")
+    assert main(["scene", str(tmp_path / "own.json")]) == 0
+    assert "beside the weight: 2 forces, up to" in " ".join(capsys.readouterr().out.split())
+    engine = seqopt.make_engine("compliance", scene)
+    steps = seqopt.sequential(engine.network)
+    build = Build("own", steps, seqopt.analyze(engine, steps))
+    assert "Counted, and not drawn: 2 forces" in report_page(engine, [build], "A build.")
