@@ -243,10 +243,11 @@ class Scene(Shown):
     def loading(self) -> str:
         """What loads and moves it beside its weight, in words; empty if nothing does."""
         largest = max((math.hypot(*load.force) for load in self.loads), default=0.0)
+        wind = ", ".join(f"{share:.3g}" for share in self.wind)
         forces, moved = len(self.loads), sum(any(g.movement or ()) for g in self.grounds)
         said = {
             f"{forces} force{'s' * (forces != 1)}, up to {largest:g} N": forces,
-            f"wind of {list(self.wind)} times the weight": any(self.wind),
+            f"wind of ({wind}) times the weight": any(self.wind),
             f"weights times {self.weight_factor:g}": self.weight_factor != 1,
             f"movement of {moved} ground end{'s' * (moved != 1)}": moved,
         }

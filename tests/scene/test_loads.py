@@ -134,7 +134,7 @@ def test_what_acts_depends_on_what_stands():
 
 def test_it_is_told(tmp_path, capsys):
     scene = loaded()
-    said = "2 forces, up to 30.0832 N, wind of [0.1, 0.0, 0.0] times the weight"
+    said = "2 forces, up to 30.0832 N, wind of (0.1, 0, 0) times the weight"
     assert scene.loading.startswith(said)
     assert scene.loading.endswith("weights times 1.35, movement of 1 ground end")
     assert six_bricks().loading == ""

@@ -18,7 +18,7 @@ from seqopt.network.build import build_network
 from seqopt.responses._staged import staged_fields
 from seqopt.scene import Load
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.library import DomeShape, WallShape, dome, wall
+from seqopt.scene.library import DomeShape, WallShape, chain, dome, wall
 from tests.builders import HERE
 
 SLIDE, TURN = 3e7, 4e5  # N/m, N m/rad of every joint
@@ -255,6 +255,16 @@ def test_a_chain_with_a_loose_part():
         found = ComplianceEngine(apart).solve(25, grips, Want.ALL)
         columns = grip_columns(apart, 25, np.array(grips))
         assert far(found, solve_mixed(apart, 25, columns)) < 1e-9
+
+
+def test_a_long_chain_that_meets_the_far_ground():
+    """All is summed again then, from the ground that has moved."""
+    network = build_network(loaded(chain(160), way=1e-5))
+    engine = ComplianceEngine(network)
+    for bricks, grips in ((160, []), (159, []), (160, [290])):
+        columns = grip_columns(network, bricks, np.array([grips], dtype=int))
+        found = engine.solve(bricks, [grips], Want.ALL)
+        assert far(found, solve_mixed(network, bricks, columns)) < 1e-10
 
 
 def test_the_plane_is_left():
