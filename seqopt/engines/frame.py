@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -65,8 +64,8 @@ def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) ->
     unknown, motion = np.flatnonzero(free), _moved_ground(network, base, load.shape)
     reduced, strain = deformation[:, unknown], deformation @ motion
     examine = partial(require_resistance, network, bricks, columns)
-    pull = _Pull(load.ravel()[unknown], strain)
-    motion[unknown] = _solve(reduced, stiffness, pull, contrast, examine)
+    pull = load.ravel()[unknown]
+    motion[unknown] = _solve(reduced, stiffness, pull, strain, contrast, examine)
     stress = stiffness * (deformation @ motion)
     reaction = (deformation.T @ stress).reshape(load.shape) - load
     springs, which = network.springs, network.edge_spring[split]
@@ -166,20 +165,18 @@ def _rows(nodes: int, pairs: Ints, first: Floats, second: Floats) -> sparse.coo_
     return sparse.coo_array((blocks.ravel(), index), shape=(row.size, 6 * nodes))
 
 
-class _Pull(NamedTuple):
-    """Forces on nodes (n,), and how beams and springs (R,) are deformed where these do not move."""
-
-    load: Floats
-    strain: Floats
-
-
 def _solve(
-    maps: sparse.csr_array, stiffness: Floats, pull: _Pull, contrast: float, examine: _Examine
+    maps: sparse.csr_array,
+    stiffness: Floats,
+    pull: Floats,
+    strain: Floats,
+    contrast: float,
+    examine: _Examine,
 ) -> Floats:
     """Return the displacements under a pull, corrected until they no longer change.
 
-    ``maps``: to deformations. A matrix that looks singular is examined: ``examine`` raises if the
-    structure is a mechanism.
+    ``maps``: to deformations; ``strain`` (R,): these where nothing moves but the ground. A matrix
+    that looks singular is examined: ``examine`` raises if the structure is a mechanism.
     """
     matrix = maps.T @ sparse.diags_array(stiffness) @ maps
     scale = 1 / np.sqrt(np.maximum(matrix.diagonal(), np.finfo(float).tiny))
@@ -193,7 +190,7 @@ def _solve(
     except RuntimeError as error:  # SuperLU met an exactly zero pivot
         examine()
         raise failure from error
-    load = pull.load - maps.T @ (stiffness * pull.strain)
+    load = pull - maps.T @ (stiffness * strain)
     vector = np.random.default_rng(0).standard_normal(len(load))
     for _ in range(4):  # inverse iteration, for the smallest eigenvalue
         vector = factor.solve(vector / np.linalg.norm(vector))
@@ -201,7 +198,7 @@ def _solve(
         examine()
     answer = scale * factor.solve(scale * load)
     for _ in range(_FRAME_CORRECTIONS):
-        residual = pull.load - maps.T @ (stiffness * (maps @ answer + pull.strain))
+        residual = pull - maps.T @ (stiffness * (maps @ answer + strain))
         correction = scale * factor.solve(scale * residual)
         answer += correction
     last, most = (np.abs(part / scale).max() for part in (correction, answer))

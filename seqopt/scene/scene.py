@@ -29,12 +29,13 @@ _Part = TypeVar("_Part")
 _AT_NODE = 1e-6  # distance treated as zero, over the length of the brick
 _FAR = 1e9  # of a position from the origin, over the smallest dimension: digits are lost beyond
 _SIZES = (1e-9, 1e9)  # m; dimensions that a brick may have
+_STORM = 1e6  # wind over the weight
 _HEAVY = 1e100  # N, N/m, N m/rad; squares of what is beyond overflow, of its inverse vanish
 
 
-def _check_bricks(bricks: Sequence[Brick], gravity: Vector) -> None:
+def _check_bricks(bricks: Sequence[Brick], gravity: Vector, factor: float) -> None:
     """Require bricks that have a size, a place and a weight. ``gravity``: m/s²."""
-    pull = math.hypot(*gravity)
+    pull = factor * math.hypot(*gravity)
     for brick in bricks:
         where, smallest = f"brick {brick.name}", min(brick.dimensions)
         if not _SIZES[0] <= smallest <= max(brick.dimensions) <= _SIZES[1]:
@@ -51,6 +52,7 @@ def _check_bricks(bricks: Sequence[Brick], gravity: Vector) -> None:
             raise SceneError(
                 f"{where}: it weighs {brick.mass * pull:g} N; correct its density "
                 f"{brick.density:g} kg/m³ or the scene's gravity {pull:g} m/s²"
+                + (", its weight_factor counted" if factor != 1 else "")
             )
 
 
@@ -59,6 +61,7 @@ def _check_springs(springs: Sequence[Joint | Ground], bricks: Mapping[int, Brick
     farthest = _FAR * max(max(brick.dimensions) for brick in bricks.values())
     for spring in springs:
         points = {"position": spring.position, "anchor": getattr(spring, "anchor", spring.position)}
+        points["movement"] = getattr(spring, "movement", None) or points["position"]
         for name, point in points.items():
             if max(map(abs, point)) > farthest:
                 raise SceneError(f"{spring.label}: {name} is {list(point)}; move it to its bricks")
@@ -93,7 +96,7 @@ def _check_loads(loads: Sequence[Load], bricks: Mapping[int, Brick]) -> None:
     """Require forces that can be computed with. ``bricks``: by name."""
     for load in loads:
         if math.hypot(*load.force) > _HEAVY:
-            raise SceneError(f"{load.label}: force is {list(load.force)}; give N, at most 1e100")
+            raise SceneError(f"{load.label}: force is {list(load.force)}; give N, to {_HEAVY:g}")
         brick = bricks[load.brick]
         if load.position and max(map(abs, load.position)) > _FAR * max(brick.dimensions):
             where = list(load.position)
@@ -171,10 +174,12 @@ class Scene(Shown):
         _unique(f"{where}: node", (n for brick in self.bricks for n in brick.nodes))
         _unique(f"{where}: robot", (robot.name for robot in self.robots))
         self._check_references(where)
-        _check_bricks(self.bricks, self.gravity)
+        _check_bricks(self.bricks, self.gravity, self.weight_factor)
         by_name = {brick.name: brick for brick in self.bricks}
         _check_springs((*self.joints, *self.grounds), by_name)
         _check_loads(self.loads, by_name)
+        if math.hypot(*self.wind) > _STORM:
+            raise SceneError(f"{where}: wind is {list(self.wind)}; give shares of the weight")
 
     def __repr__(self) -> str:
         counts = (

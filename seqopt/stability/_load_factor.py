@@ -26,6 +26,8 @@ from seqopt.stability.assessment import Verdict, _first_to_fail, _verdict_of, bo
 from seqopt.stability.limit_analysis import CAP, GAP, Compile, Sense, compile_equilibrium
 from seqopt.work.progress import Tell, with_progress
 
+_ENDLESS = (1 - GAP) * CAP  # multiples from which on none is the largest
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LoadFactor(FrozenValue):
@@ -83,13 +85,12 @@ def load_factor(
     if not size:
         return LoadFactor(np.nan, np.nan, unloaded, 0.0, motion, "", "")
     found = prove(replace(lacking.fixed(), sense=Sense.LARGEST, applied=(0.0, 1.0)))
-    if found.value < (1 - GAP) * CAP:
+    if found.value < _ENDLESS:
         motion = found.answer.motion / (np.abs(found.answer.motion).max() or 1.0)
     first = _first_to_fail(assembly, motion)
-    most, value = ((z if z < (1 - GAP) * CAP else np.inf) for z in (found.bound, found.value))
-    value = found.value if np.isnan(found.value) else value
     motion = motion / np.repeat([1.0, assembly.scales[1]], 3)
-    return LoadFactor(value / size, most / size, unloaded, force, motion, *first)
+    factor, most = (np.inf if z >= _ENDLESS else z / size for z in (found.value, found.bound))
+    return LoadFactor(factor, most, unloaded, force, motion, *first)
 
 
 def load_factors(

@@ -52,12 +52,18 @@ def test_a_file_without_says_nothing_of_it():
     [
         ({"loads": (Load(brick=9, force=(0, 0, 1)),)}, "load on brick 9: there is no brick 9"),
         ({"loads": (Load(brick=1, force=(0, 0, 1), since=8),)}, "there is no brick 8"),
-        ({"loads": (Load(brick=1, force=(0, 0, 1e101)),)}, "give N, at most 1e100"),
+        ({"loads": (Load(brick=1, force=(0, 0, 1e101)),)}, "give N, to 1e"),
         (
             {"loads": (Load(brick=1, force=(0, 0, 1), position=(0, 0, 1e10)),)},
             "load on brick 1: position is .*; move it to its brick",
         ),
         ({"loads": ((0, 0, 1),)}, r"loads: give each as Load\(...\)"),
+        ({"wind": (1e7, 0.0, 0.0)}, "wind is .*; give shares of the weight"),
+        ({"weight_factor": 1e150}, "brick 1: it weighs .*; correct its density"),
+        (
+            {"grounds": (replace(six_bricks().grounds[0], movement=(0, 0, 1e30)),)},
+            "ground end of brick 1: movement is .*; move it to its bricks",
+        ),
         ({"wind": (0.1, 0.2)}, "wind is .*; give three numbers"),
         ({"weight_factor": -1.0}, "weight_factor is -1.0; give a number that is not negative"),
     ],
