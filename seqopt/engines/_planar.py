@@ -18,6 +18,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, SceneError
 from seqopt.network.network import GROUND, Network
 from seqopt.scene.scene import Scene
+from seqopt.scene.shape import plane_axes
 
 _FLAT = 1e-9  # distance from the plane that counts as none, over the size of the structure
 
@@ -50,7 +51,9 @@ def find_plane(network: Network) -> _Plane | str:
     points = np.vstack([network.centroid, springs.position, springs.anchor])
     normal = _normal(network, points - points.mean(axis=0))
     up = np.array(network.scene.up)
-    plane = _Plane(points.mean(axis=0), normal, np.array([np.cross(up, normal), up]))
+    pulled = any(network.scene.gravity)  # otherwise up may stand on the plane
+    axes = np.array([np.cross(up, normal), up]) if pulled else plane_axes(normal)[1:]
+    plane = _Plane(points.mean(axis=0), normal, axes)
     outside = _points_outside(network, plane) or _turned_springs(network, normal)
     return outside or _pulled_outside(network, normal) or plane
 

@@ -80,9 +80,8 @@ def _dearer(within: LinearRange, below: float, where: str) -> str:
     flat = "compliance would change nothing, as nothing leaves the plane; "
     said = flat if isinstance(engine, PlanarEngine) else ""
     if np.isnan(below):
-        why = (
-            within.unchecked or getattr(engine, "unchecked", "") or "of steps that build on others"
-        )
+        unchecked = "; ".join(within.unchecked) or str(getattr(engine, "unchecked", ""))
+        why = unchecked or "of steps that build on others"
         return f"{said}what discrete elements would change is not known: {why}"
     if below >= 0:
         close = f"{where} comes closest to its elastic limits, {below / 1e6:.3g} MPa below them"
