@@ -18,6 +18,7 @@ from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability._builds import BuildVerdicts
+from seqopt.stability._load_factor import LoadFactor, load_factor_table
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.failure_map import FailureMap
 from seqopt.work.progress import Tell
@@ -81,6 +82,20 @@ def failure_page(engine: Engine, builds: Builds, found: FailureMap) -> str:
         f"map. Step by step, with {axis} {value:.3g}: a step that falls can be shown as it falls."
     )
     return report_page(engine, shown, sentence, [(_caption(axis), cases_shown(found, axis))])
+
+
+def load_page(
+    engine: Engine, name: str, steps: Sequence[Step], found: Sequence[LoadFactor], said: str
+) -> str:
+    """Return the page of a build with how its steps give way under the largest load they bear."""
+    motions = np.zeros((len(steps), len(engine.network.inner), 6))
+    for i, (step, each) in enumerate(zip(steps, found, strict=True)):
+        motions[i, : step.bricks] = each.motion
+    build = Build(name, steps, analyze(engine, steps), falls=motions)
+    table = load_factor_table(steps, found)
+    sentence = f"{engine.network.scene.name}, {name}: {said}. A step can be shown as it gives way."
+    caption = "How much load every step bears: the largest multiple, weights as they are"
+    return report_page(engine, [build], sentence, [(caption, table)])
 
 
 def _caption(axis: str) -> str:

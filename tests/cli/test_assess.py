@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from seqopt._cli.main import main
 from seqopt._cli.rows import Rows
 from seqopt.errors import FileError
+from seqopt.scene.scene_file import load_scene, save_scene
 
 ARCH = "arch:span=1,rise=0.4,pattern=VLR"
 WORDS = ["assess", ARCH, "--method", "sequential", "--mortar", "dry"]
@@ -105,6 +108,23 @@ def test_a_map_of_one_method(capsys, tmp_path):
     (build,) = data["builds"]
     assert build["fall"]["width"] == 6 * 9
     assert "falls dry" in " ".join(build["marks"])
+
+
+def test_how_much_load_a_build_bears(capsys, tmp_path):
+    """Twice the wind, half the factor; a scene without loads is a line."""
+    factors = []
+    for wind in (0.1, 0.2):
+        scene = replace(load_scene(ARCH), wind=(wind, 0.0, 0.0))
+        save_scene(scene, path := tmp_path / f"{wind}.json")
+        out = tmp_path / f"out{wind}"
+        words = ["assess", str(path), "--method", "cantilever", "--load-factor"]
+        assert main([*words, "--out", str(out)]) == 0
+        assert "17 of 17 steps are loaded: the least load factor is" in capsys.readouterr().out
+        factors.append(pd.read_csv(out / "load_factors.csv")["load_factor"])
+        assert '"fall":{' in contents(out / "report.html")
+    np.testing.assert_allclose(factors[0], 2 * factors[1], rtol=1e-3)
+    assert main([*words[:1], ARCH, *words[2:]]) == 2
+    assert "no load acts on it; give it loads or wind" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
+from seqopt._cli.loading import LOADS, answer_load_factor
 from seqopt._cli.mapping import MAP, answer_map
 from seqopt._cli.options import STEPS_USAGE, declare, form_options, scene_options, steps_options
 from seqopt._cli.outputs import keep_apart, put_table
@@ -67,7 +68,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         help="what is in the joints: the epoxy of Bruun et al. (25°, 3 MPa, 2 MPa) or nothing "
         "(default: %(default)s)",
     )
-    declare(basic, HOW)
+    declare(basic, {**HOW, **LOADS})
     declare(command.add_argument_group("where builds fail"), MAP)
     declare(command.add_argument_group("a mortar of your own (advanced)"), STRENGTH)
     form_options(command)
@@ -79,6 +80,8 @@ def run(options: argparse.Namespace) -> Answer:
         return answer_map(options)
     if options.method is None and options.plan is None:
         raise ProblemError("nothing to assess: give --method NAME, --plan FILE, or --map friction")
+    if options.load_factor:
+        return answer_load_factor(options)
     keep_apart(options, options.out)
     scene, mortar = asked_scene(options), asked_mortar(options)
     network = build_network(scene)
