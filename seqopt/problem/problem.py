@@ -460,10 +460,11 @@ def _in_values(words: Mapping[str, Any]) -> dict[str, Any]:
     return {name: READ[name](value) if name in READ else value for name, value in words.items()}
 
 
-def _goals(given: Sequence[Goal] | str) -> tuple[Goal, ...]:
-    """Return goals that are given as such, or by their names."""
+def _goals(given: Sequence[Goal] | str, least: int = 0) -> tuple[Goal, ...]:
+    """Return goals, ``least`` of them or more, that are given as such, or by their names."""
     goals = parse_goals(given) if isinstance(given, str) else given
-    if not isinstance(goals, Sequence) or {*map(type, goals)} - {Goal}:
+    kinds = {*map(type, goals)} if isinstance(goals, Sequence) else {type(goals)}
+    if kinds - {Goal} or len(kinds) < least:
         raise ProblemError(f"aims {short(given)}: give goals, or their names, as 'minmax,steps'")
     return tuple(goals)
 

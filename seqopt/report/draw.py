@@ -23,6 +23,7 @@ from matplotlib.patheffects import withStroke
 from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind
 from seqopt.report._style import BLUE, SMALL, VERMILION
+from seqopt.report.page import ROBOT_COLORS
 from seqopt.scene.boxes import boxes, vertices_of
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import normal_of
@@ -43,7 +44,6 @@ Faces = tuple[tuple[int, ...], ...]
 FACES: Faces = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 CLAY = np.array([0.80, 0.52, 0.38])
 MARKED = np.array([0.46, 0.63, 0.76])
-ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#b35900", "#444444")
 ROBOT_MARKERS = "XPDs"
 LINE = 11.0  # points from one line of text to the next
 NEAR = (0.3, 0.08)  # share of a picture within which labels are neighbors, aside and up

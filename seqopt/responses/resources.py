@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from seqopt.errors import ProblemError
+from seqopt.scene._checks import as_float
 from seqopt.work.progress import Tell
 
 
@@ -55,7 +56,7 @@ class Resources:
         if not (self.cache is None or (isinstance(self.cache, str | Path) and str(self.cache))):
             raise ProblemError(f"cache is {self.cache!r}; give the path of a folder")
         most = self.max_memory
-        if not (most is None or (isinstance(most, int | float) and most > 0)):  # NaN is not
+        if not (most is None or (as_float(most) > 0)):  # NaN is not
             raise ProblemError(f"max_memory is {most!r}; give a number of bytes above zero")
 
     def alone(self) -> Resources:

@@ -8,6 +8,7 @@ import operator
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from numbers import Real
 from typing import Any, TypeVar
 
 from seqopt.arrays import Vector
@@ -142,7 +143,7 @@ def sizes(where: str, values: Iterable[float]) -> Vector:
 def as_float(value: object) -> float:
     """Return a number as a float: NaN for what is none, infinity for one that is too large."""
     try:
-        return float(value) if isinstance(value, int | float) else math.nan
+        return float(value) if isinstance(value, Real) else math.nan
     except OverflowError:
         return math.inf
 

@@ -317,6 +317,8 @@ def islands(network: Network, bricks: int) -> tuple[_Island, ...]:
     >>> islands(middle_first, 2), islands(middle_first, 3)
     ((frozenset({2, 3}),), ())
     """
+    if _always_tied(network):
+        return ()
     pairs = acting_bodies(network, bricks) + 1  # the ground is body 0
     ones = np.ones(len(pairs), dtype=bool)
     graph = coo_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(bricks + 1, bricks + 1))

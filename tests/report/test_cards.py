@@ -14,7 +14,7 @@ import seqopt
 from seqopt.problem.problem import Orders
 from seqopt.report._notebook import card, facts
 from seqopt.report.comparison import largest
-from seqopt.report.draw import ROBOT_COLORS
+from seqopt.report.page import ROBOT_COLORS
 from seqopt.stability.steps import assess_steps
 
 HEAVIEST = 60_000  # letters of HTML

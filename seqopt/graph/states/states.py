@@ -24,7 +24,7 @@ from seqopt.problem.problem import (
     Goal,
     Measure,
     RobustAim,
-    parse_goals,
+    _goals,
 )
 from seqopt.problem.requirements import (
     LIMIT_TOLERANCE,
@@ -38,7 +38,7 @@ from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._grip_sets import GripSets
 from seqopt.responses.quantities import robot_response
 from seqopt.responses.resources import HERE, Resources
-from seqopt.scene._checks import short
+from seqopt.scene._checks import as_float, short
 from seqopt.scene.scene import Scene
 from seqopt.sequence._rule_space import FreeSpace, free_space
 from seqopt.sequence._schedule_space import ScheduleSpace
@@ -404,7 +404,7 @@ def build_states(
     >>> build_states(engine, FreeRules(), seqopt.CRITERIA["worst-ratio"], "minmax,steps")
     States('arch25', minmax, steps, 0 limits)
     """
-    named = _goals(goals)
+    named = _goals(goals, least=1)
     limits = _checked(limits, engine.network)
     if any(goal.of_states and not goal.response for goal in named):
         criterion = _of_states(engine, criterion)
@@ -433,7 +433,7 @@ def within(problem: States, caps: Mapping[str, float]) -> States:
                 f"budget {goal}: it is no total of moves or of a response; give steps, regrips, "
                 "travel or sum(RESPONSE), or set a limit"
             )
-        if not (isinstance(cap, int | float) and 0 <= cap < np.inf):
+        if not 0 <= as_float(cap) < np.inf:
             raise ProblemError(f"budget {goal}={short(cap)}: give a number from 0")
     if problem.budgets:
         raise ProblemError("the problem has budgets already; give all of them at once")
@@ -465,14 +465,6 @@ def over_scenarios(
         require_alike(problem.network.scene, scene, number)
     engines = tuple(engine_for(problem.engine, scene) for scene in scenes)
     return replace(problem, scenarios=engines, over=over)
-
-
-def _goals(given: Sequence[Goal] | str) -> tuple[Goal, ...]:
-    """Return goals that are given as such, or by their names."""
-    goals = parse_goals(given) if isinstance(given, str) else given
-    if not isinstance(goals, Sequence) or {*map(type, goals)} != {Goal}:
-        raise ProblemError(f"aims {short(given)}: give goals, or their names, as 'minmax,steps'")
-    return tuple(goals)
 
 
 def _asked(problem: States) -> States:
