@@ -24,8 +24,9 @@ tension, with that times 1 + friction as cohesion), the least coefficient of fri
 the tilt that is survived is from a right angle (rad)."""
 TILTS = 2048  # steps of a right angle, to which the tilt of a state is found
 STEP = pi / 2 / TILTS  # rad
-NARROW = {"bond": (0.02, 0.0), "friction": (0.0, 2.0**-6), "tilt": (0.0, 2e-3)}
-"""By margin, within which share of itself and within what a value is proven: brackets' widths."""
+NARROW = 0.02
+"""Within which share of itself a margin is proven: a bond, a friction, the tilt survived."""
+_LEAST = {"bond": 0.0, "friction": 1e-4, "tilt": 1e-4}  # within which one is that is hardly any
 
 
 @dataclass(frozen=True)
@@ -184,7 +185,11 @@ class StandingSets:
         return self._known[name].of(bricks, codes, compute)
 
 
+def _size(name: str, value: float) -> float:
+    """Return what one of `MARGINS` is, of a tilt what is survived: what shares are shares of."""
+    return abs(pi / 2 - value if name == "tilt" else value)
+
+
 def slack(name: str, value: float) -> float:
     """Return within what one of `MARGINS` is proven."""
-    share, least = NARROW[name]
-    return max(share * abs(value), least)
+    return max(NARROW * _size(name, value), _LEAST[name])

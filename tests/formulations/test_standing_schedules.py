@@ -26,7 +26,7 @@ from seqopt.plan.judge._infeasible import worst_least
 from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import LIMIT_TOLERANCE
-from seqopt.problem.standing import Standing, StandingSets, _without_implied
+from seqopt.problem.standing import NARROW, Standing, StandingSets, _without_implied, slack
 from seqopt.responses.quantities import CHOSEN_BY, lengths
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.rules import FreeRules
@@ -208,6 +208,39 @@ def test_a_bond_is_found_to_its_share_at_every_size(scale):
     assert plan.certificate.gap == pytest.approx((value - bound) / value)
     assert plan.summary()["gap"] == plan.certificate.gap > 1e-3
     assert f"optimal within {plan.certificate.gap:.2g}" in plan.result
+
+
+@pytest.mark.parametrize(
+    ("aim", "way"),
+    [
+        ("friction", "loop"),
+        pytest.param("bond", "free", marks=slow),
+        pytest.param("friction", "free", marks=slow),
+        pytest.param("tilt", "loop", marks=slow),
+    ],
+)
+def test_a_margin_is_that_of_the_worst_step_to_two_percent(aim, way):
+    """Friction and tilt were found to a step of their own, a tenth of what they were."""
+    engine = ComplianceEngine(build_network(small_arch(4)))
+    free = FreeRules(robots=("rob1", "rob2"), least_grips=1)
+    rules = three_robot_loop(engine.network) if way == "loop" else free
+    plan = seqopt.solve(build_states(engine, rules, ONES, aim), "schedule_search")
+    found, bound = plan.objective[aim], plan.summary()["bound"][aim]
+    assert plan.certificate.gap == pytest.approx(abs(found - bound) / found)
+    assert plan.certificate.gap <= NARROW * (1 + 1e-9)
+    steps = seqopt.assess_steps(engine.network, plan.steps, "dry")
+    worst = {
+        "bond": max(step.bond for step in steps),
+        "friction": max(step.friction for step in steps),
+        "tilt": np.degrees(min(step.tilt for step in steps)),
+    }[aim]
+    assert worst == pytest.approx(found, rel=NARROW)
+    (value,) = plan.selection.objective
+    for share in (-1.5, 1.5):  # what is claimed is better than it is, or not the best
+        wrong = value + share * slack(aim, value)
+        claim = replace(plan.selection, objective=(wrong,), bound=(wrong,))
+        with pytest.raises(SolverError, match=r"as claimed|promised as the least"):
+            judge_schedule(plan.states, claim, plan.steps)
 
 
 def test_demands_that_others_imply_are_not_asked():

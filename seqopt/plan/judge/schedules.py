@@ -24,7 +24,7 @@ from seqopt.plan.judge._rule_moves import check_scheduled
 from seqopt.plan.judge._standing_proof import proven_margins, require_margin
 from seqopt.plan.judge.certificate import Certificate
 from seqopt.problem.problem import LARGEST, Goal, Measure
-from seqopt.problem.standing import slack
+from seqopt.problem.standing import _size, slack
 from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.responses.table import analyze, force_column
 from seqopt.sequence._rule_check import check_free
@@ -63,14 +63,16 @@ def judge_schedule(
     for goal, value, bound in zip(problem.goals, promised, bounds, strict=True):
         if not goal.of_margins and not bound >= value - BELOW * abs(value):
             raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
-    gap = _gap(values, bounds)
+    gap = _gap(problem.goals, values, bounds)
     return Certificate(values, bounds, gap, gap, {}, proof.states)
 
 
-def _gap(values: Sequence[float], bounds: Sequence[float]) -> float:
+def _gap(goals: Sequence[Goal], values: Sequence[float], bounds: Sequence[float]) -> float:
     """Return the most that bounds of the first goals leave open, over the size of their values."""
-    pairs = zip(values, bounds, strict=False)
-    return max((value - bound) / (abs(value) or 1.0) for value, bound in pairs)
+    return max(
+        (value - bound) / (_size(goal.response, value) or 1.0)
+        for goal, value, bound in zip(goals, values, bounds, strict=False)
+    )
 
 
 def _as_claimed(problem: States, selection: StatePath, steps: Sequence[Step]) -> tuple[float, ...]:
@@ -126,7 +128,7 @@ def _within_budgets(
         if not goal.of_margins and not bound >= said - TOLERANCE * abs(said):
             raise SolverError(f"{goal}: no plan within budgets is promised below {said:.9g}")
     bounds = tuple(map(min, bounds, values))
-    left = _gap(values, bounds)
+    left = _gap(problem.goals, values, bounds)
     return Certificate(values, (*bounds, *values[aims:]), left, left, {}, proof.states)
 
 
@@ -142,7 +144,7 @@ def _over_totals(
     claimed = min(value, max(bound, selection.bound[0]))
     if claimed > value - BELOW * abs(value):
         claimed = value
-    gap, left = (_gap((value,), (each,)) for each in (bound, claimed))
+    gap, left = (_gap(problem.goals, (value,), (each,)) for each in (bound, claimed))
     return Certificate((value,), (bound,), gap, left, {}, proof.states)
 
 

@@ -59,7 +59,7 @@ def bisected(name: str, exists: Callable[[float], bool]) -> tuple[float, float]:
         low, high = high, min(WORST[name], 4 * high)
     while high - low > 0.6 * slack(name, high):  # the rest is for sets that stay open
         middle = (low + high) / 2
-        if name == "bond":
+        if name != "tilt":
             middle = (low * high) ** 0.5 if low else high / 16
         low, high = (low, middle) if exists(middle) else (middle, high)
     return low, high
