@@ -164,8 +164,7 @@ def compare(
         notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
     verdicts = (prover or BuildProver(engine.network, progress=progress)).of_tables(tables)
-    left = (within := LinearRange(engine)).of_builds(tables)
-    table = _table(rows, left, verdicts)
+    table = _table(rows, left := (within := LinearRange(engine)).of_builds(tables), verdicts)
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
     found = (maxima, printed, table, tables, loop, tuple(notes), refusal)
     return Comparison(*found, left, criteria, verdicts, what_was_enough(within, tables))

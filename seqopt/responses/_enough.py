@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 import pandas as pd
 
+from seqopt.arrays import Terse
 from seqopt.engines._auto import AutoEngine
 from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
@@ -19,8 +20,8 @@ from seqopt.responses.table import LinearRange
 _KNOWN = AutoEngine, PlanarEngine, ComplianceEngine, DiscreteEngine
 
 
-@dataclass(frozen=True)
-class Enough:
+@dataclass(frozen=True, repr=False)
+class Enough(Terse):
     """What computed the steps of builds, and what is known of models that were not taken.
 
     ``engine``: its name; ``dearer``: what dearer engines would change in these steps, in words;

@@ -38,6 +38,9 @@ STARTS = (  # of lines on standard error
     *(
         "seqopt",
         "engine: ",
+        "enough: ",
+        "left out: ",
+        "proof: ",
         "robots: ",
         "payload: ",
         "kept: ",
