@@ -82,7 +82,7 @@ def _dearer(within: LinearRange, below: float, where: str) -> str:
     said = flat if isinstance(engine, PlanarEngine) else ""
     if np.isnan(below):
         unchecked = "; ".join(within.unchecked) or str(getattr(engine, "unchecked", ""))
-        why = unchecked or "of steps that build on others"
+        why = unchecked or "steps build on earlier ones"
         return f"{said}what discrete elements would change is not known: {why}"
     if below >= 0:
         close = f"{where} comes closest to its elastic limits, {below / 1e6:.3g} MPa below them"

@@ -257,8 +257,7 @@ def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]
         written=written,
         notes=(
             *_posed_notes(found.asked.problem),
-            *plan.enough.lines,
-            f"proof: {_proof(plan)}",
+            *(() if stopped else (*plan.enough.lines, f"proof: {_proof(plan)}")),
             *idle_notes(scene, plan.steps),
             *refused(found.prover),
         ),
