@@ -30,6 +30,7 @@ bit:
 True
 """
 
+from seqopt.responses._calibration import StiffnessFit, calibrate
 from seqopt.responses._choices import Evaluation, StepChoices
 from seqopt.responses._staged import analyze_staged
 from seqopt.responses.quantities import RESPONSES, Response, responses_of
@@ -42,7 +43,9 @@ __all__ = [
     "Resources",
     "Response",
     "StepChoices",
+    "StiffnessFit",
     "analyze",
     "analyze_staged",
+    "calibrate",
     "responses_of",
 ]
