@@ -140,7 +140,8 @@ def _free_formulations(table: pd.DataFrame) -> str:
 
 
 def _classical(table: pd.DataFrame) -> str:
-    off = (100 * table["off"]).map("{:.2f} %".format).where(table["known"].notna(), "–")
+    off = ((100 * table["off"]).round(2) + 0.0).map("{:.2f} %".format)
+    off = off.where(table["known"].notna(), "–")
     numbers = [table[name].map("{:.4g}".format).replace("nan", "–") for name in ("known", "ours")]
     rows = zip(table["result"], table["source"], *numbers, off, strict=True)
     return markdown(["result", "by", "known", "ours", "difference"], [*rows])
