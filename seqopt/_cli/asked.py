@@ -11,11 +11,11 @@ import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import asked_standing, parse_robots
-from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
+from seqopt._cli.values import asked_standing, mortar_word, parse_robots
+from seqopt.contact.mortar import Mortar
 from seqopt.engines._auto import AutoEngine
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import make_engine
+from seqopt.engines.registry import LIMITED, make_engine
 from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
@@ -60,11 +60,13 @@ def asked_scene(options: argparse.Namespace) -> Scene:
 
 def asked_engine(options: argparse.Namespace, network: Network) -> Engine:
     """Return the engine that a command is asked for."""
-    mortar = None if options.mortar is None else MORTARS[options.mortar]
+    mortar = None if options.mortar is None else mortar_word(options.mortar, "--mortar")
+    of_verdicts = options.engine not in LIMITED and not getattr(options, "no_stability", True)
     try:
-        return make_engine(options.engine, network, mortar)
+        return make_engine(options.engine, network, None if of_verdicts else mortar)
     except SceneError as error:
-        raise SceneError(f"--engine {options.engine}: {error}") from error
+        why = str(error).removeprefix(f"engine {options.engine}: ")
+        raise SceneError(f"--engine {options.engine}: {why}") from error
 
 
 def asked_steps(options: argparse.Namespace, scene: Scene) -> tuple[Step, ...]:
@@ -131,7 +133,7 @@ def asked_prover(options: argparse.Namespace, network: Network) -> BuildProver:
     """Return what says which steps of builds stand, with the mortars that a command shows."""
     own = getattr(options, "stands", None) or getattr(options, "mortar", None) or "epoxy"
     demanded = asked_standing(options) if getattr(options, "stands", None) else None
-    mortar = find_mortar(own) if demanded is None else demanded.mortar
+    mortar = mortar_word(own, "--mortar") if demanded is None else demanded.mortar
     shown = {"dry": Mortar(friction=mortar.friction), own: mortar}
     return BuildProver(network, {} if options.no_stability else shown, options.tell)
 

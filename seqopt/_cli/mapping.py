@@ -11,7 +11,7 @@ from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
 from seqopt._cli.outputs import figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import number_word
+from seqopt._cli.values import mortar_word, number_word
 from seqopt._files import csv_text
 from seqopt.engines.registry import USUAL, make_engine, versions
 from seqopt.errors import ProblemError
@@ -37,6 +37,8 @@ def answer_map(options: argparse.Namespace) -> Answer:
     scene = asked_scene(options)
     axis, values = _asked_axis(options.map)
     holds = (options.holds or "dry,epoxy").split(",")
+    for name in holds:
+        mortar_word(name, "--holds")
     require_out(options)
     builds, notes = _asked_builds(options, scene)
     found = failure_map(scene, builds, holds, axis, values, options.tell)

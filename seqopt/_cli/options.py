@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from seqopt.contact.mortar import MORTARS
 from seqopt.engines.registry import ENGINES
 from seqopt.problem.criteria import Among, Ranked
 from seqopt.scene.scene import ORDERS
@@ -98,9 +97,8 @@ def engine_options(command: argparse.ArgumentParser) -> Takes:
     )
     takes.add_argument(
         "--mortar",
-        choices=tuple(MORTARS),
-        help="what holds the joints of the engines auto and discrete: the epoxy of Bruun et al. "
-        "(default), or dry, nothing",
+        help="what holds the joints, in verdicts and in the engines auto and discrete: epoxy, that "
+        "of Bruun et al. (default), dry, nothing, or bond=STRENGTH (Pa)",
     )
     return takes
 

@@ -11,7 +11,7 @@ from math import radians
 from typing import Any
 
 from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
-from seqopt.errors import ProblemError, SeqoptError, StepError, did_you_mean
+from seqopt.errors import ProblemError, SceneError, SeqoptError, StepError, did_you_mean
 from seqopt.plan.calling.formulation import Formulation, as_formulation
 from seqopt.problem.criteria import Among, Ranked, RankSum
 from seqopt.problem.requirements import NEVER, Criterion, Limit, payload_limits
@@ -158,7 +158,16 @@ def asked_mortar(options: argparse.Namespace) -> Mortar:
         for name in ("friction", "tensile_strength", "cohesion")
         if (text := getattr(options, name)) is not None
     }
-    return replace(MORTARS[options.mortar], **given)
+    return replace(mortar_word(options.mortar, "--mortar"), **given)
+
+
+def mortar_word(text: str, where: str) -> Mortar:
+    """Return a mortar by its words; ``where`` is the argument, for messages."""
+    try:
+        return find_mortar(text)
+    except SceneError as error:
+        wrong = f"{where} {text}: give {', '.join(MORTARS)}, or bond=STRENGTH (Pa), zero or more"
+        raise ProblemError(wrong) from error
 
 
 def asked_standing(options: argparse.Namespace) -> Standing | None:
@@ -168,7 +177,7 @@ def asked_standing(options: argparse.Namespace) -> Standing | None:
         if names:
             raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands dry, say")
         return None
-    mortar = find_mortar(options.stands)
+    mortar = mortar_word(options.stands, "--stands")
     given = {name: number_word(getattr(options, name), f"--{name}", zero=True) for name in names}
     tilt = radians(given.pop("tilt", 0.0))
     return Standing(replace(mortar, **given), tilt)

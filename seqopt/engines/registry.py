@@ -93,7 +93,7 @@ ENGINES: dict[str, Callable[..., Engine]] = {
     "discrete": DiscreteEngine,
 }
 USUAL = "compliance"  # the engine where none is asked for
-_LIMITED = ("auto", "discrete")  # engines whose joints hold what mortar does
+LIMITED = ("auto", "discrete")  # engines whose joints hold what mortar does
 
 
 def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None = None) -> Engine:
@@ -128,12 +128,12 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
     if name not in ENGINES:
         raise SceneError(f"engine {name} does not exist; known are {', '.join(ENGINES)}")
     network, options = network_of(network), dict[str, object]()
-    if mortar is not None and name in _LIMITED:
+    if mortar is not None and name in LIMITED:
         options["mortar"] = find_mortar(mortar)
     elif mortar is not None:
         raise SceneError(
             f"engine {name}: its joints never fail, so a mortar changes nothing; "
-            f"use the engine {' or '.join(_LIMITED)}"
+            f"use the engine {' or '.join(LIMITED)}"
         )
     engine = ENGINES[name](network, **options)
     vars(engine)["recipe"] = Recipe(name, network.scene, options)

@@ -83,7 +83,8 @@ def test_margins_of_some_steps(capsys, tmp_path, words, known):
         (["--map", "wind"], "--map wind: give friction or tilt, with values as friction=0.3,0.6"),
         (["--map", "tilt=60"], "--map tilt=60: 60 is too much; give tilt from 0 to 45"),
         (["--map", "friction=x"], "--map friction=x: 'x' is not a positive number or zero"),
-        (["--map", "friction", "--holds", "glue"], "mortar 'glue': give a Mortar, or one of"),
+        (["--map", "friction", "--holds", "glue"], "--holds glue: give epoxy, dry, or bond="),
+        (["--mortar", "bond=-1"], "--mortar bond=-1: give epoxy, dry, or bond=STRENGTH (Pa)"),
     ],
 )
 def test_what_cannot_be_meant_is_a_line(capsys, words, said):

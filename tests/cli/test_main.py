@@ -502,7 +502,10 @@ def test_help_teaches(capsys, command):
         (("assess", "--plan", "no.csv", "--robots", "rob1,rob2"), "--robots rob1,rob2: a plan"),
         (("assess",), "nothing to assess: give --method NAME, --plan FILE, or --map friction"),
         (("assess", "--method", "sequential", "--plan", "x.csv"), "not allowed with"),
-        (("assess", "--method", "sequential", "--mortar", "glue"), "'glue' (choose from 'epoxy'"),
+        (
+            ("assess", "--method", "sequential", "--mortar", "glue"),
+            "--mortar glue: give epoxy, dry",
+        ),
         (("assess", "--method", "sequential", "--friction", "-1"), "--friction: '-1' is not"),
         (("assess", "--plan", "no.csv"), "no.csv"),
     ],

@@ -16,7 +16,7 @@ from seqopt._cli.options import STEPS_USAGE, declare, form_options, scene_option
 from seqopt._cli.outputs import keep_apart, put_table
 from seqopt._cli.rows import Rows
 from seqopt._cli.values import MOST_WORKERS, asked_mortar, count_word
-from seqopt.contact.mortar import MORTARS, Mortar
+from seqopt.contact.mortar import Mortar
 from seqopt.engines.registry import versions
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
@@ -63,10 +63,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     steps_options(basic, required=False)
     basic.add_argument(
         "--mortar",
-        choices=tuple(MORTARS),
         default="epoxy",
-        help="what is in the joints: the epoxy of Bruun et al. (25°, 3 MPa, 2 MPa) or nothing "
-        "(default: %(default)s)",
+        help="what is in the joints: epoxy, that of Bruun et al. (25°, 3 MPa, 2 MPa), dry (nothing) "
+        "or bond=STRENGTH (Pa) (default: %(default)s)",
     )
     declare(basic, {**HOW, **LOADS})
     declare(command.add_argument_group("where builds fail"), MAP)
