@@ -64,8 +64,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     basic.add_argument(
         "--mortar",
         default="epoxy",
-        help="what is in the joints: the epoxy of Bruun et al. (25°, 3 MPa, 2 MPa), dry (nothing) or "
-        "bond=STRENGTH (Pa) (default: %(default)s)",
+        help="what is in the joints: the epoxy of Bruun et al. (25°, 3 MPa, 2 MPa), dry (nothing), "
+        "or bond=STRENGTH (Pa) (default: %(default)s)",
     )
     declare(basic, {**HOW, **LOADS})
     declare(command.add_argument_group("where builds fail"), MAP)
