@@ -84,7 +84,8 @@ class StandingSets:
 
     ``standing``: margins are those of its mortar; ``payloads`` (k,): all that robots may have, N;
     ``demands``: all of which what stands has to meet; by default the one; ``undecided``: how many
-    grip sets were neither proven to stand nor to fall.
+    grip sets were neither proven to stand nor to fall; ``others``: of the same scene, with other
+    demands: what stands with more stands with less.
     """
 
     def __init__(
@@ -100,8 +101,9 @@ class StandingSets:
                 "a robot without a largest force holds up anything, and says nothing of what "
                 "stands; give it a payload, or a limit on its force, and keep payloads"
             )
-        demands = _without_implied(demands or (standing,))
+        self._demands = demands = _without_implied(demands or (standing,))
         self._screens = [Screen(network, demand.mortar, demand.tilt) for demand in demands]
+        self.others: list[StandingSets] = []
         self._margins = Margins(network, standing.mortar)
         self._network, self._mortar = network, standing.mortar
         self._tilts_known: dict[int, Screen] = {}
@@ -133,14 +135,30 @@ class StandingSets:
         return np.asarray(self._verdicts(bricks, held, payload) != FALLS)
 
     def _verdicts(self, bricks: int, held: Ints, payload: Floats) -> Floats:
+        codes = self._codes(held, payload)
+
         def verdicts(rows: Ints) -> Floats:
-            grips = bricks, held[rows], payload[rows]
-            each = [screen.stands(*grips) for screen in self._screens]
-            found: Floats = np.min(each, axis=0).astype(float)
+            found = self._by_others(bricks, codes[rows])
+            if len(new := np.flatnonzero(np.isnan(found))):
+                grips = bricks, held[rows[new]], payload[rows[new]]
+                found[new] = np.min([screen.stands(*grips) for screen in self._screens], axis=0)
             self.undecided += int(((found != STANDS) & (found != FALLS)).sum())
             return found[:, None]
 
-        return self._ask("", bricks, (held, payload), verdicts)[:, 0]
+        return self._known[""].of(bricks, codes, verdicts)[:, 0]
+
+    def _by_others(self, bricks: int, codes: Ints) -> Floats:
+        """Return the verdicts (n,) that what is known with other demands decides; else NaN."""
+        out = np.full(len(codes), np.nan)
+        for other in self.others:
+            found = other._known[""].known(bricks, codes)
+            for one, weaker, verdict in ((other, self, STANDS), (self, other, FALLS)):
+                if one._demands_all_of(weaker):
+                    out[found == verdict] = verdict
+        return out
+
+    def _demands_all_of(self, other: StandingSets) -> bool:
+        return all(any(mine._implies(each) for mine in self._demands) for each in other._demands)
 
     def margins(self, name: str, bricks: int, held: Ints, payload: Floats) -> Floats:
         """Return (S, 2) between which values, as goals count them, margins of grip sets lie."""
@@ -177,12 +195,15 @@ class StandingSets:
     def _ask(
         self, name: str, bricks: int, grips: tuple[Ints, Floats], compute: Callable[[Ints], Floats]
     ) -> Floats:
-        held, payload = grips
+        return self._known[name].of(bricks, self._codes(*grips), compute)
+
+    def _codes(self, held: Ints, payload: Floats) -> Ints:
+        """Return a number (S,) for every grip set."""
         kinds = np.where(held > 0, np.searchsorted(self._payloads, payload), 0)
         codes = np.zeros(len(held), dtype=np.int64)
         for nodes, kind in zip(held.T, kinds.T, strict=True):
             codes = (codes * self._most + nodes) * len(self._payloads) + kind
-        return self._known[name].of(bricks, codes, compute)
+        return codes
 
 
 def _size(name: str, value: float) -> float:

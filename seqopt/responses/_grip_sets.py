@@ -52,6 +52,14 @@ class KnownRows:
         """How much memory the rows take."""
         return sum(codes.nbytes + values.nbytes for codes, values in self._known.values())
 
+    def known(self, key: object, codes: Ints) -> Floats:
+        """Return the first values (n,) of rows that are known already; NaN of others."""
+        known, values = self._known.get(key, (codes[:0], None))
+        if values is None or not len(known):
+            return np.full(len(codes), np.nan)
+        at = np.searchsorted(known, codes).clip(max=len(known) - 1)
+        return np.where(known[at] == codes, values[at, 0], np.nan)
+
     def of(self, key: object, codes: Ints, compute: Callable[[Ints], Floats]) -> Floats:
         """Return the rows of codes, those that are new computed now, all together.
 

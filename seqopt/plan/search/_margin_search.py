@@ -11,7 +11,7 @@ from seqopt.graph._explore import Explorer
 from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import Goal, Measure
-from seqopt.problem.standing import Standing, slack
+from seqopt.problem.standing import Standing, StandingSets, slack
 from seqopt.stability.assessment import ROUGHEST
 
 WORST = {"bond": 1e9, "friction": ROUGHEST, "tilt": pi / 2}  # as goals count them
@@ -29,20 +29,22 @@ def best_margin(
     none does; ``rest``: of the goals after it, with the demand that all stand with that value.
     Raises `InfeasibleError` if there is no plan, whatever the margin.
     """
-    name = problem.goals[0].response
+    name, asked = problem.goals[0].response, list[StandingSets]()
 
-    def demanding(value: float) -> States:
-        goals = problem.goals[1:] or (Goal(Measure.STEPS),)
-        return replace(with_margin(problem, name, value), goals=goals)
+    def demanding(value: float, goals: tuple[Goal, ...]) -> States:
+        found = replace(with_margin(problem, name, value), goals=goals)
+        found.stability.others = asked
+        asked.append(found.stability)
+        return found
 
     def exists(value: float) -> bool:
-        reach = replace(demanding(value), goals=(Goal(Measure.STEPS),))
+        reach = demanding(value, (Goal(Measure.STEPS),))
         return explore(reach, width=WIDTH, tell=tell).whole or explore(reach, tell=tell).whole
 
     if problem.demands and not exists(WORST[name]):
         raise InfeasibleError("no plan of the free schedule stands as is demanded")
     low, high = bisected(name, exists)
-    return high, low, demanding(high)
+    return high, low, demanding(high, problem.goals[1:] or (Goal(Measure.STEPS),))
 
 
 def bisected(name: str, exists: Callable[[float], bool]) -> tuple[float, float]:
