@@ -126,6 +126,13 @@ class LinearRange:
             if (over := ~(values <= most)).any()  # what is not a number is not within
         )
 
+    def seen(self, step: Step, fields: Fields) -> Fields:
+        """Return the fields of a step, all of them, and remember what it is asked of them."""
+        found = self._of(fields)
+        if not (self._breaks and found[2] > 0):  # else others than those of rigid bricks
+            self._known[step.bricks, tuple(step.held)] = found
+        return fields
+
     def of_builds(self, tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[Departure, ...]]:
         """Return the limits that builds leave, for those that leave any, by name."""
         return {name: left for name, each in tables.items() if (left := self.departures(each))}

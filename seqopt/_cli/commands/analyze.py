@@ -31,7 +31,7 @@ from seqopt._cli.values import parse_time_limit
 from seqopt._files import write_bytes
 from seqopt._interrupts import ending
 from seqopt.engines._auto import AutoEngine, Level
-from seqopt.engines.interface import Engine, Fields
+from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.registry import provenance
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
@@ -86,13 +86,14 @@ def run(options: argparse.Namespace) -> Answer:
     network = build_network(scene)
     engine, steps = asked_engine(options, network), asked_steps(options, scene)
     limit = parse_time_limit(options.time_limit)
-    in_time = _InTime(_step_answers(options, engine, steps), limit)
+    within = LinearRange(engine)
+    in_time = _InTime(_step_answers(options, within, steps), limit)
     answers = in_time if options.fields is None else list(in_time)
     table = response_table(network, answers)
     late, ended = _late(options, len(table), len(steps), engine, in_time)
     if table.empty:
         return Answer(facts={"steps": ()}, failures=late, status=ended)
-    within, computed = LinearRange(engine), steps[: len(table)]
+    computed = steps[: len(table)]
     staged = None if options.staged is None else staged_fields(network, computed, options.staged)
     outside = within.departures(table, staged)
     if options.fields is not None:
@@ -130,12 +131,12 @@ def _late(
 
 
 def _step_answers(
-    options: argparse.Namespace, engine: Engine, steps: Sequence[Step]
+    options: argparse.Namespace, within: LinearRange, steps: Sequence[Step]
 ) -> Iterator[tuple[Step, Fields]]:
     """Return steps with their fields, each from scratch or with what earlier ones lock in."""
-    each = with_progress("steps", steps, options.tell)
+    each, engine = with_progress("steps", steps, options.tell), within.engine
     if options.staged is None:
-        return ((step, step_fields(engine, step)) for step in each)
+        return ((step, within.seen(step, step_fields(engine, step, Want.ALL))) for step in each)
     if options.engine != "compliance":
         raise SceneError(
             f"--engine {options.engine}: --staged goes with exactly rigid bricks alone; "
