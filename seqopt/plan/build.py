@@ -70,7 +70,7 @@ class ShownBuild(Shown):
 
     @property
     def enough(self) -> Enough:
-        """Which model was enough for the steps, what dearer ones would change, what is left out."""
+        """Which model was enough for the steps, what others would change, what is left out."""
         return what_was_enough(self._within, {"": self.responses()})
 
     def grips(self) -> pd.DataFrame:

@@ -102,7 +102,7 @@ class Comparison(Terse):
         Which steps stand, by row of ``table``, one for each mortar that was asked for; of these the
         table counts the steps that fall, as ``falls_dry``.
     enough : Enough
-        Which model was enough for all steps, and what dearer ones would change.
+        Which model was enough for all steps, and what more detailed ones would change.
     """
 
     maxima: pd.DataFrame

@@ -1,4 +1,4 @@
-"""Which model was enough, what a dearer one would have changed, and what was left out."""
+"""Which model was enough, what a more detailed one would have changed, and what was left out."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ _KNOWN = AutoEngine, PlanarEngine, ComplianceEngine, DiscreteEngine
 class Enough(Terse):
     """What computed the steps of builds, and what is known of models that were not taken.
 
-    ``engine``: its name; ``dearer``: what dearer engines would change in these steps, in words;
+    ``engine``: its name; ``others``: what more detailed ones would change here, in words;
     ``joint``, ``step``: which joint comes closest to its elastic limits, and where; empty where
     that is not known; ``below_limit``: by how much it stays below, Pa; negative beyond them;
     ``left_out``: of the model.
     """
 
     engine: str
-    dearer: str
+    others: str
     joint: str
     step: str
     below_limit: float | None
@@ -45,7 +45,7 @@ class Enough(Terse):
     @property
     def lines(self) -> tuple[str, str]:
         """The same in two lines, for people."""
-        return f"enough: {self.engine}; {self.dearer}", f"left out: {'; '.join(self.left_out)}"
+        return f"enough: {self.engine}; {self.others}", f"left out: {'; '.join(self.left_out)}"
 
 
 def what_was_enough(
@@ -63,7 +63,7 @@ def what_was_enough(
     step = f"step {number}{f' of {build}' if len(builds) > 1 else ''}" if known else ""
     return Enough(
         type(engine).__name__ if recipe is None else recipe.engine,
-        _dearer(within, below if known else np.nan, f"{joint} in {step}"),
+        _others(within, below if known else np.nan, f"{joint} in {step}"),
         joint if known else "",
         step,
         below if known else None,
@@ -71,11 +71,11 @@ def what_was_enough(
     )
 
 
-def _dearer(within: LinearRange, below: float, where: str) -> str:
-    """Return what dearer engines would change, in words; ``below``: the limits, Pa."""
+def _others(within: LinearRange, below: float, where: str) -> str:
+    """Return what more detailed engines would change, in words; ``below``: the limits, Pa."""
     engine = within.engine
     if isinstance(engine, DiscreteEngine):
-        return "none is dearer"
+        return "none is more detailed"
     if not isinstance(engine, _KNOWN):
         return "what another one would change is not known"
     flat = "compliance would change nothing, as nothing leaves the plane; "
@@ -88,7 +88,7 @@ def _dearer(within: LinearRange, below: float, where: str) -> str:
         close = f"{where} comes closest to its elastic limits, {below / 1e6:.3g} MPa below them"
         return f"{said}discrete elements would change nothing in these steps: {close}"
     if isinstance(engine, AutoEngine):
-        return "dearer ones would change nothing: discrete elements were taken where joints open"
+        return "discrete elements were taken where joints open, elsewhere they change nothing"
     return f"{said}what discrete elements would change is not known: {where} leaves its limits"
 
 

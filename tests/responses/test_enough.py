@@ -29,20 +29,20 @@ def enough(scene, name):
 @pytest.mark.parametrize("name", ["compliance", "planar", "auto"])
 def test_within_elastic_limits_discrete_elements_change_nothing(name):
     found, steps, table = enough(arch(), name)
-    assert "discrete elements would change nothing in these steps" in found.dearer
-    assert ("compliance would change nothing" in found.dearer) == (name == "planar")
+    assert "discrete elements would change nothing in these steps" in found.others
+    assert ("compliance would change nothing" in found.others) == (name == "planar")
     assert found.below_limit > 0
     assert f"{found.joint} in {found.step}" in found.lines[0]
-    dearer = seqopt.analyze(DiscreteEngine(seqopt.build_network(arch())), steps)
+    detailed = seqopt.analyze(DiscreteEngine(seqopt.build_network(arch())), steps)
     for column in ("F_max_N", "M_sup_Nm", "D_max_1e-3mm"):
-        np.testing.assert_allclose(dearer[column], table[column], rtol=1e-7, atol=1e-9)
+        np.testing.assert_allclose(detailed[column], table[column], rtol=1e-7, atol=1e-9)
 
 
 def test_beyond_elastic_limits_nothing_is_promised():
     """The negative control: so heavy that joints break, and discrete elements answer otherwise."""
     found, steps, table = enough(arch(2e6), "compliance")
     assert found.below_limit < 0
-    assert "discrete elements would change is not known" in found.dearer
+    assert "discrete elements would change is not known" in found.others
     number = int(found.step.removeprefix("step "))
     engine = DiscreteEngine(seqopt.build_network(arch(2e6)))
     try:
@@ -54,7 +54,7 @@ def test_beyond_elastic_limits_nothing_is_promised():
 
 def test_what_is_left_out_is_that_of_the_run():
     found, _, _ = enough(arch(), "frame")
-    assert "not known" in found.dearer
+    assert "not known" in found.others
     assert "what earlier steps lock in" in found.left_out
     engine = seqopt.make_engine("compliance", arch())
     last = seqopt.sequential(engine.network)[-1:]

@@ -297,7 +297,7 @@ def _posed_notes(problem: Problem) -> tuple[str, ...]:
 
 
 def _proof(plan: Plan) -> str:
-    """Return which proof was enough, and what a dearer one could still change."""
+    """Return which proof was enough, and what another could still change."""
     proof, looked = plan.certificate, f"{plan.models} models"
     if proof is None or plan.gap is None:
         return "none; how much better another plan may be is not known"
