@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import pandas as pd
@@ -102,21 +101,6 @@ def level_notes(engine: Engine) -> tuple[str, ...]:
         for choice, sets in engine.tally.items()
     ]
     return (*said, *([f"engine: {engine.unchecked}"] if engine.unchecked else []))
-
-
-def proof_note(ways: Iterable[str]) -> str:
-    """Return in a line which proofs of what stands were enough.
-
-    ``ways``: of every step, as `seqopt.stability._step_verdicts.StepVerdict.way`.
-
-    Examples
-    --------
-    >>> proof_note(["forces", "earlier forces", "earlier forces", "cone program"])
-    'proof: earlier forces for 2 steps, forces for 1, cone program for 1'
-    """
-    (first, most), *rest = Counter(ways).most_common()
-    said = [f"{first} for {most} step{'s' * (most > 1)}", *(f"{way} for {n}" for way, n in rest)]
-    return f"proof: {', '.join(said)}"
 
 
 def idle_notes(scene: Scene, steps: Sequence[AnyStep]) -> tuple[str, ...]:

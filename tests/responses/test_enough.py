@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt._cli.asked import proof_note
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.errors import SeqoptError
 from seqopt.responses._enough import what_was_enough
@@ -62,7 +61,3 @@ def test_what_is_left_out_is_that_of_the_run():
     assert "what earlier steps lock in" not in alone.left_out
     assert alone.below_limit is None
     assert found.facts().keys() == alone.facts().keys()
-
-
-def test_ways_of_proofs_are_counted():
-    assert proof_note(["motion"]) == "proof: motion for 1 step"
