@@ -166,8 +166,9 @@ def mortar_word(text: str, where: str) -> Mortar:
     try:
         return find_mortar(text)
     except SceneError as error:
-        wrong = f"{where} {text}: give {', '.join(MORTARS)}, or bond=STRENGTH (Pa), zero or more"
-        raise ProblemError(wrong) from error
+        hint = did_you_mean(text.partition("=")[0], (*MORTARS, "bond"))
+        known = f"give {', '.join(MORTARS)}, or bond=STRENGTH (Pa), zero or more"
+        raise ProblemError(f"{where} {text}{hint}: {known}") from error
 
 
 def asked_standing(options: argparse.Namespace) -> Standing | None:

@@ -84,7 +84,8 @@ class Stability(Shown, FrozenValue):
 
     Examples
     --------
-    >>>     >>> from seqopt.contact.mortar import DRY
+    >>> from seqopt.contact.faces import step_assembly
+    >>> from seqopt.contact.mortar import DRY
     >>> from seqopt.network.build import build_network
     >>> from seqopt.scene.scene_file import load_scene
     >>> network = build_network(load_scene("arch25"))
