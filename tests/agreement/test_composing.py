@@ -180,6 +180,7 @@ def best_of(plans, aims, caps):
     return out or None
 
 
+@pytest.mark.slow
 @given(data=st.data())
 @settings(max_examples=20)
 @pytest.mark.parametrize("name", ["free", "three-robot", "modified-sequential", "own"])

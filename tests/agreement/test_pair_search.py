@@ -219,6 +219,7 @@ def test_costs_that_are_given_and_free_schedules_have_nothing_to_save():
         solve(costs, "overlap_dp", lazy=True)
 
 
+@pytest.mark.slow
 def test_from_the_command_line(capsys, tmp_path):
     words = ["optimize", "--formulation", "minimax", "--criteria", "worst-ratio", "--lazy"]
     assert main([*words, "--out", str(tmp_path / "out")]) == 0

@@ -213,6 +213,7 @@ def test_figures_that_cannot_be_drawn_are_left_out_and_it_says_so(
     assert "report.html" in plain
 
 
+@pytest.mark.slow
 def test_pareto_of_a_loop_and_methods_to_beat(capsys, tmp_path, arch):
     out = ["--out", str(tmp_path / "front")]
     loop = ["--schedule", "three-robot", "--aim", "F_largest,T_max"]

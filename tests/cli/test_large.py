@@ -56,6 +56,7 @@ def contents(folder):
     return out | {"summary.json": summary}
 
 
+@pytest.mark.slow
 def test_results_do_not_depend_on_workers_cache_and_memory(tmp_path):
     scene = tmp_path / "scene.json"
     save_scene(small_arch(9), scene)
@@ -195,6 +196,7 @@ def test_a_killed_worker_is_replaced(tmp_path):
     assert contents(tmp_path / "out") == contents(tmp_path / "plain")
 
 
+@pytest.mark.slow
 def test_fewer_candidates_are_a_heuristic_that_says_so(capsys, tmp_path):
     words = [*WORDS, "overlap_dp", "--criteria", "worst-ratio-published"]
     whole, near = tmp_path / "whole", tmp_path / "near"

@@ -35,6 +35,7 @@ def run(capsys, *arguments):
     return status, out, err
 
 
+@pytest.mark.slow
 def test_compare(capsys):
     status, out, _ = run(capsys, "compare")
     assert status == 0
@@ -205,6 +206,7 @@ def test_a_plan_from_a_file(capsys, tmp_path):
     assert out.count("\n") == 3
 
 
+@pytest.mark.slow
 def test_optimize(capsys, tmp_path):
     folder = tmp_path / "new" / "out"
     arguments = ("optimize", "--formulation", "overlap_dp", "--out", str(folder))

@@ -34,6 +34,7 @@ WRITES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRITES)
 def test_every_summary_says_what_it_came_from(capsys, tmp_path, arch, name):
     command, *words = WRITES[name]

@@ -169,6 +169,7 @@ def test_strict_asks_for_payloads(capsys, words, status):
     assert ("seqopt: payload exceeded: rob2 holds up to" in err) == (status == 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("limits", "status"), [((), 0), (("--limit", "F_largest=300"), 0)])
 def test_strict_is_content_where_payloads_hold(capsys, tmp_path, limits, status):
     words = ("optimize", "--formulation", "overlap_dp", "--strict", "--out", str(tmp_path / "o"))

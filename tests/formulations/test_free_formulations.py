@@ -91,6 +91,7 @@ def test_it_agrees_with_brute_force(name, aim, size):
 SYMMETRIC = with_robots(from_both_sides(2, "VL"), 2)  # its peaks are equal but for rounding
 
 
+@pytest.mark.slow
 @given(build=free_builds(most_bricks=4, most_robots=3))
 @example(build=(SYMMETRIC, FreeRules(least_grips=0, newest="free")))
 @settings(max_examples=8)

@@ -223,6 +223,7 @@ def test_weights_of_scenarios_that_prove_little_leave_a_gap():
         judge_schedule(states, replace(found, objective=(0.9 * found.objective[0],)), plan.steps)
 
 
+@pytest.mark.slow
 def test_a_margin_within_a_budget_is_proven_to_its_width():
     """The margin comes first, and the budget holds beside it."""
     problem = within(posed("friction,minmax"), {"travel": 1.0})

@@ -369,6 +369,7 @@ def test_longer_arches_fall_dry_as_the_cone_program_says(name):
         assert found == one_by_one(network, steps, DRY)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_a_vault_is_proven_without_cone_programs():
     """The start of a vault; with epoxy all of it."""
