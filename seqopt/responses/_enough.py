@@ -86,7 +86,8 @@ def _others(within: LinearRange, below: float, where: str) -> str:
         return f"{said}what discrete elements would change is not known: {why}"
     if below >= 0:
         close = f"{where} comes closest to its elastic limits, {below / 1e6:.3g} MPa below them"
-        return f"{said}discrete elements would change nothing in these steps: {close}"
+        own = "" if isinstance(engine, AutoEngine) else " with epoxy"  # whose limits they are
+        return f"{said}discrete elements{own} would change nothing in these steps: {close}"
     if isinstance(engine, AutoEngine):
         return "discrete elements were taken where joints open, elsewhere they change nothing"
     return f"{said}what discrete elements would change is not known: {where} leaves its limits"
