@@ -174,12 +174,9 @@ def _fault_of_table(text: str) -> str:
         return ""
     table = pd.read_csv(io.StringIO(text))
     if "verdict" in table:
-        stands = table["verdict"] == "stands"
-        return (
-            ""
-            if np.isfinite(table["tilt_survived_deg"][stands & (table["unproven"] == 0)]).all()
-            else "a tilt"
-        )
+        tilts = table["tilt_survived_deg"]  # one is finite where one is asked for
+        proven = (table["verdict"] == "stands") & (table["unproven"] == 0) & tilts.notna().any()
+        return "" if np.isfinite(tilts[proven]).all() else "a tilt"
     columns = [r.column for r in RESPONSES.values()]
     if not np.isfinite(table[columns].to_numpy(float)).all():
         return "a response is not finite"
