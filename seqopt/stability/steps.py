@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from concurrent.futures import Executor
 
 import pandas as pd
 
@@ -22,6 +23,7 @@ def assess_steps(
     mortar: Mortar | str,
     margins: Collection[str] = (),
     progress: Tell | None = None,
+    workers: int | Executor = 1,
 ) -> tuple[Stability, ...]:
     """Return whether every step stands, and the margins that are asked for.
 
@@ -36,6 +38,8 @@ def assess_steps(
         several times as long as a verdict.
     progress : callable, optional
         Told as a `seqopt.work.Stage` how far it is, step by step.
+    workers : int or concurrent.futures.Executor, optional
+        Processes to share the steps among, or any executor, which the caller ends.
 
     Returns
     -------
@@ -55,7 +59,8 @@ def assess_steps(
     ['stands', 'stands']
     """
     network, steps, asked = network_of(network), require_steps(steps), find_margins(margins)
-    found = each_stability(network, steps, find_mortar(mortar), asked)
+    shared = (None, workers) if isinstance(workers, int) else (workers, 1)
+    found = each_stability(network, steps, find_mortar(mortar), asked, shared=shared)
     told = with_progress("assessing steps", steps, progress)
     return tuple(result for result, _ in zip(found, told, strict=True))
 

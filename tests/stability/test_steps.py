@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -62,9 +63,11 @@ def test_what_fails_first_is_known_without_margins(network, steps):
 def test_shared_steps_have_the_same_rows(network):
     steps = seqopt.sequential(network)[:20]
     alone = [*each_stability(network, steps, EPOXY)]
-    shared = [*each_stability(network, steps, EPOXY, shared=(None, 2))]
-    verdicts = [[found.verdict for found in each] for each in (alone, shared)]
-    assert verdicts[0] == verdicts[1]
+    shared = assess_steps(network, steps, EPOXY, workers=2)
+    with ThreadPoolExecutor(2) as threads:
+        given = assess_steps(network, steps, EPOXY, workers=threads)
+    verdicts = [[found.verdict for found in each] for each in (alone, shared, given)]
+    assert verdicts[0] == verdicts[1] == verdicts[2]
     rows = [stability_row(*pair) for pair in zip(steps, shared, strict=True)]
     assert [row["step"] for row in rows] == [step.number for step in steps]
 
