@@ -8,6 +8,7 @@ from concurrent.futures import Executor
 import pandas as pd
 
 from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.errors import ProblemError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
@@ -49,6 +50,8 @@ def assess_steps(
     ------
     SceneError
         If bricks that share a joint do not touch, or there is no such margin.
+    ProblemError
+        If there cannot be so many workers.
 
     Examples
     --------
@@ -59,6 +62,8 @@ def assess_steps(
     ['stands', 'stands']
     """
     network, steps, asked = network_of(network), require_steps(steps), find_margins(margins)
+    if not (hasattr(workers, "submit") or (isinstance(workers, int) and workers > 0)):
+        raise ProblemError(f"workers is {workers!r}; give a whole number from 1, or an executor")
     shared = (None, workers) if isinstance(workers, int) else (workers, 1)
     found = each_stability(network, steps, find_mortar(mortar), asked, shared=shared)
     told = with_progress("assessing steps", steps, progress)

@@ -11,7 +11,7 @@ import pytest
 import seqopt
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY
-from seqopt.errors import SceneError
+from seqopt.errors import ProblemError, SceneError
 from seqopt.stability import assess
 from seqopt.stability._step_verdicts import each_stability, stability_row
 from seqopt.stability.assessment import MARGINS
@@ -78,6 +78,12 @@ def test_no_steps_and_no_such_margin():
     assert [*each_stability(network, (), DRY, shared=(None, 2))] == []
     with pytest.raises(SceneError, match=r"margin 'tillt' \(did you mean tilt\?\): give all"):
         assess_steps(network, (), DRY, ["tillt"])
+
+
+@pytest.mark.parametrize("workers", [0, "two", None])
+def test_workers_that_cannot_be(network, workers):
+    with pytest.raises(ProblemError, match=f"workers is {workers!r}; give a whole number from 1"):
+        assess_steps(network, (), DRY, workers=workers)
 
 
 def test_a_step_that_touches_nothing_is_not_called_standing(network, steps):
