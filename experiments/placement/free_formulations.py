@@ -27,7 +27,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.states.states import build_states
 from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation, formulation_names
 
-SIZES = ("chain7", "chain11", "chain15", "arch25", "chain49", "chain97", "chain145")
+SIZES = ("chain7", "chain11", "chain15", "arch25", "chain49", "chain97")
 AIMS = ("minmax,steps", "sum")
 PATIENCE, SHORT = 60.0, 5.0  # s after which one is stopped; below which it is run three times
 SEARCH, SLOWER = "schedule_search", {"flow_lp": 2.0, "flow_mip": 20.0}  # on so many bricks:
