@@ -133,8 +133,8 @@ def cure_words(case: Mapping[Any, Any]) -> str:
     bond, friction, node = case["bond_needed_Pa"], case["friction_needed"], case["grip_node"]
     enough = [f"a bond of {bond / 1e3:.3g} kPa"] if np.isfinite(bond) else []
     enough += [f"friction {friction:.3g}"] if np.isfinite(friction) else []
-    all_ = (
-        f"every step stands with {' or '.join(enough)}" if enough else "no bond or friction helps"
-    )
-    one = "" if pd.isna(node) else f"; one more robot at node {int(node)} would hold this step"
-    return f"{all_}{one}"
+    open_ = np.isnan([bond, friction]).any()
+    none = "what is enough is not proven" if open_ else "no bond or friction helps"
+    said = f"every step stands with {' or '.join(enough)}" if enough else none
+    more = "" if pd.isna(node) else f"; one more robot at node {int(node)} would hold this step"
+    return f"{said}{more}"

@@ -10,6 +10,7 @@ import pytest
 import seqopt
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar
 from seqopt.errors import SceneError
+from seqopt.report._failures import cure_words
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability._step_verdicts import step_verdicts
 from seqopt.stability.assessment import Verdict
@@ -121,3 +122,16 @@ def test_wrong_words(network, builds):
         failure_map(network.scene, builds, axis="wind")
     with pytest.raises(SceneError, match="mortar 'glue'"):
         failure_map(network.scene, builds, ["glue"])
+
+
+@pytest.mark.parametrize(
+    ("bond", "said"),
+    [
+        (2e3, "every step stands with a bond of 2 kPa"),
+        (np.inf, "no bond or friction helps"),
+        (np.nan, "what is enough is not proven"),
+    ],
+)
+def test_what_is_not_proven_is_not_called_impossible(bond, said):
+    case = {"bond_needed_Pa": bond, "friction_needed": np.inf, "grip_node": None}
+    assert cure_words(case) == said
