@@ -14,6 +14,7 @@ from seqopt.arrays import Floats, FrozenValue
 from seqopt.contact._elastic_limits import face_quadrature, find_elastic_limits
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import EPOXY
+from seqopt.engines._hands import read_hands
 from seqopt.engines._planar import _Plane
 from seqopt.engines.diagnosis import diagnose
 from seqopt.engines.discrete._equilibrium_path import settle
@@ -51,7 +52,8 @@ def values(arch25):
     grips = np.array([2])
     assembly = step_assembly(network, 2, (2, None, None))
     system = build_system(network, 2, EPOXY, None)
-    held = _held_nodes(network, system, grips, network.node_position[network.inner.ravel()[grips]])
+    nodes = network.node_position[network.inner.ravel()[grips]]
+    held = _held_nodes(network, system, grips, nodes, np.zeros((1, 3)))
     parts = ungripped_system(network, 2)
     proven = Prover(assembly, _compiled())(bonded(assembly, EPOXY))
     plane = _Plane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.eye(3)[[0, 2]])
@@ -70,7 +72,7 @@ def values(arch25):
         *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points, held),
         *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),
         *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, EPOXY)),
-        load_factor(assembly, EPOXY),
+        *(load_factor(assembly, EPOXY), read_hands(network, grips[None], np.ones((1, 1, 3)))),
         *_Known(assembly, bonded(assembly, EPOXY)).motions_of(np.ones((2, 6))),
         *(_HoldingForces(0.0, np.zeros(1)), first_directions(4, 1)),
         *each_verdict(network, sequential(network)[:1], EPOXY),

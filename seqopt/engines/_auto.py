@@ -16,10 +16,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt.arrays import Bools
+from seqopt.arrays import Bools, Floats
 from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
-from seqopt.engines._planar import find_plane, off_plane
+from seqopt.engines._hands import read_hands
+from seqopt.engines._planar import across_plane, find_plane, off_plane
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import (
     Fields,
@@ -70,7 +71,7 @@ class _RigidBricks(NamedEngine):
         if isinstance(plane, str):
             self.in_space = LevelChoice(Level.RIGID, plane)
         else:
-            self._plane = ComplianceEngine(self.network, plane.basis)
+            self._mirror, self._plane = plane, ComplianceEngine(self.network, plane.basis)
             self._flat = off_plane(self.network, plane) == 0
 
     @cached_property
@@ -78,21 +79,38 @@ class _RigidBricks(NamedEngine):
         """Where all grips lie in the plane, none is needed."""
         return ComplianceEngine(self.network)
 
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+    def solve(
+        self,
+        bricks: int,
+        grips: ArrayLike,
+        want: Want = Want.RESPONSES,
+        moved: ArrayLike | None = None,
+    ) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
         if not self._flat.any():
-            return self._space.solve(bricks, grips, want)
-        if self._flat.all():
+            return self._space.solve(bricks, grips, want, moved)
+        if self._flat.all() and moved is None:
             return self._plane.solve(bricks, grips, want)
-        flat, sets = self.lies_flat(bricks, grips), np.asarray(grips)
-        inside = self._plane.solve(bricks, sets[flat], want)
-        return merge_sets(flat, inside, self._space.solve(bricks, sets[~flat], want))
+        flat, sets = self.lies_flat(bricks, grips, moved), np.asarray(grips)
+        inside = self._plane.solve(bricks, sets[flat], want, _of(moved, flat))
+        if flat.all():
+            return inside
+        outside = self._space.solve(bricks, sets[~flat], want, _of(moved, ~flat))
+        return merge_sets(flat, inside, outside)
 
-    def lies_flat(self, bricks: int, grips: ArrayLike) -> Bools:
-        """Return which grip sets (S,) lie in the plane of the structure."""
-        if not self._flat.any() or self._flat.all():
+    def lies_flat(self, bricks: int, grips: ArrayLike, moved: ArrayLike | None = None) -> Bools:
+        """Return which grip sets (S,) lie in the plane of the structure, and stay in it."""
+        if not self._flat.any() or (self._flat.all() and moved is None):
             return np.full(len(np.asarray(grips)), self._flat[0])
-        return np.asarray(self._flat[grip_columns(self.network, bricks, grips)].all(axis=1))
+        columns = grip_columns(self.network, bricks, grips)
+        flat = np.asarray(self._flat[columns].all(axis=1))
+        hands = read_hands(self.network, columns, moved)
+        return flat if hands is None else flat & ~across_plane(self._mirror, hands.moved)
+
+
+def _of(moved: ArrayLike | None, which: Bools) -> Floats | None:
+    """Return how grips of some sets are moved."""
+    return None if moved is None else np.asarray(moved, dtype=float)[which]
 
 
 class AutoEngine(NamedEngine):
@@ -115,15 +133,23 @@ class AutoEngine(NamedEngine):
         except SceneError as error:
             self.unchecked = f"elastic limits are not checked: {error}"
 
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+    def solve(
+        self,
+        bricks: int,
+        grips: ArrayLike,
+        want: Want = Want.RESPONSES,
+        moved: ArrayLike | None = None,
+    ) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
         asked = want if self.limits is None else want | Want.JOINTS
-        fields, flat = self.rigid.solve(bricks, grips, asked), self.rigid.lies_flat(bricks, grips)
+        fields = self.rigid.solve(bricks, grips, asked, moved)
+        flat = self.rigid.lies_flat(bricks, grips, moved)
         beyond = np.zeros(len(flat), dtype=bool)
         if self.limits is not None:
             beyond = self.limits.exceeded(fields.joint_wrench)
         if beyond.any():
-            found = self._discrete.solve(bricks, np.asarray(grips)[beyond], asked)
+            sets, far = np.asarray(grips)[beyond], _of(moved, beyond)
+            found = self._discrete.solve(bricks, sets, asked, far)
             fields = merge_sets(beyond, keep_wanted(found, asked), select_sets(fields, ~beyond))
         in_space = self.rigid.in_space
         levels = (_IN_PLANE, flat & ~beyond), (in_space, ~flat & ~beyond), (_BEYOND, beyond)

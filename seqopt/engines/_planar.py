@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, FrozenValue
+from seqopt.engines._hands import read_hands
 from seqopt.engines.interface import Basis, Fields, NamedEngine, Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, SceneError
@@ -64,6 +65,12 @@ def off_plane(network: Network, plane: _Plane) -> Floats:
     away = plane.distance(inner)
     away[away <= _FLAT * np.ptp(inner, axis=0).max()] = 0.0
     return away
+
+
+def across_plane(plane: _Plane, moved: Floats) -> Bools:
+    """Return which grip sets (S,) are moved (S, r, 3) out of a plane, beyond rounding."""
+    out = np.abs(moved @ plane.normal).max(axis=1, initial=0.0)
+    return np.asarray(out > _FLAT * np.linalg.norm(moved, axis=2).max(axis=1, initial=0.0))
 
 
 def _normal(network: Network, spread: Floats) -> Floats:
@@ -154,14 +161,24 @@ class PlanarEngine(NamedEngine):
         plane = find_plane(self.network)
         if isinstance(plane, str):
             raise SceneError(f"{plane}; {_ELSE}")
-        self._away = off_plane(self.network, plane)
+        self._plane, self._away = plane, off_plane(self.network, plane)
         self._engine = ComplianceEngine(self.network, plane.basis)
 
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+    def solve(
+        self,
+        bricks: int,
+        grips: ArrayLike,
+        want: Want = Want.RESPONSES,
+        moved: ArrayLike | None = None,
+    ) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
-        away = self._away[grip_columns(self.network, bricks, grips)]
+        columns = grip_columns(self.network, bricks, grips)
+        hands = read_hands(self.network, columns, moved)
+        if hands is not None and across_plane(self._plane, hands.moved).any():
+            raise GripError(f"moved: a grip is moved out of the scene's plane; {_ELSE}")
+        away = self._away[columns]
         if away.any():
             node = np.asarray(grips).ravel()[away.argmax()]
             far = f"{1e3 * away.max():.3g} mm outside the scene's plane"
             raise GripError(f"grip on node {node}: it lies {far}; {_ELSE}")
-        return self._engine.solve(bricks, grips, want)
+        return self._engine.solve(bricks, grips, want, moved)

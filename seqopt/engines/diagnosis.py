@@ -21,6 +21,7 @@ from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
 from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.engines._hands import Hands, read_hands
 from seqopt.engines.interface import Engine, Fields, Want, grip_columns
 from seqopt.engines.rigid._mechanism import free_motion, ungripped_system
 from seqopt.engines.rigid._mixed import MixedSystem, mixed_system, solve_mixed
@@ -88,10 +89,10 @@ class _Residuals:
 
     ``equilibrium``: force or moment left on a brick over the largest sum of magnitudes on one;
     ``joints``: wrench of a joint less stiffness times deformation, over the sum of the magnitudes
-    in it, or over the weight of a brick where they are smaller; ``grips``: motion of a held node
-    over the largest motion of any brick, or over what the weight of a brick does to the stiffest
-    joint where all are smaller; ``plain``: stiffness times motions less load, over the load: no
-    measure of quality, shown to compare.
+    in it, or over the weight of a brick where they are smaller; ``grips``: what is between a held
+    node and its hand over the largest motion of any brick, or over what the weight of a brick does
+    to the stiffest joint where all are smaller; ``plain``: stiffness times motions less load, over
+    the load: no measure of quality, shown to compare.
     """
 
     equilibrium: float
@@ -105,7 +106,9 @@ class _Residuals:
         return max(self.equilibrium, self.joints, self.grips)
 
 
-def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> _Residuals:
+def residual(
+    network: Network, bricks: int, columns: Ints, fields: Fields, hands: Hands | None = None
+) -> _Residuals:
     """Return the residuals of the first grip set's fields, from the network alone."""
     springs, center = network.springs, network.centroid[:bricks]
     acting = springs.acting(bricks)
@@ -133,6 +136,8 @@ def residual(network: Network, bricks: int, columns: Ints, fields: Fields) -> _R
     owner = columns // 2
     grip = np.hstack([fields.grip_force[0], np.zeros((len(columns), 3))])
     still = _moved(twist[owner], node[columns] - center[owner]).sum(axis=0)[:, :3]
+    if hands is not None:
+        still = still - hands.moved[0]
     every = np.repeat(np.arange(bricks), 2)
     motion = np.abs(_moved(twist[every], node - center[every])[:, :, :3]).sum(axis=0).max()
     dead = np.hstack([network.weight[:bricks], np.zeros((bricks, 3))])
@@ -255,7 +260,9 @@ class Diagnosis(FrozenValue):
         return np.inf if self.residuals is None else self.residuals.backward_error
 
 
-def diagnose(source: Engine | Network, bricks: int, grips: ArrayLike) -> Diagnosis:
+def diagnose(
+    source: Engine | Network, bricks: int, grips: ArrayLike, moved: ArrayLike | None = None
+) -> Diagnosis:
     """Return whether one grip set is solved well, ill-conditioned or a mechanism.
 
     Parameters
@@ -266,6 +273,8 @@ def diagnose(source: Engine | Network, bricks: int, grips: ArrayLike) -> Diagnos
         How many bricks stand.
     grips : (r,) int
         Node numbers.
+    moved : (r, 3) float, optional
+        How far each grip is from where it should be, m, as engines take it.
 
     Returns
     -------
@@ -279,6 +288,8 @@ def diagnose(source: Engine | Network, bricks: int, grips: ArrayLike) -> Diagnos
     network = source if isinstance(source, Network) else source.network
     numbers = np.array(grips, dtype=np.int64).reshape(1, -1)
     columns = grip_columns(network, bricks, numbers)
+    far = None if moved is None else np.array(moved, dtype=float)[None]
+    hands = read_hands(network, columns, far)
     lowest, condition, mode = _spectrum(network, bricks, columns[0])
     free = free_motion(network, bricks, columns[0]) if lowest < _LOOKED_INTO else None
     if free is not None:
@@ -286,10 +297,12 @@ def diagnose(source: Engine | Network, bricks: int, grips: ArrayLike) -> Diagnos
     residuals, refusal = None, None
     try:
         if isinstance(source, Network):
-            fields = solve_mixed(network, bricks, columns)
-        else:
+            fields = solve_mixed(network, bricks, columns, hands)
+        elif far is None:
             fields = source.solve(bricks, numbers, Want.JOINTS | Want.BRICKS)
-        residuals = residual(network, bricks, columns[0], fields)
+        else:
+            fields = source.solve(bricks, numbers, Want.JOINTS | Want.BRICKS, far)
+        residuals = residual(network, bricks, columns[0], fields, hands)
     except (MechanismError, SolverError) as error:
         refusal = error
     finding, reason = _judge(lowest, condition, residuals, refusal)

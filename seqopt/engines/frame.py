@@ -17,6 +17,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Floats, Ints
+from seqopt.engines._hands import Hands
 from seqopt.engines.interface import Fields, SerialEngine
 from seqopt.engines.rigid._mechanism import require_resistance
 from seqopt.errors import SolverError
@@ -45,12 +46,16 @@ class FrameEngine(SerialEngine):
         super().__init__(network)
         self._contrast = contrast
 
-    def _answers(self, bricks: int, columns: Ints) -> Iterable[Fields]:
-        return [_solve_one(self.network, bricks, row, self._contrast) for row in columns]
+    def _answers(self, bricks: int, columns: Ints, hands: Hands | None) -> Iterable[Fields]:
+        far = np.zeros((*columns.shape, 3)) if hands is None else hands.moved
+        pairs = zip(columns, far, strict=True)
+        return [_solve_one(self.network, bricks, *each, self._contrast) for each in pairs]
 
 
-def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) -> Fields:
-    """Return the fields of one model."""
+def _solve_one(
+    network: Network, bricks: int, columns: Ints, moved: Floats, contrast: float
+) -> Fields:
+    """Return the fields of one model, whose held nodes are moved (r, 3)."""
     edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
     split, deformation, stiffness = _frame(network, bricks, contrast)
     load = np.zeros((deformation.shape[1] // 6, 6))
@@ -62,6 +67,7 @@ def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) ->
     free[base] = False
     free[held, :3] = False
     unknown, motion = np.flatnonzero(free), _moved_ground(network, base, load.shape)
+    motion[(6 * held[:, None] + np.arange(3)).ravel()] = moved.ravel()
     reduced, strain = deformation[:, unknown], deformation @ motion
     examine = partial(require_resistance, network, bricks, columns)
     pull = load.ravel()[unknown]
@@ -75,14 +81,14 @@ def _solve_one(network: Network, bricks: int, columns: Ints, contrast: float) ->
     halves, own = stress[-6 * len(split) :].reshape(2, len(split), 3)[:, mine], which[mine]
     wrench = np.zeros((len(springs.since), 6))
     wrench[own] = -np.einsum("hsk,ski->shi", halves, springs.axes[own]).reshape(-1, 6)
-    moved = motion.reshape(load.shape)
+    shift = motion.reshape(load.shape)
     return Fields(
         edge_force=stress[None, :edges],
-        displacement=moved[None, :nodes, :3],
+        displacement=shift[None, :nodes, :3],
         grip_force=reaction[None, held, :3],
         support=(of_end @ reaction[base])[None],
         joint_wrench=wrench[None],
-        brick_twist=moved[network.inner[:bricks]].mean(axis=1)[None],
+        brick_twist=shift[network.inner[:bricks]].mean(axis=1)[None],
     )
 
 

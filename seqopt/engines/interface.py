@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from scipy import linalg
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
+from seqopt.engines._hands import Hands, read_hands
 from seqopt.errors import GripError, SolverError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
@@ -120,7 +121,13 @@ class Engine(Protocol):
     def network(self) -> Network:
         """The network whose nodes and edges the fields follow."""
 
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+    def solve(
+        self,
+        bricks: int,
+        grips: ArrayLike,
+        want: Want = Want.RESPONSES,
+        moved: ArrayLike | None = None,
+    ) -> Fields:
         """Return the fields of a partial structure for many grip sets.
 
         Parameters
@@ -131,6 +138,11 @@ class Engine(Protocol):
             Numbers of the nodes that each set holds.
         want : Want, optional
             Which fields are evaluated; an engine may evaluate others too.
+        moved : (S, r, 3) float, optional
+            How far each grip is from where it should be, along the scene's axes, m; nowhere by
+            default. A rigid grip moves its node as far. Fields are linear in it, beside those that
+            the weight makes. Two rigid grips on one brick cannot stretch it: along the brick, both
+            of its nodes go halfway between.
 
         Returns
         -------
@@ -139,7 +151,8 @@ class Engine(Protocol):
         Raises
         ------
         GripError
-            If a grip set names an unknown, blocked, unplaced or repeated node.
+            If a grip set names an unknown, blocked, unplaced or repeated node, or ``moved`` is not
+            as many lengths.
         MechanismError
             If bricks, joints and grips leave a motion that nothing resists.
         SolverError
@@ -291,13 +304,20 @@ class SerialEngine(NamedEngine, ABC):
     """
 
     @failing_in_a_line()
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+    def solve(
+        self,
+        bricks: int,
+        grips: ArrayLike,
+        want: Want = Want.RESPONSES,
+        moved: ArrayLike | None = None,
+    ) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self.network, bricks, grips)
+        hands = read_hands(self.network, columns, moved)
         none = no_sets(self.network, bricks, columns.shape[1])
-        answer = join_sets([none, *self._answers(bricks, columns)])
+        answer = join_sets([none, *self._answers(bricks, columns, hands)])
         return require_finite(answer, bricks, grips)
 
     @abstractmethod
-    def _answers(self, bricks: int, columns: Ints) -> Iterable[Fields]:
+    def _answers(self, bricks: int, columns: Ints, hands: Hands | None) -> Iterable[Fields]:
         """Return the fields of every grip set by itself."""

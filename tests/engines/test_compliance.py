@@ -169,7 +169,7 @@ def test_what_is_only_compared_is_corrected_once_and_right_to_six_digits(monkeyp
 
     class Counted(_Corrector):
         def _correction(self, *arguments):
-            made.append(len(arguments[0]))
+            made.append(len(arguments[0].columns))
             return super()._correction(*arguments)
 
     monkeypatch.setattr("seqopt.engines.rigid._refinement._Corrector", Counted)

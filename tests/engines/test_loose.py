@@ -20,7 +20,13 @@ from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mechanism import require_resistance, ungripped_system
 from seqopt.engines.rigid._mixed import solve_dense, solve_mixed
 from seqopt.engines.rigid._operator import OperatorBuilder
-from seqopt.engines.rigid._refinement import Refinement, _Corrector, _held_operator, _hold_loose
+from seqopt.engines.rigid._refinement import (
+    Refinement,
+    _Asked,
+    _Corrector,
+    _held_operator,
+    _hold_loose,
+)
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.graph.layers.layers import candidate_layers
@@ -228,7 +234,9 @@ def test_the_first_correction_is_the_error(arch25):
     index = operator.load_index(columns := grip_columns(net, 20, [[7, 20, 33]]))
     right = refinement.grip_forces(operator, columns, index).force
     wrong = right * (1 + 1e-6)
-    change, more = better._correction(columns, index, better._states(index, wrong), wrong)
+    change, more = better._correction(
+        _Asked(columns, index, None), better._states(index, wrong), wrong
+    )
     assert wrong + more == pytest.approx(right, rel=1e-12)
     assert np.abs(more).max() == pytest.approx(1e-6 * np.abs(right).max(), rel=1e-3)
     left = better._states(index, wrong) + change - better._states(index, right)

@@ -30,19 +30,35 @@ class Held(FrozenValue):
     system: System
     free: sparse.csr_array  # (6n, m); motions that the grips leave
     pads: sparse.csr_array  # (6n, 6n); stiffness of grips that give way
+    far: Floats  # (6n,); how grips move the bodies that they hold, all the way
+    pull: Floats  # (6n,); how grips that give way pull at bodies that stay, all the way
 
-    def reaction(self, motion: Floats, force: Floats, load: Floats) -> Floats:
+    def moved(self, motion: Floats, share: float = 1.0) -> Floats:
+        """Return how bodies move (6n,). ``motion`` (m,): in the free motions; ``share``: of it."""
+        return np.asarray(self.free @ motion + share * self.far)
+
+    def reaction(self, motion: Floats, force: Floats, share: float = 1.0) -> Floats:
         """Return what is not balanced on the bodies (6n,): what the grips must take.
 
-        ``motion`` (m,): in the free motions; ``force`` (P, 3): of the points, N; ``load`` (6n,).
+        ``motion`` (m,): in the free motions; ``force`` (P, 3): of the points, N; ``share``: of the
+        load, and of the ways of grips.
         """
-        system = self.system
+        system, moved = self.system, self.moved(motion, share)
         carried = system.gap.T @ system.bed_wrenches(force).ravel()
-        return np.asarray(load + carried - (system.layers + self.pads) @ (self.free @ motion))
+        given = share * (system.load + self.pull)
+        return np.asarray(given + carried - (system.layers + self.pads) @ moved)
+
+    def openings(self, motion: Floats, share: float) -> Floats:
+        """Return the openings (P, 3) of the points; as of `reaction`."""
+        return self.system.openings(self.across @ motion + share * self._taken, share)
+
+    @cached_property
+    def _taken(self) -> Floats:
+        return frozen(np.asarray(self.system.gap @ self.far))
 
     def rounding(self, motion: Floats, force: Floats) -> float:
         """Return what rounding leaves of a balance between large forces, N."""
-        moved = np.abs(self.free @ motion)
+        moved = np.abs(self.moved(motion))
         return _ROUNDING * float((self._sizes @ moved).max() + np.abs(force).sum())
 
     @cached_property
@@ -169,9 +185,9 @@ def _newton(held: Held, state: Settled, share: float, resistance: float) -> Sett
     drag = np.maximum(resistance, _LENT_STIFFNESS) * held.diagonal
     step, best = np.zeros_like(motion), np.inf
     for _ in range(_ITERATIONS):
-        opening = system.openings(held.across @ motion, share)
+        opening = held.openings(motion, share)
         force, slope = system.points.forces(opening, state.slip, state.broken)
-        left = held.free.T @ held.reaction(motion, force, share * system.load)
+        left = held.free.T @ held.reaction(motion, force, share)
         missing = left - resistance * held.diagonal * (motion - state.motion)
         size = np.linalg.norm(missing)
         unit = max(system.scale, held.rounding(motion, force) / _BALANCED)

@@ -23,6 +23,7 @@ from scipy import linalg, sparse
 
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.mortar import EPOXY, Mortar
+from seqopt.engines._hands import Hands
 from seqopt.engines.discrete._equilibrium_path import Held, Settled, settle
 from seqopt.engines.discrete._system import BedStiffness, System, build_system
 from seqopt.engines.interface import Fields, SerialEngine
@@ -91,21 +92,23 @@ class DiscreteEngine(SerialEngine):
         self._mortar, self._bed, self._pinch = mortar, bed, pinch
         self._systems: dict[int, System] = {}
 
-    def _answers(self, bricks: int, columns: Ints) -> Iterable[Fields]:
+    def _answers(self, bricks: int, columns: Ints, hands: Hands | None) -> Iterable[Fields]:
         for row in columns:
             require_resistance(self.network, bricks, row)
         if bricks not in self._systems:
             self._systems[bricks] = build_system(self.network, bricks, self._mortar, self._bed)
-        return [self._solve_one(self._systems[bricks], row) for row in columns]
+        far = np.zeros((*columns.shape, 3)) if hands is None else hands.moved
+        each = zip(columns, far, strict=True)
+        return [self._solve_one(self._systems[bricks], *one) for one in each]
 
-    def _solve_one(self, system: System, columns: Ints) -> Fields:
-        """Return the fields of one grip set."""
+    def _solve_one(self, system: System, columns: Ints, far: Floats) -> Fields:
+        """Return the fields of one grip set, moved (r, 3)."""
         network, pinch, inner = self._network, self._pinch, self._network.inner.ravel()[columns]
         nodes = network.node_position[inner]
         if pinch is None:
-            held = _held_nodes(network, system, columns, nodes)
+            held = _held_nodes(network, system, columns, nodes, far)
         else:
-            held = _pinched(network, system, columns, nodes, pinch)
+            held = _pinched(network, system, columns, far, pinch)
         found = settle(held)
         if not found.rests:
             raise _not_at_rest(network, held, found, inner)
@@ -116,7 +119,7 @@ def _not_at_rest(network: Network, held: Held, found: Settled, nodes: Ints) -> S
     """Return the error of a structure that did not come to rest: it went, or was not followed."""
     system = held.system
     if held.gone(found):
-        moved = system.unit * (held.free @ found.motion)
+        moved = system.unit * held.moved(found.motion)
         said = "joints open or slip and brick {brick} becomes unstable; add a grip, a bond or "
         return mechanism_error(network, moved[: 6 * system.bricks], said + "friction")
     names = ", ".join(str(network.node_name[n]) for n in nodes) or "nothing"
@@ -126,25 +129,34 @@ def _not_at_rest(network: Network, held: Held, found: Settled, nodes: Ints) -> S
     )
 
 
-def _held_nodes(network: Network, system: System, columns: Ints, nodes: Floats) -> Held:
-    """Return a system whose held nodes stand still, at (r, 3)."""
-    blocks = [np.eye(6)] * (len(system.load) // 6)
+def _held_nodes(
+    network: Network, system: System, columns: Ints, nodes: Floats, far: Floats
+) -> Held:
+    """Return a system whose held nodes, at (r, 3), are moved as far (r, 3)."""
+    blocks, taken = [np.eye(6)] * (len(system.load) // 6), np.zeros_like(system.load)
     for body in np.unique(columns // 2):
-        moved = point_motion(nodes[columns // 2 == body] - network.centroid[body]).reshape(-1, 6)
-        blocks[body] = linalg.null_space(moved * system.unit[:6])
+        mine = columns // 2 == body
+        moved = point_motion(nodes[mine] - network.centroid[body]).reshape(-1, 6)
+        moved *= system.unit[:6]
+        blocks[body] = linalg.null_space(moved)
+        taken[6 * body : 6 * body + 6] = np.linalg.lstsq(moved, far[mine].ravel(), rcond=None)[0]
     free = sparse.csr_array(sparse.block_diag([sparse.csr_array(block) for block in blocks]))
-    return Held(system, free, sparse.csr_array(system.layers.shape))
+    return Held(system, free, sparse.csr_array(system.layers.shape), taken, np.zeros_like(taken))
 
 
-def _pinched(network: Network, system: System, columns: Ints, nodes: Floats, pinch: Pinch) -> Held:
-    """Return a system whose held bricks are pinched between pads beside their nodes (r, 3)."""
+def _pinched(network: Network, system: System, columns: Ints, far: Floats, pinch: Pinch) -> Held:
+    """Return a system whose held bricks are pinched between pads, which are moved (r, 3)."""
     blocks = [sparse.csr_array((6, 6))] * (len(system.load) // 6)
-    units = np.outer(system.unit[:6], system.unit[:6])
-    for body, node in zip(columns // 2, nodes, strict=True):
-        pads = _pad_stiffness(network, body, node, pinch) * units
+    units, pull = np.outer(system.unit[:6], system.unit[:6]), np.zeros_like(system.load)
+    inner = network.node_position[network.inner.ravel()]
+    for column, moved in zip(columns, far, strict=True):
+        body = column // 2
+        pads = _pad_stiffness(network, body, inner[column], pinch) * units
         blocks[body] = blocks[body] + sparse.csr_array(pads)
+        pull[6 * body : 6 * body + 6] += pads[:, :3] @ (moved / system.unit[:3])
     every = sparse.eye_array(len(system.load), format="csr")
-    return Held(system, every, sparse.csr_array(sparse.block_diag(blocks, format="csr")))
+    pads_of = sparse.csr_array(sparse.block_diag(blocks, format="csr"))
+    return Held(system, every, pads_of, np.zeros_like(pull), pull)
 
 
 def _fields(network: Network, held: Held, found: Settled, columns: Ints, nodes: Floats) -> Fields:
@@ -153,10 +165,10 @@ def _fields(network: Network, held: Held, found: Settled, columns: Ints, nodes: 
     Two grips on one brick share so that their forces are as small as can be; what pads exert
     beside a force, a moment, belongs to no node.
     """
-    system, moved = held.system, held.free @ found.motion
+    system, moved = held.system, held.moved(found.motion)
     wrench = np.zeros((len(network.springs.since), 6))
     wrench[system.acting] = system.bed_wrenches(found.force)
-    exerted = -held.reaction(found.motion, found.force, system.load) - held.pads @ moved
+    exerted = -held.reaction(found.motion, found.force) - held.pads @ moved + held.pull
     force = np.zeros((len(columns), 3))
     for body in np.unique(columns // 2):
         mine, rows = np.flatnonzero(columns // 2 == body), slice(6 * body, 6 * body + 6)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints, frozen
+from seqopt.engines._hands import Hands
 from seqopt.engines.rigid._operator import ComplianceOperator
 
 
@@ -93,37 +94,55 @@ def _couples(grips: int) -> Ints:
 
 
 def grip_forces(
-    operator: ComplianceOperator, columns: Ints, index: Ints, pairs: Pairs | None = None
+    operator: ComplianceOperator,
+    columns: Ints,
+    index: Ints,
+    pairs: Pairs | None = None,
+    hands: Hands | None = None,
 ) -> _GripForces:
-    """Return the forces with which grips hold their nodes still.
+    """Return the forces with which grips hold their nodes still, or where hands are.
 
     Two grips on one rigid brick leave the force between them along the brick undetermined:
     `share_pairs` says how they share it.
 
     ``index`` (S, k): the loads at the grips, from `ComplianceOperator.load_index`; ``pairs``: of
-    the sets, if they are known.
+    the sets, if they are known; ``hands``: in the operator's directions.
     """
     pairs = pairs_of(operator, columns) if pairs is None else pairs
     rows = np.ascontiguousarray(index.T)
-    force, pivot = _solved(operator, pairs, rows, operator.dead_displacement.take(rows))
+    dead = operator.dead_displacement.take(rows)
+    if hands is not None:
+        dead[: len(dead) - operator.loose] -= _in_rows(hands.moved)
+    force, pivot = _solved(operator, pairs, rows, dead)
     return _GripForces(force.T, pivot)
 
 
-def trusted(operator: ComplianceOperator, index: Ints, found: _GripForces, most: float) -> Bools:
+def trusted(
+    operator: ComplianceOperator,
+    index: Ints,
+    found: _GripForces,
+    most: float,
+    hands: Hands | None = None,
+) -> Bools:
     """Return which sets' forces (S,) rounding changes little enough.
 
-    ``most``: largest of `_doubts` that is accepted.
+    ``most``: largest of `_doubts` that is accepted; ``hands``: as of `grip_forces`.
     """
     lowest = found.lowest
-    out = np.asarray(most * lowest >= len(found.pivot) * operator.worst_doubt)
+    out = np.zeros(len(lowest), dtype=bool)
+    if hands is None:  # where hands move, forces may undo what the weight does
+        out = np.asarray(most * lowest >= len(found.pivot) * operator.worst_doubt)
     rest = np.flatnonzero(~out & (lowest > 0))
     if rest.size:
         part = _GripForces(found.force[rest], found.pivot[:, rest])
-        out[rest] = _doubts(operator, index[rest], part) <= most
+        own = None if hands is None else hands.of(rest)
+        out[rest] = _doubts(operator, index[rest], part, own) <= most
     return out
 
 
-def _doubts(operator: ComplianceOperator, index: Ints, found: _GripForces) -> Floats:
+def _doubts(
+    operator: ComplianceOperator, index: Ints, found: _GripForces, hands: Hands | None = None
+) -> Floats:
     """Return the error (S,) of forces for rounding of one part in one, over the largest of each.
 
     A displacement is known to a share of all that adds up in it; with ``|G_ij| ≤ √(G_ii G_jj)``
@@ -134,10 +153,18 @@ def _doubts(operator: ComplianceOperator, index: Ints, found: _GripForces) -> Fl
     root, own, scale = operator.shares.take(np.ascontiguousarray(index.T), axis=1)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         own += (root * size).sum(axis=0)
+        if hands is not None:
+            nodes = len(own) - operator.loose
+            own[:nodes] += np.abs(_in_rows(hands.moved)) / root[:nodes]
         own *= scale
         own /= found.pivot
         most = size.max(axis=0, initial=np.finfo(float).tiny)
         return np.asarray(own.max(axis=0, initial=0.0) / most)
+
+
+def _in_rows(moved: Floats) -> Floats:
+    """Return what hands move (S, r, d) as rows (rd, S)."""
+    return np.ascontiguousarray(moved.reshape(len(moved), moved.shape[1] * moved.shape[2]).T)
 
 
 def still_forces(operator: ComplianceOperator, columns: Ints, index: Ints, moved: Floats) -> Floats:

@@ -24,6 +24,7 @@ from scipy import linalg, sparse
 from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.engines._hands import Hands
 from seqopt.engines.interface import Fields, join_sets, no_sets
 from seqopt.engines.rigid._mechanism import (
     RigidStructure,
@@ -180,7 +181,7 @@ _EMPTY = 1e-6  # forces this small beside the moments over a brick's length are 
 _LIGHT = 1e-3  # nor what is this small beside the weight, or the motion it makes at a typical joint
 
 
-def solve_mixed(network: Network, bricks: int, columns: Ints) -> Fields:
+def solve_mixed(network: Network, bricks: int, columns: Ints, hands: Hands | None = None) -> Fields:
     """Return the fields of grip sets, one factorization for each.
 
     A mechanism that no load excites passes: `seqopt.engines.rigid._mechanism.require_resistance`
@@ -188,26 +189,33 @@ def solve_mixed(network: Network, bricks: int, columns: Ints) -> Fields:
     """
     parts = ungripped_system(network, bricks)
     answers = [no_sets(network, bricks, columns.shape[1])]
-    for grips in columns:
-        solution = solve_load(parts, grips, parts.load, parts.moved)
+    for i, grips in enumerate(columns):
+        own = None if hands is None else hands.of(slice(i, i + 1))
+        solution = solve_load(parts, grips, parts.load, parts.moved, own)
         answers.append(respond(network, parts.statics, parts.motion, grips[None], solution))
     return join_sets(answers)
 
 
 def solve_load(
-    parts: Ungripped, grips: Ints, pull: Floats, moved: Floats | float = 0.0
+    parts: Ungripped,
+    grips: Ints,
+    pull: Floats,
+    moved: Floats | float = 0.0,
+    hands: Hands | None = None,
 ) -> Solution:
     """Return how a partial structure answers to a load while a grip set holds its nodes still.
 
-    ``pull`` (6b,), ``moved`` (6s,): as ``load`` and ``moved`` of the parts. Raises `MechanismError`
-    if a motion that the load excites meets no resistance; `SolverError` if the answer still changes
-    by more than `LAST_CORRECTION`.
+    ``pull`` (6b,), ``moved`` (6s,): as ``load`` and ``moved`` of the parts; ``hands``: of this set,
+    if they move. Raises `MechanismError` if a motion that the load excites meets no resistance;
+    `SolverError` if the answer still changes by more than `LAST_CORRECTION`.
     """
     network, bricks = parts.network, parts.bricks
     system = mixed_system(parts, grips)
     joints, last = len(parts.wrench_unit), len(parts.wrench_unit) + len(parts.twist_unit)
     load = np.zeros(system.matrix.shape[0])
     load[:joints], load[joints:last] = moved, pull
+    if hands is not None:
+        load[last:] = system.force.T @ hands.moved.ravel()
     try:
         factors = splu(system.matrix)
     except RuntimeError as error:
@@ -252,19 +260,21 @@ def _sizes(parts: Ungripped, states: Floats) -> Floats:
 _BACKWARD = 1e-10  # largest backward error of an accepted solution
 
 
-def solve_dense(network: Network, bricks: int, columns: Ints) -> Fields:
+def solve_dense(network: Network, bricks: int, columns: Ints, hands: Hands | None = None) -> Fields:
     """Return the fields of grip sets from the stiffness matrix of each.
 
     Raises `MechanismError` if nothing resists a motion; `SolverError` if a motion is resisted too
     little for the assembled stiffness to tell, or the backward error is larger than `_BACKWARD`.
     """
     parts = rigid_structure(network, bricks)
-    answers = [_solve_one_dense(network, parts, grips) for grips in columns]
+    far = np.zeros((*columns.shape, 3)) if hands is None else hands.moved
+    each = zip(columns, far, strict=True)
+    answers = [_solve_one_dense(network, parts, *one) for one in each]
     return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
 
 
-def _solve_one_dense(network: Network, parts: RigidStructure, grips: Ints) -> Fields:
-    """Return the fields of one grip set."""
+def _solve_one_dense(network: Network, parts: RigidStructure, grips: Ints, far: Floats) -> Fields:
+    """Return the fields of one grip set, whose nodes are moved (r, 3)."""
     bricks = len(parts.matrix) // 6
     pull = parts.inner_motion.T @ network.inner_weight[: 2 * bricks].ravel()
     pull += network.applied(bricks).ravel()
@@ -275,12 +285,15 @@ def _solve_one_dense(network: Network, parts: RigidStructure, grips: Ints) -> Fi
     if lost_to_rounding(values):
         require_resistance(network, bricks, grips)
         raise SolverError(f"direct solve of {bricks} bricks: too close to a mechanism")
-    target = motions.T @ pull
+    taken = np.zeros_like(pull)
+    if far.any():
+        taken = np.asarray(np.linalg.lstsq(forbidden, far.ravel(), rcond=None)[0])
+    target = motions.T @ (pull - parts.matrix @ taken)
     answer = vectors @ (vectors.T @ target / values)
     residual = np.abs(motions.T @ (parts.matrix @ (motions @ answer)) - target).max()
     if not residual <= _BACKWARD * (values[-1] * np.abs(answer).max() + np.abs(target).max()):
         raise SolverError(f"direct solve of {bricks} bricks: backward error too large")
-    twist = motions @ answer
+    twist = motions @ answer + taken
     wrench = np.zeros((len(network.springs.since), 6))
     wrench[parts.acting] = -np.einsum("sij,sjk,k->si", parts.stiffness, parts.gap, twist)
     wrench[parts.acting] += np.einsum("sij,sj->si", parts.stiffness, moved)

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -29,6 +30,7 @@ from scipy.sparse import csgraph
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.engines._hands import Hands
 from seqopt.engines.interface import SPACE, Basis, Fields, join_sets, merge_sets, no_sets
 from seqopt.engines.rigid._grip_equations import grip_forces, still_forces
 from seqopt.engines.rigid._mechanism import Shared, Ungripped, require_resistance, ungripped_system
@@ -238,20 +240,35 @@ class Refinement:
         operator: ComplianceOperator | None = None,
         largest: float = LAST_CORRECTION,
         basis: Basis = SPACE,
+        hands: Hands | None = None,
     ) -> Fields:
         """Return all fields of grip sets.
 
         ``operator``: with wrenches and twists, if there is one for these grips; it serves if
         nothing is loose. ``largest``: correction of a set after which it needs no other, over the
         largest of each kind. ``basis``: the directions that the operator knows; in the others
-        nothing may move.
+        nothing may move. ``hands``: of the sets, in all of space.
         """
-        starts = range(0, len(columns), _TOGETHER)
+        every = [slice(i, i + _TOGETHER) for i in range(0, len(columns), _TOGETHER)]
         if operator is None or self.held.loose:
             operator, basis = self.own, SPACE
         corrector = _Corrector(self, operator, largest, basis)
-        parts = (corrector.together(columns[i : i + _TOGETHER]) for i in starts)
+        own = [None if hands is None else hands.of(part) for part in every]
+        parts = (corrector.together(columns[p], h) for p, h in zip(every, own, strict=True))
         return join_sets([no_sets(self.network, self.bricks, columns.shape[1]), *parts])
+
+
+class _Asked(NamedTuple):
+    """Grip sets that are corrected together."""
+
+    columns: Ints  # (S, r)
+    loads: Ints  # (S, k); rows of the operator's loads at the grips
+    hands: Hands | None  # in the operator's directions
+
+    def of(self, which: Ints) -> _Asked:
+        """Return some of the sets."""
+        hands = None if self.hands is None else self.hands.of(which)
+        return _Asked(self.columns[which], self.loads[which], hands)
 
 
 class _Corrector:
@@ -268,17 +285,18 @@ class _Corrector:
         self.held, self.inner, self.pulls = system.held, system.inner, system.pulls
         self.operator, self.largest, self.basis = operator, largest, basis
 
-    def together(self, columns: Ints) -> Fields:
+    def together(self, columns: Ints, hands: Hands | None = None) -> Fields:
         """Return the fields of a few sets."""
         operator, parts, bricks = self.operator, self.parts, self.bricks
         index = operator.load_index(columns)
-        found = grip_forces(operator, columns, index)
+        own = None if hands is None else hands.within(self.basis.force)
+        found = grip_forces(operator, columns, index, hands=own)
         if operator.loose:
             for row in columns[~(found.lowest >= _HARDLY_HELD)]:
                 require_resistance(self.network, bricks, row)
         states = self._states(index, found.force)
         force = self._in_space(found.force, columns.shape[1])
-        done = self._correct(columns, index, states, force)
+        done = self._correct(_Asked(columns, index, own), states, force)
         wrench, twist = unscaled(parts, states[done])
         held = force[done].reshape(int(done.sum()), columns.shape[1], 3)
         solution = Solution(twist, wrench, held)
@@ -286,7 +304,8 @@ class _Corrector:
         fields = respond(self.network, parts.statics, motion, columns[done], solution)
         if done.all():
             return fields
-        return merge_sets(done, fields, solve_mixed(self.network, bricks, columns[~done]))
+        rest = None if hands is None else hands.of(~done)
+        return merge_sets(done, fields, solve_mixed(self.network, bricks, columns[~done], rest))
 
     def _states(self, index: Ints, force: Floats, weight: float = 1.0) -> Floats:
         """Return the scaled answers (S, n) to forces (S, k) at loads, and the weight or none."""
@@ -302,29 +321,27 @@ class _Corrector:
         nodes = force[:, : grips * width].reshape(len(force), grips, width)
         return np.asarray(nodes @ self.basis.force).reshape(len(force), 3 * grips)
 
-    def _correct(self, columns: Ints, index: Ints, states: Floats, force: Floats) -> Bools:
+    def _correct(self, asked: _Asked, states: Floats, force: Floats) -> Bools:
         """Correct answers in place until they no longer change; return which have come so far.
 
         ``states`` (S, n): scaled wrenches and twists; ``force`` (S, 3r): of the grips.
         """
-        done = np.zeros(len(columns), dtype=bool)
+        done = np.zeros(len(asked.columns), dtype=bool)
         left = np.flatnonzero(np.isfinite(states).all(axis=1))
         for _ in range(_STEPS):
             if not len(left):
                 break
             before = states[left]
-            change, more = self._correction(columns[left], index[left], before, force[left])
+            change, more = self._correction(asked.of(left), before, force[left])
             states[left] += change
             force[left] += more
             done[left] = unchanged(self.parts, before, change, self.largest)
             left = left[~done[left] & np.isfinite(change).all(axis=1)]
         return done
 
-    def _correction(
-        self, columns: Ints, index: Ints, states: Floats, force: Floats
-    ) -> tuple[Floats, Floats]:
+    def _correction(self, asked: _Asked, states: Floats, force: Floats) -> tuple[Floats, Floats]:
         """Return what must be added to scaled answers (S, n) and grip forces (S, 3r)."""
-        operator, parts = self.operator, self.parts
+        operator, parts, columns = self.operator, self.parts, asked.columns
         joints, grips = len(parts.wrench_unit), columns.shape[1]
         at = (3 * columns[:, :, None] + np.arange(3)).reshape(force.shape)
         pulled = loads_of(at, force, 6 * self.bricks + 1).matrix @ self.pulls
@@ -337,8 +354,10 @@ class _Corrector:
         if operator.loose:
             moved += loose @ operator.flexibility[-operator.loose :, : -operator.loose]
         at_grips = np.take_along_axis(moved, at, axis=1).reshape(-1, 3) @ self.basis.force.T
+        if asked.hands is not None:
+            at_grips -= asked.hands.moved.reshape(at_grips.shape)
         moved = np.hstack([at_grips.reshape(len(moved), -1), -pull])
-        change = still_forces(operator, columns, index, moved)
+        change = still_forces(operator, columns, asked.loads, moved)
         more = self._in_space(change, grips)
         change[:, change.shape[1] - operator.loose :] += loose
-        return answer + self._states(index, change, 0.0), more
+        return answer + self._states(asked.loads, change, 0.0), more

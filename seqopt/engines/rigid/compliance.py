@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.engines._hands import Hands, read_hands
 from seqopt.engines.interface import (
     SHAPES,
     SPACE,
@@ -78,21 +79,28 @@ class _Tried:
 
 
 def _try_forces(
-    operator: ComplianceOperator, columns: Ints, *, even: bool, accuracy: float
+    operator: ComplianceOperator,
+    columns: Ints,
+    hands: Hands | None = None,
+    *,
+    even: bool,
+    accuracy: float,
 ) -> _Tried:
     """Return what an operator alone says about grip sets, and which of them it answers well enough.
 
-    ``even``: whether the joints are about equally stiff: where not, pivots do not tell the whole
-    error; ``accuracy``: largest error of fields, over the largest entry of each, that is accepted.
+    ``hands``: in the operator's directions; ``even``: whether the joints are about equally stiff:
+    where not, pivots do not tell the whole error; ``accuracy``: largest error of fields, over the
+    largest entry of each, that is accepted.
     """
     sets, index, pairs = len(columns), operator.load_index(columns), pairs_of(operator, columns)
     force, good = np.empty(index.shape), np.empty(sets, dtype=bool)
     for start in range(0, sets, _CHUNK):
         part = slice(start, start + _CHUNK)
         mine = pairs if sets <= _CHUNK else pairs.within(start, start + _CHUNK)
-        found = grip_forces(operator, columns[part], index[part], mine)
+        own = None if hands is None else hands.of(part)
+        found = grip_forces(operator, columns[part], index[part], mine, own)
         force[part] = found.force
-        good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN)
+        good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN, own)
     force[~good] = 0.0
     if not even:
         good &= ~_cancels(operator, index, force)
@@ -137,25 +145,39 @@ class ComplianceEngine(NamedEngine):
         self._refinement: Refinement | None = None  # of the brick count that was asked last
 
     @failing_in_a_line()
-    def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
+    def solve(
+        self,
+        bricks: int,
+        grips: ArrayLike,
+        want: Want = Want.RESPONSES,
+        moved: ArrayLike | None = None,
+    ) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self._network, bricks, grips)
+        hands = read_hands(self._network, columns, moved)
+        found = self._found(bricks, columns, hands, want)
+        return require_finite(found, bricks, grips)
+
+    def _found(self, bricks: int, columns: Ints, hands: Hands | None, want: Want) -> Fields:
+        """Return what is wanted of grip sets, corrected where the operator is not enough."""
         tried: _Tried | None = None
         if bricks <= len(self._tree.spring):
             operator, even = self._operator(bricks, columns), bricks <= self._even
             accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
-            tried = _try_forces(operator, columns, even=even, accuracy=accuracy)
+            own = None if hands is None else hands.within(self._basis.force)
+            tried = _try_forces(operator, columns, own, even=even, accuracy=accuracy)
         if tried is None or (len(columns) and not tried.trusted.any()):
-            return require_finite(self._refined(bricks, columns, want), bricks, grips)
+            return self._refined(bricks, columns, hands, want)
         found = tried.fields(want)
         if self._basis is not SPACE:
             found["grip_force"] = found["grip_force"] @ self._basis.force
         if not tried.trusted.all():
             wrong = ~tried.trusted
-            better = self._refined(bricks, columns[wrong], want)
+            rest = None if hands is None else hands.of(wrong)
+            better = self._refined(bricks, columns[wrong], rest, want)
             for name, values in found.items():
                 values[wrong] = getattr(better, name)
-        return require_finite(Fields(**found), bricks, grips)
+        return Fields(**found)
 
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
@@ -186,7 +208,7 @@ class ComplianceEngine(NamedEngine):
         """Made when the first operator is: a scene that is loose from the start has none."""
         return OperatorBuilder(self._network, self._tree, self._basis)
 
-    def _refined(self, bricks: int, columns: Ints, want: Want) -> Fields:
+    def _refined(self, bricks: int, columns: Ints, hands: Hands | None, want: Want) -> Fields:
         """Return what is wanted of grip sets that the operator alone answers not well enough."""
         largest = _SCREEN if want & Want.SCREEN else LAST_CORRECTION
         operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
@@ -194,7 +216,7 @@ class ComplianceEngine(NamedEngine):
             if self._refinement is None or self._refinement.bricks != bricks:
                 tied = operator is not None  # the tree that it grew on reaches them all
                 self._refinement = Refinement(self._network, bricks, self._shared, tied=tied)
-            answer = self._refinement.solve(columns, operator, largest, self._basis)
+            answer = self._refinement.solve(columns, operator, largest, self._basis, hands)
         return keep_wanted(answer, want)
 
 

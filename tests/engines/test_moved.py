@@ -1,0 +1,151 @@
+"""Grips that are not where they should be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seqopt.engines._hands import read_hands
+from seqopt.engines.diagnosis import Finding, diagnose
+from seqopt.engines.interface import _NAMES, Want, grip_columns
+from seqopt.engines.registry import ENGINES
+from seqopt.engines.rigid._mixed import solve_dense, solve_mixed
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import GripError
+from seqopt.network.build import build_network
+from tests.builders import hinged, six_bricks
+
+SETS = [[3, 8, 11], [4, 5, 9]]  # two hold one brick in the second
+
+
+def apart(fields, others):
+    """The largest difference of each field, relative to its largest entry."""
+    out = 0.0
+    for name in _NAMES:
+        a, b = getattr(fields, name), getattr(others, name)
+        out = max(out, np.abs(a - b).max(initial=0.0) / max(np.abs(b).max(initial=0.0), 1e-300))
+    return out
+
+
+def drawn(sets, size, seed=0):
+    return size * np.random.default_rng(seed).normal(size=(*np.shape(sets), 3))
+
+
+def in_plane(net, moved):
+    """Without what leaves the plane of an arch whose bricks all stand in it."""
+    normal = np.cross(np.diff(net.centroid[:2], axis=0)[0], (0.0, 0.0, 1.0))
+    normal /= np.linalg.norm(normal)
+    return moved - (moved @ normal)[..., None] * normal
+
+
+@pytest.fixture(params=ENGINES)
+def engine(request):
+    pattern = "V" if request.param == "planar" else "VLR"
+    return ENGINES[request.param](build_network(six_bricks(pattern)))
+
+
+def test_held_nodes_go_along_and_answers_add_up(engine):
+    """Small enough that no joint leaves its elastic limits, for engines that have any."""
+    net = engine.network
+    ways = [in_plane(net, drawn(SETS, 1e-8, seed)) for seed in range(2)]
+    still, one, two, both = (
+        engine.solve(6, SETS, Want.ALL, m) for m in (None, *ways, ways[0] + ways[1])
+    )
+    nodes = net.inner.ravel()[grip_columns(net, 6, SETS)[0]]
+    assert one.displacement[0, nodes] == pytest.approx(ways[0][0], rel=1e-4, abs=1e-14)
+    for name in _NAMES:
+        a, b, c, d = (getattr(f, name) for f in (still, one, two, both))
+        assert np.abs(b + c - a - d).max() <= 1e-5 * max(np.abs(each).max() for each in (a, b, c))
+        assert np.abs(a - b).max() > 1e-3 * np.abs(a).max()
+    assert apart(engine.solve(6, SETS, Want.ALL, np.zeros((2, 3, 3))), still) <= 1e-12
+
+
+def test_engines_agree(engine):
+    net = engine.network
+    moved = in_plane(net, drawn(SETS, 1e-8))
+    columns = grip_columns(net, 6, SETS)
+    direct = solve_dense(net, 6, columns, read_hands(net, columns, moved))
+    assert apart(engine.solve(6, SETS, Want.ALL, moved), direct) <= 1e-5
+    assert apart(engine.solve(6, SETS, Want.ALL), direct) > 1e-3  # the measure can fail
+
+
+@pytest.mark.parametrize(
+    ("moved", "named"),
+    [
+        ([[0.1, 0.0, 0.0]], r"moved has shape \(1, 3\); give lengths in meters.*\(2, 3, 3\)"),
+        (np.full((2, 3, 3), np.nan), "moved: a length is not finite"),
+        ("far", "moved: give lengths in meters"),
+    ],
+)
+def test_wrong_ways_are_refused(engine, moved, named):
+    with pytest.raises(GripError, match=named):
+        engine.solve(6, SETS, Want.RESPONSES, moved)
+
+
+def test_a_plane_is_not_left():
+    net = build_network(six_bricks("V"))
+    out = drawn(SETS, 1e-4)
+    with pytest.raises(GripError, match="out of the scene's plane; use the compliance engine"):
+        ENGINES["planar"](net).solve(6, SETS, Want.RESPONSES, out)
+    auto, fast = ENGINES["auto"](net), ComplianceEngine(net)
+    out[0] = in_plane(net, out)[0]
+    mine = auto.rigid.solve(6, SETS, Want.ALL, out)
+    assert apart(mine, fast.solve(6, SETS, Want.ALL, out)) <= 1e-9
+    assert auto.rigid.lies_flat(6, SETS, out).tolist() == [True, False]
+
+
+def test_a_brick_is_not_stretched(engine25):
+    """Along it both of its nodes go halfway; all else is as asked."""
+    net, grips = engine25.network, np.array([[22, 23, 3]])
+    first, second = (net.node_position[net.index_of_node[n]] for n in grips[0, :2])
+    axis = (second - first) / np.linalg.norm(second - first)
+    moved = drawn(grips, 1e-4)
+    stretched = moved + np.array([[-2e-3, 6e-3, 0.0]])[..., None] * axis
+    along = moved + np.array([[2e-3, 2e-3, 0.0]])[..., None] * axis
+    one, other = (engine25.solve(18, grips, Want.ALL, m) for m in (stretched, along))
+    assert apart(one, other) <= 1e-12
+    assert apart(engine25.solve(18, grips, Want.ALL, moved), other) > 1e-3
+    edge = np.flatnonzero((net.edge_spring < 0) & (net.edge_brick == 11))
+    assert not one.edge_force[0, edge].any()
+
+
+@pytest.mark.parametrize("kind", ["whole", "hinge", "island"])
+def test_what_is_corrected_moves_too(arch25, kind):
+    """Also grips close together far out, of which the operator alone knows too little."""
+    joints = arch25.joints[:11] + arch25.joints[12:]
+    scenes = {"whole": arch25, "hinge": hinged(arch25, 3), "island": replace(arch25, joints=joints)}
+    net = build_network(scenes[kind])
+    sets = [(36, 37, 39), (34, 36, 39), (25, 31, 38), (26, 27, 37)]
+    moved, columns = drawn(sets, 4e-4), grip_columns(net, 20, sets)
+    exact = solve_mixed(net, 20, columns, read_hands(net, columns, moved))
+    assert apart(ComplianceEngine(net).solve(20, sets, Want.ALL, moved), exact) <= 1e-9
+    assert apart(ComplianceEngine(net).solve(20, sets, Want.ALL), exact) > 1e-3
+
+
+def test_a_hand_that_takes_all_force_away(engine25):
+    """Moved where the node goes by itself, a grip bears nothing: forces undo no displacements."""
+    net = engine25.network
+    free = engine25.solve(9, np.zeros((1, 0), dtype=int), Want.ALL)
+    node = net.index_of_node[13]
+    found = engine25.solve(9, [[13]], Want.ALL, free.displacement[:, [node]])
+    assert np.abs(found.grip_force).max() <= 1e-8
+    assert np.abs(found.displacement - free.displacement).max() <= 1e-12
+
+
+def test_diagnosis_asks_where_hands_are(engine25):
+    moved = drawn([3, 20, 33], 4e-4)
+    found = diagnose(engine25, 18, [3, 20, 33], moved)
+    assert found.finding is Finding.SOLVED_WELL
+    assert diagnose(engine25.network, 18, [3, 20, 33], moved).finding is Finding.SOLVED_WELL
+
+    class Still:
+        """An engine that takes hands for still."""
+
+        network = engine25.network
+
+        def solve(self, bricks, grips, want=Want.RESPONSES, moved=None):
+            return engine25.solve(bricks, grips, want)
+
+    assert diagnose(Still(), 18, [3, 20, 33], moved).residuals.grips > 0.1
