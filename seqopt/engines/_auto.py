@@ -20,7 +20,7 @@ from seqopt.arrays import Bools, Floats
 from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines._hands import read_hands
-from seqopt.engines._planar import across_plane, find_plane, off_plane
+from seqopt.engines._planar import find_plane, leaves_plane, off_plane
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import (
     Fields,
@@ -67,6 +67,7 @@ class _RigidBricks(NamedEngine):
     def __init__(self, network: Network | Scene) -> None:
         super().__init__(network)
         plane, self.in_space = find_plane(self.network), _OFF_PLANE
+        self._stiff = self.network.scene.grip_kinds.rigid
         self._flat: Bools = np.zeros(2 * len(self.network.inner), dtype=bool)  # by node
         if isinstance(plane, str):
             self.in_space = LevelChoice(Level.RIGID, plane)
@@ -89,7 +90,7 @@ class _RigidBricks(NamedEngine):
         """Return the fields of a partial structure for grip sets (S, r)."""
         if not self._flat.any():
             return self._space.solve(bricks, grips, want, moved)
-        if self._flat.all() and moved is None:
+        if self._flat.all() and moved is None and self._stiff:
             return self._plane.solve(bricks, grips, want)
         flat, sets = self.lies_flat(bricks, grips, moved), np.asarray(grips)
         inside = self._plane.solve(bricks, sets[flat], want, _of(moved, flat))
@@ -100,12 +101,12 @@ class _RigidBricks(NamedEngine):
 
     def lies_flat(self, bricks: int, grips: ArrayLike, moved: ArrayLike | None = None) -> Bools:
         """Return which grip sets (S,) lie in the plane of the structure, and stay in it."""
-        if not self._flat.any() or (self._flat.all() and moved is None):
+        if not self._flat.any() or (self._flat.all() and moved is None and self._stiff):
             return np.full(len(np.asarray(grips)), self._flat[0])
         columns = grip_columns(self.network, bricks, grips)
         flat = np.asarray(self._flat[columns].all(axis=1))
-        hands = read_hands(self.network, columns, moved)
-        return flat if hands is None else flat & ~across_plane(self._mirror, hands.moved)
+        hands = read_hands(self.network, columns, grips, moved)
+        return flat if hands is None else flat & ~leaves_plane(self._mirror, hands, columns)
 
 
 def _of(moved: ArrayLike | None, which: Bools) -> Floats | None:

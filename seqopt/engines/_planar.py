@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from seqopt.arrays import Bools, Floats, FrozenValue
-from seqopt.engines._hands import read_hands
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.engines._hands import Hands, read_hands
 from seqopt.engines.interface import Basis, Fields, NamedEngine, Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, SceneError
@@ -67,10 +67,26 @@ def off_plane(network: Network, plane: _Plane) -> Floats:
     return away
 
 
-def across_plane(plane: _Plane, moved: Floats) -> Bools:
-    """Return which grip sets (S,) are moved (S, r, 3) out of a plane, beyond rounding."""
-    out = np.abs(moved @ plane.normal).max(axis=1, initial=0.0)
-    return np.asarray(out > _FLAT * np.linalg.norm(moved, axis=2).max(axis=1, initial=0.0))
+def leaves_plane(plane: _Plane, hands: Hands, columns: Ints) -> Bools:
+    """Return the hands of which grip sets (S,) are moved, or give way, out of a plane."""
+    out = np.zeros(len(columns), dtype=bool)
+    if hands.moved is not None:
+        away = np.abs(hands.moved @ plane.normal).max(axis=1, initial=0.0)
+        size = np.linalg.norm(hands.moved, axis=2).max(axis=1, initial=0.0)
+        out |= away > _FLAT * size
+    if hands.give is not None:
+        give = hands.each_give(*columns.shape)
+        inside, across = plane.basis, _across(plane)
+        turned = hands.turns is not None
+        ways = [b.wrench if turned else b.force for b in (inside, across)]
+        mixed = np.abs(ways[0] @ give @ ways[1].T).max(axis=(1, 2, 3), initial=0.0)
+        out |= mixed > _FLAT * np.abs(give).max(axis=(1, 2, 3), initial=0.0)
+    return out
+
+
+def _across(plane: _Plane) -> Basis:
+    """Return the force and the moments that leave a plane."""
+    return Basis(plane.normal[None], plane.axes)
 
 
 def _normal(network: Network, spread: Floats) -> Floats:
@@ -173,9 +189,9 @@ class PlanarEngine(NamedEngine):
     ) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self.network, bricks, grips)
-        hands = read_hands(self.network, columns, moved)
-        if hands is not None and across_plane(self._plane, hands.moved).any():
-            raise GripError(f"moved: a grip is moved out of the scene's plane; {_ELSE}")
+        hands = read_hands(self.network, columns, grips, moved)
+        if hands is not None and leaves_plane(self._plane, hands, columns).any():
+            raise GripError(f"a grip is moved, or gives way, out of the scene's plane; {_ELSE}")
         away = self._away[columns]
         if away.any():
             node = np.asarray(grips).ravel()[away.argmax()]

@@ -34,7 +34,9 @@ _SHIFT = 1e-15  # added to the scaled stiffness of a mechanism to find its mode
 _EIGENVALUE_TOLERANCE = 1e-6  # relative
 
 
-def _spectrum(network: Network, bricks: int, columns: Ints) -> tuple[float, float, Floats]:
+def _spectrum(
+    network: Network, bricks: int, columns: Ints, hands: Hands | None
+) -> tuple[float, float, Floats]:
     """Return how the constrained stiffness, scaled by its diagonal, resists motions.
 
     The inverse is applied by the mixed system, which keeps small eigenvalues that the stiffness
@@ -47,11 +49,11 @@ def _spectrum(network: Network, bricks: int, columns: Ints) -> tuple[float, floa
     most = max(diagonal.max(), 1.0 if not diagonal.any() else 0.0)
     scale = np.sqrt(np.maximum(diagonal, _LEAST_DIAGONAL * most))
     try:
-        lowest, motion = _lowest(mixed_system(parts, columns), scale, len(root))
+        lowest, motion = _lowest(mixed_system(parts, columns, hands=hands), scale, len(root))
     except RuntimeError:  # exactly singular, or the iteration broke down
         lowest = 0.0
     if not lowest > UNRESISTED:
-        shifted = mixed_system(parts, columns, shift=_SHIFT * scale**2)
+        shifted = mixed_system(parts, columns, _SHIFT * scale**2, hands)
         lowest, motion = _lowest(shifted, scale, len(root))
         lowest = max(lowest - _SHIFT, 0.0)
     scaled = sparse.diags_array(root.ravel()) @ parts.deformation @ sparse.diags_array(1 / scale)
@@ -134,10 +136,9 @@ def residual(
     apart = np.abs(wrench + law).reshape(-1, 2, 3).max(axis=2)
     node = network.node_position[network.inner[:bricks].ravel()]
     owner = columns // 2
-    grip = np.hstack([fields.grip_force[0], np.zeros((len(columns), 3))])
-    still = _moved(twist[owner], node[columns] - center[owner]).sum(axis=0)[:, :3]
-    if hands is not None:
-        still = still - hands.moved[0]
+    grip = np.hstack([fields.grip_force[0], fields.grip_moment[0]])
+    still = _moved(twist[owner], node[columns] - center[owner]).sum(axis=0)
+    still = _apart_from_hands(still, grip, hands)
     every = np.repeat(np.arange(bricks), 2)
     motion = np.abs(_moved(twist[every], node - center[every])[:, :, :3]).sum(axis=0).max()
     dead = np.hstack([network.weight[:bricks], np.zeros((bricks, 3))])
@@ -154,6 +155,25 @@ def residual(
         grips=float(np.abs(still).max(initial=0.0) / max(motion, least)),
         plain=float(np.linalg.norm(plain[:, :3]) / (np.linalg.norm(dead) or 1.0)),
     )
+
+
+def _apart_from_hands(moved: Floats, borne: Floats, hands: Hands | None) -> Floats:
+    """Return how far nodes are from where their hands let them be (r, n), m, turns over a lever.
+
+    ``moved``, ``borne`` (r, 6): how nodes shift and turn, what hands exert on them.
+    """
+    if hands is None:
+        return moved[:, :3]
+    out = moved * np.repeat([1.0, hands.lever], 3)
+    bears = borne / np.repeat([1.0, hands.lever], 3)
+    if hands.moved is not None:
+        out[:, :3] -= hands.moved[0]
+    if hands.give is not None:
+        give = hands.each_give(1, len(moved))[0]
+        ways = give.shape[2]
+        out[:, :ways] += np.einsum("rij,rj->ri", give, bears[:, :ways])
+    out[~hands.each_turns(1, len(moved))[0], 3:] = 0.0
+    return np.asarray(out)
 
 
 def _beside_weight(network: Network, bricks: int, stiffness: Floats) -> tuple[Floats, float]:
@@ -289,9 +309,9 @@ def diagnose(
     numbers = np.array(grips, dtype=np.int64).reshape(1, -1)
     columns = grip_columns(network, bricks, numbers)
     far = None if moved is None else np.array(moved, dtype=float)[None]
-    hands = read_hands(network, columns, far)
-    lowest, condition, mode = _spectrum(network, bricks, columns[0])
-    free = free_motion(network, bricks, columns[0]) if lowest < _LOOKED_INTO else None
+    hands = read_hands(network, columns, numbers, far)
+    lowest, condition, mode = _spectrum(network, bricks, columns[0], hands)
+    free = free_motion(network, bricks, columns[0], hands) if lowest < _LOOKED_INTO else None
     if free is not None:
         lowest, condition, mode = 0.0, np.inf, free
     residuals, refusal = None, None

@@ -11,12 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._hands import Hands
 from seqopt.engines.interface import Fields, SerialEngine
 from seqopt.engines.rigid._mechanism import require_resistance
@@ -47,17 +48,18 @@ class FrameEngine(SerialEngine):
         self._contrast = contrast
 
     def _answers(self, bricks: int, columns: Ints, hands: Hands | None) -> Iterable[Fields]:
-        far = np.zeros((*columns.shape, 3)) if hands is None else hands.moved
-        pairs = zip(columns, far, strict=True)
+        every = [None if hands is None else hands.of(slice(i, i + 1)) for i in range(len(columns))]
+        pairs = zip(columns, every, strict=True)
         return [_solve_one(self.network, bricks, *each, self._contrast) for each in pairs]
 
 
 def _solve_one(
-    network: Network, bricks: int, columns: Ints, moved: Floats, contrast: float
+    network: Network, bricks: int, columns: Ints, hands: Hands | None, contrast: float
 ) -> Fields:
-    """Return the fields of one model, whose held nodes are moved (r, 3)."""
+    """Return the fields of one model."""
     edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
     split, deformation, stiffness = _frame(network, bricks, contrast)
+    grips = _hold(network, columns, hands, deformation.shape[1])
     load = np.zeros((deformation.shape[1] // 6, 6))
     load[network.inner[:bricks].ravel(), :3] = network.inner_weight[: 2 * bricks]
     _add_loads(network, bricks, load)
@@ -65,13 +67,16 @@ def _solve_one(
     base = np.flatnonzero(network.node_kind[:nodes] == PartKind.BASE.value)
     free = np.ones(load.shape, dtype=bool)
     free[base] = False
-    free[held, :3] = False
+    free.ravel()[grips.fixed] = False
     unknown, motion = np.flatnonzero(free), _moved_ground(network, base, load.shape)
-    motion[(6 * held[:, None] + np.arange(3)).ravel()] = moved.ravel()
-    reduced, strain = deformation[:, unknown], deformation @ motion
-    examine = partial(require_resistance, network, bricks, columns)
+    motion[grips.fixed] = grips.moved
+    whole = sparse.csr_array(sparse.vstack([deformation, grips.spring]))
+    every = np.concatenate([stiffness, grips.stiffness])
+    reduced, strain = whole[:, unknown], whole @ motion
+    strain[len(stiffness) :] -= grips.stretched
+    examine = partial(require_resistance, network, bricks, columns, hands)
     pull = load.ravel()[unknown]
-    motion[unknown] = _solve(reduced, stiffness, pull, strain, contrast, examine)
+    motion[unknown] = _solve(reduced, every, pull, strain, contrast, examine)
     stress = stiffness * (deformation @ motion)
     reaction = (deformation.T @ stress).reshape(load.shape) - load
     springs, which = network.springs, network.edge_spring[split]
@@ -86,10 +91,50 @@ def _solve_one(
         edge_force=stress[None, :edges],
         displacement=shift[None, :nodes, :3],
         grip_force=reaction[None, held, :3],
+        grip_moment=np.where(grips.turns[:, None], reaction[held, 3:], 0.0)[None],
         support=(of_end @ reaction[base])[None],
         joint_wrench=wrench[None],
         brick_twist=shift[network.inner[:bricks]].mean(axis=1)[None],
     )
+
+
+class _Holds(NamedTuple):
+    """How grips hold a frame."""
+
+    fixed: Ints  # (f,); motions (6n,) that hands prescribe
+    moved: Floats  # (f,); by how much, m
+    spring: sparse.csr_array  # (p, 6n); deformations of hands that give way
+    stiffness: Floats  # (p,)
+    stretched: Floats  # (p,); of these, where the nodes are in place
+    turns: Bools  # (r,); which bear moments
+
+
+def _hold(network: Network, columns: Ints, hands: Hands | None, size: int) -> _Holds:
+    """Return how the grips of one set hold a frame with as many motions."""
+    hands, grips = hands or Hands(), len(columns)
+    soft, turns = hands.soft(1, grips)[0], hands.each_turns(1, grips)[0]
+    far, at = hands.far(1, grips)[0], 6 * network.inner.ravel()[columns][:, None] + np.arange(6)
+    fixed: list[Ints] = [np.zeros(0, dtype=np.int64)]
+    spring: list[Floats] = [np.zeros((0, size))]
+    stiffness: list[float] = []
+    stretched: list[float] = []
+    for g in range(grips):
+        ways = [way for way in range(6) if (soft[g] if way < 3 else turns[g])]
+        if not soft[g]:
+            fixed.append(at[g, :3])
+        if ways:
+            scale = np.where(np.array(ways) < 3, 1.0, hands.lever)
+            give = hands.each_give(1, grips)[0, g][np.ix_(ways, ways)] / np.outer(scale, scale)
+            values, axes = np.linalg.eigh(give)
+            own = np.zeros((len(ways), size))
+            own[:, at[g, ways]] = axes.T
+            spring.append(own)
+            stiffness += (1 / values).tolist()
+            stretched += (own[:, at[g, :3]] @ far[g]).tolist()
+    rows = sparse.csr_array(np.vstack(spring))
+    held = np.concatenate(fixed)
+    moved = far[~soft].ravel()
+    return _Holds(held, moved, rows, np.array(stiffness), np.array(stretched), turns)
 
 
 def _add_loads(network: Network, bricks: int, load: Floats) -> None:

@@ -20,6 +20,7 @@ from seqopt.engines._hands import Hands, read_hands
 from seqopt.errors import GripError, SolverError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
+from seqopt.scene._checks import settle
 from seqopt.scene.scene import Scene
 
 
@@ -83,8 +84,9 @@ class Fields(FrozenValue):
         Axial force of every network edge, tension positive, N.
     displacement : (S, N, 3) float
         Of every network node, m.
-    grip_force : (S, r, 3) float
-        Force of every grip on the structure, N.
+    grip_force, grip_moment : (S, r, 3) float
+        Force of every grip on the structure, N, and its moment about the node, N m; no moment
+        where a grip lets its node turn.
     support : (S, G, 6) float
         Reaction on the structure at every ground end of the scene, in its order, N, and its moment
         about the end's own fixed point, N m; zero where the end does not act.
@@ -101,6 +103,12 @@ class Fields(FrozenValue):
     support: Floats
     joint_wrench: Floats
     brick_twist: Floats
+    grip_moment: Floats = None  # type: ignore[assignment]  # zero where none is given
+
+    def __post_init__(self) -> None:
+        if self.grip_moment is None:
+            settle(self, grip_moment=np.zeros_like(self.grip_force))
+        super().__post_init__()
 
 
 class Engine(Protocol):
@@ -135,14 +143,17 @@ class Engine(Protocol):
         bricks : int
             How many bricks stand, in build order.
         grips : (S, r) int
-            Numbers of the nodes that each set holds.
+            Numbers of the nodes that each set holds. Where the robots of a scene are not equally
+            stiff, a node's number means a grip of the first robot;
+            `seqopt.Scene.grip_numbers` has the numbers for grips of given robots.
         want : Want, optional
             Which fields are evaluated; an engine may evaluate others too.
         moved : (S, r, 3) float, optional
             How far each grip is from where it should be, along the scene's axes, m; nowhere by
-            default. A rigid grip moves its node as far. Fields are linear in it, beside those that
-            the weight makes. Two rigid grips on one brick cannot stretch it: along the brick, both
-            of its nodes go halfway between.
+            default. A rigid grip moves its node as far, a soft one the far end of its spring.
+            Fields are linear in it, beside those that the weight makes. Two rigid grips on one
+            brick cannot stretch it: along the brick, both of its nodes go halfway between, which is
+            what grips of one stiffness do, whatever it is.
 
         Returns
         -------
@@ -216,6 +227,7 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
     if numbers.ndim != 2 or (numbers.size and not np.issubdtype(numbers.dtype, np.integer)):
         shape = numbers.shape
         raise GripError(f"grips have shape {shape}; give integer node numbers, (sets, grips)")
+    numbers, _ = network.scene.grip_kinds.split(numbers)
     known, index = network.index_of_grip
     last = len(known) - 1
     at = (numbers.astype(np.int64, copy=False) - known[0]).clip(0, last)
@@ -313,7 +325,7 @@ class SerialEngine(NamedEngine, ABC):
     ) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self.network, bricks, grips)
-        hands = read_hands(self.network, columns, moved)
+        hands = read_hands(self.network, columns, grips, moved)
         none = no_sets(self.network, bricks, columns.shape[1])
         answer = join_sets([none, *self._answers(bricks, columns, hands)])
         return require_finite(answer, bricks, grips)

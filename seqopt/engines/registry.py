@@ -59,9 +59,12 @@ class Recipe:
     def key(self) -> str:
         """What answers depend on, condensed: equal for equal scenes, options and arithmetic.
 
-        Names, provenance and robots of a scene change no answer and are left out.
+        Names and provenance of a scene change no answer and are left out; of robots only how their
+        grips give way counts.
         """
         scene = {k: v for k, v in scene_to_dict(self.scene).items() if k not in _WITHOUT_EFFECT}
+        ways = [(robot.stiffness, robot.rotational_stiffness) for robot in self.scene.robots]
+        scene["grips"] = [*dict.fromkeys(ways)] or [(None, None)]
         built = json.dumps(scene, sort_keys=True)
         parts = (self.engine, repr(sorted(self.options.items())), built, _arithmetic())
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()

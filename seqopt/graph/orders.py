@@ -144,7 +144,10 @@ def whole_bound(problem: AllOrders) -> float:
     numbers = node_numbers(free.network)
     places = [i for i, n in enumerate(numbers, 1) if n not in problem.scene.blocked_nodes]
     least = -np.inf
-    sets = _sets(places, max(1, free.free_rules.least_grips), free.space.robots)
+    kinds = [k * len(numbers) for k in range(len(problem.scene.grip_kinds.turns))]
+    every = [place + more for more in kinds for place in places]  # whoever holds them
+    fewest = max(1, free.free_rules.least_grips)
+    sets = _sets(every, fewest, free.space.robots, len(numbers))
     if len(sets):
         least = float(_values(free, sets).min())
     if free.free_rules.ending is not Ending.HELD:
@@ -152,12 +155,16 @@ def whole_bound(problem: AllOrders) -> float:
     return least
 
 
-def _sets(places: list[int], fewest: int, robots: int) -> Ints:
-    """Return all grip sets, zeros for robots that are free first; none if they are too many."""
+def _sets(places: list[int], fewest: int, robots: int, nodes: int) -> Ints:
+    """Return all grip sets, zeros for robots that are free first; none if they are too many.
+
+    ``nodes``: how many there are; places beyond that are the same nodes, held by others.
+    """
     rows: list[tuple[int, ...]] = []
     for count in range(fewest, robots + 1):
-        for nodes in combinations(places, count):
-            rows.append((*[0] * (robots - count), *nodes))
+        for held in combinations(places, count):
+            if len({place % nodes for place in held}) == count:
+                rows.append((*[0] * (robots - count), *held))
             if len(rows) > MOST_SETS:
                 return np.zeros((0, robots), dtype=np.int64)
     return np.array(rows, dtype=np.int64).reshape(-1, robots)

@@ -28,7 +28,7 @@ from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report._style import BLUE, SMALL, WIDTH, new_picture, styled
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, force_key, grip_mark
-from seqopt.responses.table import force_column
+from seqopt.responses.table import force_column, step_fields
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import boxes
 from seqopt.scene.scene import Scene
@@ -198,8 +198,7 @@ def spread_steps(steps: Sequence[Step], most: int) -> tuple[int, ...]:
 
 
 def _fields(engine: Engine, step: Step) -> Fields:
-    held = np.array([step.held], dtype=np.int64).reshape(1, -1)
-    return engine.solve(step.bricks, held, Want.EDGES | Want.DISPLACEMENTS | Want.BRICKS)
+    return step_fields(engine, step, Want.EDGES | Want.DISPLACEMENTS | Want.BRICKS)
 
 
 def _picked(steps: Sequence[Step], chosen: int | Sequence[int] | None) -> list[Step]:

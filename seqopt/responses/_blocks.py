@@ -51,7 +51,7 @@ class Block(FrozenValue):
     """States with one brick count, and what is to be known of them."""
 
     bricks: int  # how many bricks stand
-    grips: Ints  # (S, r); nodes held
+    grips: Ints  # (S, r); numbers of grips, as `seqopt.Scene.grip_numbers` has them
     names: tuple[str, ...]  # responses of `seqopt.responses.quantities.CHOSEN_BY`
     screen: bool = True  # whether six digits are enough
 
@@ -312,9 +312,9 @@ class Batch(FrozenValue):
     schedule: Schedule
     steps: tuple[OpenStep, ...]
     names: tuple[frozenset[str], ...]  # responses that each step needs
-    rows: Ints  # (P, r); nodes held, for all possible choices of one step after the other
+    rows: Ints  # (P, r); grips, for all possible choices of one step after the other
     possible: tuple[Bools, ...]  # (C,); which choices of each step leave no node held twice
-    states: Ints  # (S, r); the different sets of nodes in them, ascending
+    states: Ints  # (S, r); the different grip sets in them, numbers ascending
     state: Ints  # (P,); which of these each choice leads to
 
     def blocks(self) -> Iterator[Block]:
@@ -379,7 +379,8 @@ def batch_of(schedule: Schedule, steps: Sequence[OpenStep], wanted: Wanted) -> B
     names = tuple(frozenset(wanted(schedule.moves[step.moves[-1]].bricks)) for step in steps)
     choices = [combinations(schedule, step) for step in steps]
     possible = tuple(no_node_twice(rows) for rows in choices)
-    rows = np.concatenate([rows[ok] for rows, ok in zip(choices, possible, strict=True)])
+    parts = zip(steps, choices, possible, strict=True)
+    rows = np.concatenate([grip_rows(schedule, step, nodes[ok]) for step, nodes, ok in parts])
     states, state = distinct(np.sort(rows, axis=1))
     return Batch(schedule, tuple(steps), names, rows, possible, states, state)
 
@@ -415,6 +416,11 @@ def combinations(schedule: Schedule, step: OpenStep) -> Ints:
         if grip is not None
     ]
     return np.stack([column.ravel() for column in columns], axis=1).astype(np.int64)
+
+
+def grip_rows(schedule: Schedule, step: OpenStep, nodes: Ints) -> Ints:
+    """Return the numbers of grips on nodes (P, r) that the robots of a step hold."""
+    return schedule.scene.grip_kinds.numbers(nodes, _robots_holding(step))
 
 
 def no_node_twice(rows: Ints) -> Bools:

@@ -36,6 +36,7 @@ from seqopt.responses._blocks import (
     choices_of,
     combinations,
     distinct,
+    grip_rows,
     no_node_twice,
     open_store,
     require_memory,
@@ -348,4 +349,4 @@ def _window_states(schedule: Schedule, step: OpenStep, choice: Sequence[int]) ->
         node = schedule.moves[first].candidates[choice[first]]
         step = replace(step, grips=tuple(node if g == OpenGrip(first) else g for g in step.grips))
     rows = combinations(schedule, step)
-    return np.sort(rows[no_node_twice(rows)], axis=1)
+    return np.sort(grip_rows(schedule, step, rows[no_node_twice(rows)]), axis=1)

@@ -97,7 +97,8 @@ def _left_out(
     within: LinearRange, builds: Mapping[str, pd.DataFrame], *, staged: bool
 ) -> Iterator[str]:
     """Yield what the model has not, as far as it could matter in these builds."""
-    robots, moved = within.engine.network.scene.robots, RESPONSES["D_max"]
+    every, moved = within.engine.network.scene.robots, RESPONSES["D_max"]
+    robots = [robot for robot in every if robot.stiffness is None]
     tables = builds.values()
     if any(table[f"{robot.name}_node"].notna().any() for table in tables for robot in robots):
         yield "that robots give way"

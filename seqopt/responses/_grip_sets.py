@@ -109,8 +109,10 @@ class GripSets:
     ) -> None:
         self._engine, self._resources, self._screen = engine, resources, screen
         self.names, self._known = tuple(names), KnownRows()
-        placed = engine.network.scene.placed
-        self._number = np.array([0, *(node for brick in placed for node in brick.nodes)])
+        scene = engine.network.scene
+        nodes = np.array([node for brick in scene.placed for node in brick.nodes])
+        kinds = [k * scene.grip_kinds.span for k in range(len(scene.grip_kinds.turns))]
+        self._number = np.concatenate([[0], *(nodes + more for more in kinds)])
 
     def __repr__(self) -> str:
         return f"<GripSets of {self._engine}: {self.solved} solved>"
@@ -133,7 +135,8 @@ class GripSets:
         """Return the responses of grip sets and the forces of their grips.
 
         ``held`` (S, r): nodes held, ascending in every row, as places in build order counted from
-        1; zeros for robots that hold none. Results: ``responses`` (S, R): in the order of the
+        1, those of grips of the second kind after all of the first, and so on; zeros for robots
+        that hold none. Results: ``responses`` (S, R): in the order of the
         names, SI units; infinite where something would be loose. ``forces`` (S, r): N; zero for a
         robot that holds none.
         """

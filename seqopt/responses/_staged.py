@@ -20,6 +20,7 @@ import pandas as pd
 from scipy import linalg
 
 from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.engines._hands import Hands, read_hands
 from seqopt.engines.interface import Fields, grip_columns
 from seqopt.engines.rigid._mechanism import Ungripped, ungripped_system
 from seqopt.engines.rigid._mixed import edge_forces, reactions, solve_load, split_pairs
@@ -27,7 +28,7 @@ from seqopt.errors import StepError
 from seqopt.network._mechanics import spring_maps
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
-from seqopt.responses.table import response_table, step_named
+from seqopt.responses.table import grips_of, response_table, step_named
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, check_sequence, require_steps
@@ -46,8 +47,8 @@ class StagedState(FrozenValue):
 
     ``twist`` (6b,): of the bricks from where the plan has them, m and rad; ``wrench`` (J, 6): of
     every spring of the network on its second body, N and N m; ``carried`` (E,): by the edges,
-    tension positive, N; ``grips`` (3,): forces of the grips on their nodes, as indices into
-    ``network.inner.ravel()``, N.
+    tension positive, N; ``grips`` (6,): forces and moments of the grips on their nodes, as indices
+    into ``network.inner.ravel()``, N and N m.
     """
 
     bricks: int
@@ -130,49 +131,64 @@ def next_state(parts: Ungripped, before: StagedState, step: Step, placing: Placi
         load[-2:] = network.inner_weight[2 * bricks - 2 : 2 * bricks]
         new = _fitted(network, before) if placing is Placing.FITTED else np.zeros(6)
         state = replace(state, twist=np.concatenate([before.twist, new]))
-    held = grip_columns(network, bricks, np.array([step.held], dtype=np.int64))[0].tolist()
+    numbers = grips_of(network.scene, step)
+    columns, turn = grip_columns(network, bricks, numbers), np.zeros((bricks, 3))
+    held = columns[0].tolist()
     for grip in set(before.grips) - set(held):
-        load[grip] -= before.grips[grip]
-    state = replace(state, grips={grip: before.grips.get(grip, np.zeros(3)) for grip in held})
-    return _loaded(parts, state, load, before.bricks)
+        load[grip] -= before.grips[grip][:3]
+        turn[grip // 2] -= before.grips[grip][3:]
+    state = replace(state, grips={grip: before.grips.get(grip, np.zeros(6)) for grip in held})
+    hands = read_hands(network, columns, numbers, None)
+    return _loaded(parts, state, (load, turn), before.bricks, hands)
 
 
 def state_fields(parts: Ungripped, state: StagedState) -> Fields:
     """Return the fields of a state. ``parts``: of its structure. Result: of one grip set."""
-    force = np.array(list(state.grips.values())).reshape(1, -1, 3)
+    borne = np.array(list(state.grips.values())).reshape(1, -1, 6)
     return Fields(
         edge_force=state.carried[None].copy(),
         displacement=(parts.motion @ state.twist).reshape(1, -1, 3)
         + parts.network.ground_motion(state.bricks),
-        grip_force=force,
+        grip_force=borne[..., :3].copy(),
         support=reactions(parts.network, parts.statics, state.wrench[None]),
         joint_wrench=state.wrench[None].copy(),
         brick_twist=state.twist.reshape(1, -1, 6).copy(),
+        grip_moment=borne[..., 3:].copy(),
     )
 
 
-def _loaded(parts: Ungripped, state: StagedState, load: Floats, before: int) -> StagedState:
-    """Return a state with a further load (2b, 3) at the inner nodes, those held kept still.
+def _loaded(
+    parts: Ungripped,
+    state: StagedState,
+    pulls: tuple[Floats, Floats],
+    before: int,
+    hands: Hands | None,
+) -> StagedState:
+    """Return a state with further forces (2b, 3) at inner nodes and moments (b, 3) on bricks.
 
-    What loads it, and which ground end moves, since there were ``before`` bricks, is added.
+    Nodes that are held are kept still, or as their ``hands`` let them be. What loads it, and which
+    ground end moves, since there were ``before`` bricks, is added.
     """
+    load, turn = pulls
     network, applied = parts.network, parts.network.applied(state.bricks, before)
     new = np.repeat(network.springs.since[parts.acting] > before, 6)
     moved = np.where(new, parts.moved, 0.0)
-    if not (load.any() or applied.any() or moved.any()):
+    if not (load.any() or turn.any() or applied.any() or moved.any()):
         return state
     columns: Ints = np.array(list(state.grips), dtype=np.int64)
     inner = (3 * network.inner[: state.bricks].ravel()[:, None] + np.arange(3)).ravel()
     pull = parts.motion[inner].T @ load.ravel() * parts.twist_unit / parts.unit
     pull += applied.ravel() * parts.twist_unit / parts.unit
-    solution = solve_load(parts, columns, pull, moved)
+    pull += np.pad(turn, ((0, 0), (3, 0))).ravel() * parts.twist_unit / parts.unit
+    solution = solve_load(parts, columns, pull, moved, hands)
     load += np.repeat(0.5 * applied[:, :3], 2, axis=0)
     force = solution.force.copy()
     load[columns] += force[0]
     carried = edge_forces(network, parts.statics, solution.wrench, load[None])
-    split_pairs(network, columns[None], force, carried)
+    split_pairs(network, columns[None], force, carried, solution.soft)
     twist, wrench = state.twist + solution.twist[0], state.wrench + solution.wrench[0]
-    pairs = zip(state.grips.items(), force[0], strict=True)
+    borne = np.concatenate([force, solution.moment], axis=2)[0]
+    pairs = zip(state.grips.items(), borne, strict=True)
     grips = {grip: before + more for (grip, before), more in pairs}
     return StagedState(state.bricks, twist, wrench, state.carried + carried[0], grips)
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Floats, Ints
 from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
 from seqopt.engines._auto import AutoEngine
@@ -130,7 +130,7 @@ class LinearRange:
         """Return the fields of a step, all of them, and remember what it is asked of them."""
         found = self._of(fields)
         if not (self._breaks and found[2] > 0):  # else others than those of rigid bricks
-            self._known[step.bricks, tuple(step.held)] = found
+            self._known[step.bricks, self._network.scene.grip_numbers(step.grips)] = found
         return fields
 
     def of_builds(self, tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[Departure, ...]]:
@@ -155,8 +155,9 @@ class LinearRange:
             return np.array([self._of(each) for each in fields])
         if isinstance(self._engine, DiscreteEngine):
             return np.full((len(table), 4), -np.inf)  # whoever goes far is unstable there
-        nodes = table[[f"{robot.name}_node" for robot in self._network.scene.robots]]
-        held = (tuple(int(n) for n in row if pd.notna(n)) for row in nodes.to_numpy(object))
+        scene = self._network.scene
+        nodes = table[[f"{robot.name}_node" for robot in scene.robots]].to_numpy(object)
+        held = (scene.grip_numbers([int(n) if pd.notna(n) else None for n in r]) for r in nodes)
         keys = [*zip(map(int, table["bricks"]), held, strict=True)]
         for key in keys:  # in order: engines grow with the build
             if key not in self._known:
@@ -272,7 +273,12 @@ def support_columns(scene: Scene) -> list[tuple[str, str]]:
 def step_fields(engine: Engine, step: Step, want: Want = Want.RESPONSES) -> Fields:
     """Return the full fields of one step, of one grip set; errors of the engine name the step."""
     with step_named(step):
-        return engine.solve(step.bricks, np.array([step.held], dtype=np.int64).reshape(1, -1), want)
+        return engine.solve(step.bricks, grips_of(engine.network.scene, step), want)
+
+
+def grips_of(scene: Scene, step: Step) -> Ints:
+    """Return the grips of a step as engines take them: one set, (1, r)."""
+    return np.array([scene.grip_numbers(step.grips)], dtype=np.int64).reshape(1, -1)
 
 
 @contextmanager

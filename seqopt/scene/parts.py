@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import partial
+from numbers import Real
 
 import numpy as np
 
@@ -387,8 +388,26 @@ class Ground(Spring):
         return (self.brick,)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Robot:
+_GIVES = (1e-3, 1e15)  # N/m, N m/rad; what is stiffer is rigid to all digits
+
+
+def _each_way(where: str, value: float | Iterable[float], unit: str) -> Vector:
+    """Return three stiffnesses of a grip, of one number or three."""
+    one = isinstance(value, Real) and not isinstance(value, bool)
+    try:
+        x, y, z = [float(value)] * 3 if one else map(float, value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        x = y = z = math.nan
+    if not all(_GIVES[0] <= each <= _GIVES[1] for each in (x, y, z)):
+        low, high = _GIVES
+        raise SceneError(
+            f"{where} is {short(value)}; give one number or three, {low:g} to {high:g} {unit}"
+        )
+    return x, y, z
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Robot(Terse):
     """A robot that can hold one node.
 
     Parameters
@@ -399,25 +418,40 @@ class Robot:
         Largest force that it can exert on the structure, N.
     reach : Reach, optional
         Where it can hold; anywhere by default.
+    stiffness : float or Vector, optional
+        How stiff its grip is, the robot behind it included: a force by which the node it holds is
+        pulled from where the hand should be, over that distance, N/m. One number, or three along
+        the scene's axes; rigid by default.
+    rotational_stiffness : float or Vector, optional
+        The same for turning the node: moments over angles, N m/rad, one number or three about the
+        scene's axes. By default a grip lets its node turn.
 
     Raises
     ------
     SceneError
-        If the name cannot be printed or the payload is not a positive number.
+        If the name cannot be printed, the payload is not a positive number, or a stiffness is not
+        one or three numbers from 1e-3 to 1e15.
 
     Examples
     --------
     >>> import seqopt
     >>> left = seqopt.Sphere(center=(0.3, -0.5, 0.6), radius=1.0)
     >>> seqopt.Robot(name="left", payload=500.0, reach=left)
-    Robot(name='left', payload=500.0, reach=Sphere(center=(0.3, -0.5, 0.6), radius=1.0))
+    Robot(name='left', payload=500, reach=Sphere(center=(0.3, -0.5, 0.6), radius=1.0))
+    >>> seqopt.Robot(name="soft", payload=500.0, stiffness=1e6).stiffness
+    (1000000.0, 1000000.0, 1000000.0)
     """
 
     name: str
     payload: float
     reach: Reach = field(default_factory=Anywhere)
+    stiffness: float | Vector | None = None
+    rotational_stiffness: float | Vector | None = None
 
     def __post_init__(self) -> None:
         printable("robot", self.name)
-        newtons = partial(positive, unit="N")
-        check(self, f"robot {self.name}", reach=_as_reach, payload=newtons)
+        newtons, where = partial(positive, unit="N"), f"robot {self.name}"
+        check(self, where, reach=_as_reach, payload=newtons)
+        check(self, where, stiffness=unless_none(partial(_each_way, unit="N/m, or none if rigid")))
+        turning = partial(_each_way, unit="N m/rad, or none if its node may turn")
+        check(self, where, rotational_stiffness=unless_none(turning))

@@ -13,6 +13,7 @@ from seqopt._showing import Shown, display
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import check, not_negative, printable, short, vector, wholes
+from seqopt.scene._grip_kinds import GripKinds, grip_kinds
 from seqopt.scene._loads import Load
 from seqopt.scene.parts import Brick, Ground, Joint, Reach, Robot
 
@@ -22,6 +23,7 @@ import re
 from collections.abc import Callable
 
 import networkx as nx
+import numpy as np
 
 from seqopt.errors import did_you_mean
 
@@ -271,6 +273,56 @@ class Scene(Shown):
         <Scene arch25: 25 bricks, 24 joints, 2 ground ends, 2 robots>
         """
         return replace(self, robots=robots)
+
+    def with_grips(
+        self, stiffness: float | Vector | None, rotational_stiffness: float | Vector | None = None
+    ) -> Scene:
+        """Return the same scene with grips of all robots as stiff as said.
+
+        ``stiffness``, ``rotational_stiffness``: as of `Robot`; None for rigid grips, and for such
+        as let their nodes turn.
+
+        Examples
+        --------
+        >>> import seqopt
+        >>> scene = seqopt.load_scene("arch25").with_grips(1e6)
+        >>> scene.robots[0].stiffness
+        (1000000.0, 1000000.0, 1000000.0)
+        >>> scene.with_grips(None) == seqopt.load_scene("arch25")
+        True
+        """
+        ways = {"stiffness": stiffness, "rotational_stiffness": rotational_stiffness}
+        robots = tuple(replace(robot, **ways) for robot in self.robots)  # type: ignore[arg-type]
+        return replace(self, robots=robots)
+
+    @cached_property
+    def grip_kinds(self) -> GripKinds:
+        """How its robots give way where they hold."""
+        return grip_kinds(self.robots, [*self.brick_of_node])
+
+    def grip_numbers(self, grips: Sequence[int | None]) -> tuple[int, ...]:
+        """Return the numbers by which engines are asked about grips of the robots.
+
+        They are those of the nodes; where robots are not equally stiff, numbers also say which
+        stiffness a grip has.
+
+        ``grips``: the node of every robot of the scene in order, None of one that holds none.
+
+        Examples
+        --------
+        >>> import dataclasses
+        >>> import seqopt
+        >>> scene = seqopt.load_scene("arch25")
+        >>> scene.grip_numbers((7, None, 3))
+        (7, 3)
+        >>> left, middle, right = scene.robots
+        >>> soft = dataclasses.replace(right, stiffness=1e6)
+        >>> scene.with_robots(left, middle, soft).grip_numbers((7, None, 3))
+        (7, 53)
+        """
+        robots = [i for i, node in enumerate(grips) if node is not None]
+        nodes = np.array([node for node in grips if node is not None], dtype=np.int64)
+        return tuple(self.grip_kinds.numbers(nodes, robots).tolist())
 
     def plot(self, bricks: int | None = None) -> Figure:
         """Draw the scene, or its first ``bricks`` in build order and the others pale."""

@@ -102,7 +102,10 @@ def _named(bricks: list[Brick]) -> str:
 
 
 _VERSION = 1
-_UNSAID = ("thickness", "face", "shape", "node_offsets", "movement", "position", "since")
+_UNSAID = (
+    *("thickness", "face", "shape", "node_offsets", "movement", "position", "since"),
+    *("stiffness", "rotational_stiffness"),  # of robots
+)
 """Left out of a file where there is none."""
 _UNLOADED = {"loads": (), "wind": (0.0, 0.0, 0.0), "weight_factor": 1.0}  # not said either
 _REACHES: dict[str, type[Reach]] = {"anywhere": Anywhere, "side": Side, "sphere": Sphere}
@@ -336,7 +339,7 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     for key, usual in _UNLOADED.items():
         if document[key] == usual:
             del document[key]
-    kinds = ("bricks", "joints", "grounds", "loads")
+    kinds = ("bricks", "joints", "grounds", "robots", "loads")
     for part in (part for kind in kinds for part in document.get(kind, ())):
         for key in _UNSAID:
             if part.get(key, "") is None:

@@ -80,7 +80,7 @@ def sort_robots(
         places = not rules.placers or robot.name in rules.placers
         cap = robot.payload if rules.payload is Payload.KEPT else np.inf
         cap = min(cap, (caps or {}).get(robot.name, np.inf))
-        key = (reach.tobytes(), newest.tobytes(), places, cap)
+        key = (reach.tobytes(), newest.tobytes(), places, cap, scene.grip_kinds.of_robot[i])
         first = alike.setdefault(key, RobotKind((), reach, newest, places, cap))
         alike[key] = replace(first, robots=(*first.robots, i))
     return tuple(alike.values())

@@ -17,6 +17,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg, sparse
@@ -29,7 +30,7 @@ from seqopt.engines.discrete._system import BedStiffness, System, build_system
 from seqopt.engines.interface import Fields, SerialEngine
 from seqopt.engines.rigid._mechanism import mechanism_error, require_resistance
 from seqopt.engines.rigid._mixed import Solution, respond
-from seqopt.errors import SeqoptError, SolverError
+from seqopt.errors import SceneError, SeqoptError, SolverError
 from seqopt.network._mechanics import build_statics, node_motion, point_motion
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
@@ -89,30 +90,35 @@ class DiscreteEngine(SerialEngine):
         pinch: Pinch | None = None,
     ) -> None:
         super().__init__(network)
+        if pinch is not None and not self.network.scene.grip_kinds.rigid:
+            raise SceneError("pinch: pads give way as they do; leave them or the grips' stiffness")
         self._mortar, self._bed, self._pinch = mortar, bed, pinch
         self._systems: dict[int, System] = {}
 
     def _answers(self, bricks: int, columns: Ints, hands: Hands | None) -> Iterable[Fields]:
-        for row in columns:
-            require_resistance(self.network, bricks, row)
+        every = [None if hands is None else hands.of(slice(i, i + 1)) for i in range(len(columns))]
+        for row, own in zip(columns, every, strict=True):
+            require_resistance(self.network, bricks, row, own)
         if bricks not in self._systems:
             self._systems[bricks] = build_system(self.network, bricks, self._mortar, self._bed)
-        far = np.zeros((*columns.shape, 3)) if hands is None else hands.moved
-        each = zip(columns, far, strict=True)
+        each = zip(columns, every, strict=True)
         return [self._solve_one(self._systems[bricks], *one) for one in each]
 
-    def _solve_one(self, system: System, columns: Ints, far: Floats) -> Fields:
-        """Return the fields of one grip set, moved (r, 3)."""
+    def _solve_one(self, system: System, columns: Ints, hands: Hands | None) -> Fields:
+        """Return the fields of one grip set."""
         network, pinch, inner = self._network, self._pinch, self._network.inner.ravel()[columns]
         nodes = network.node_position[inner]
+        springs: list[_Spring] = []
         if pinch is None:
-            held = _held_nodes(network, system, columns, nodes, far)
+            springs = _springs(network, system, columns, nodes, hands)
+            held = _held_nodes(network, system, columns, hands, springs)
         else:
+            far = (hands or Hands()).far(1, len(columns))[0]
             held = _pinched(network, system, columns, far, pinch)
         found = settle(held)
         if not found.rests:
             raise _not_at_rest(network, held, found, inner)
-        return _fields(network, held, found, columns, nodes)
+        return _fields(network, held, found, columns, springs)
 
 
 def _not_at_rest(network: Network, held: Held, found: Settled, nodes: Ints) -> SeqoptError:
@@ -129,19 +135,68 @@ def _not_at_rest(network: Network, held: Held, found: Settled, nodes: Ints) -> S
     )
 
 
+class _Spring(NamedTuple):
+    """A hand that gives way."""
+
+    grip: int
+    body: int
+    ways: list[int]  # in which of shifts and turns it gives way, w
+    motion: Floats  # (w, 6); how its node shifts and turns with the body, scaled as the system is
+    stiffness: Floats  # (w, w)
+    far: Floats  # (w,); how far its end is moved
+
+    @property
+    def pads(self) -> Floats:
+        """Its stiffness for the scaled twists of the body, (6, 6)."""
+        return np.asarray(self.motion.T @ self.stiffness @ self.motion)
+
+    def force(self, twist: Floats) -> Floats:
+        """Return what it exerts, (w,), on a body that is moved by a scaled twist (6,)."""
+        return np.asarray(self.stiffness @ (self.far - self.motion @ twist))
+
+
+def _springs(
+    network: Network, system: System, columns: Ints, nodes: Floats, hands: Hands | None
+) -> list[_Spring]:
+    """Return the hands of one set that give way; nodes are at (r, 3)."""
+    if hands is None or hands.give is None:
+        return []
+    grips, out = len(columns), []
+    soft, turns = hands.soft(1, grips)[0], hands.each_turns(1, grips)[0]
+    give, far = hands.each_give(1, grips)[0], hands.far(1, grips)[0]
+    scale = np.repeat([1.0, hands.lever], 3)
+    for grip, body in enumerate(columns // 2):
+        ways = [way for way in range(6) if (soft[grip] if way < 3 else turns[grip])]
+        if ways:
+            shift = point_motion(nodes[grip] - network.centroid[body])
+            every = np.vstack([shift, np.eye(6)[3:]]) * system.unit[:6]
+            own = give[grip][np.ix_(ways, ways)] / np.outer(scale[ways], scale[ways])
+            moved = np.append(far[grip], np.zeros(3))[ways]
+            out.append(_Spring(grip, int(body), ways, every[ways], np.linalg.inv(own), moved))
+    return out
+
+
 def _held_nodes(
-    network: Network, system: System, columns: Ints, nodes: Floats, far: Floats
+    network: Network, system: System, columns: Ints, hands: Hands | None, springs: list[_Spring]
 ) -> Held:
-    """Return a system whose held nodes, at (r, 3), are moved as far (r, 3)."""
-    blocks, taken = [np.eye(6)] * (len(system.load) // 6), np.zeros_like(system.load)
-    for body in np.unique(columns // 2):
-        mine = columns // 2 == body
+    """Return a system whose nodes are held: rigidly, and by springs where hands give way."""
+    count, hands = len(system.load) // 6, hands or Hands()
+    blocks, taken = [np.eye(6)] * count, np.zeros_like(system.load)
+    pads, pull = [sparse.csr_array((6, 6))] * count, np.zeros_like(system.load)
+    rigid, far = ~hands.soft(1, len(columns))[0], hands.far(1, len(columns))[0]
+    nodes = network.node_position[network.inner.ravel()[columns]]
+    for body in np.unique(columns[rigid] // 2):
+        mine = rigid & (columns // 2 == body)
         moved = point_motion(nodes[mine] - network.centroid[body]).reshape(-1, 6)
         moved *= system.unit[:6]
         blocks[body] = linalg.null_space(moved)
         taken[6 * body : 6 * body + 6] = np.linalg.lstsq(moved, far[mine].ravel(), rcond=None)[0]
+    for spring in springs:
+        own = slice(6 * spring.body, 6 * spring.body + 6)
+        pads[spring.body] = pads[spring.body] + sparse.csr_array(spring.pads)
+        pull[own] += spring.motion.T @ spring.stiffness @ spring.far
     free = sparse.csr_array(sparse.block_diag([sparse.csr_array(block) for block in blocks]))
-    return Held(system, free, sparse.csr_array(system.layers.shape), taken, np.zeros_like(taken))
+    return Held(system, free, sparse.csr_array(sparse.block_diag(pads)), taken, pull)
 
 
 def _pinched(network: Network, system: System, columns: Ints, far: Floats, pinch: Pinch) -> Held:
@@ -159,19 +214,30 @@ def _pinched(network: Network, system: System, columns: Ints, far: Floats, pinch
     return Held(system, every, pads_of, np.zeros_like(pull), pull)
 
 
-def _fields(network: Network, held: Held, found: Settled, columns: Ints, nodes: Floats) -> Fields:
+def _fields(
+    network: Network, held: Held, found: Settled, columns: Ints, springs: list[_Spring]
+) -> Fields:
     """Return the fields of one grip set.
 
-    Two grips on one brick share so that their forces are as small as can be; what pads exert
+    Two rigid grips on one brick share so that their forces are as small as can be; what pads exert
     beside a force, a moment, belongs to no node.
     """
     system, moved = held.system, held.moved(found.motion)
     wrench = np.zeros((len(network.springs.since), 6))
     wrench[system.acting] = system.bed_wrenches(found.force)
-    exerted = -held.reaction(found.motion, found.force) - held.pads @ moved + held.pull
-    force = np.zeros((len(columns), 3))
-    for body in np.unique(columns // 2):
-        mine, rows = np.flatnonzero(columns // 2 == body), slice(6 * body, 6 * body + 6)
+    exerted = -held.reaction(found.motion, found.force)
+    (force, moment), soft = np.zeros((2, len(columns), 3)), np.zeros(len(columns), dtype=bool)
+    for spring in springs:
+        both = np.zeros(6)
+        both[spring.ways] = spring.force(moved[6 * spring.body : 6 * spring.body + 6])
+        force[spring.grip], moment[spring.grip] = both[:3], both[3:]
+        soft[spring.grip] = 0 in spring.ways
+    if not springs:
+        exerted += held.pull - held.pads @ moved
+    nodes = network.node_position[network.inner.ravel()[columns]]
+    for body in np.unique(columns[~soft] // 2):
+        mine = np.flatnonzero(~soft & (columns // 2 == body))
+        rows = slice(6 * body, 6 * body + 6)
         if len(mine) == 1:
             force[mine[0]] = exerted[rows][:3]
         else:
@@ -179,6 +245,6 @@ def _fields(network: Network, held: Held, found: Settled, columns: Ints, nodes: 
             pulls = np.linalg.lstsq(maps, exerted[rows] / system.unit[rows], rcond=None)[0]
             force[mine] = pulls.reshape(-1, 3)
     twist = (system.unit * moved)[None, : 6 * system.bricks]
-    solution = Solution(twist, wrench[None], force[None])
+    solution = Solution(twist, wrench[None], force[None], moment[None], soft[None])
     motion, statics = node_motion(network, system.bricks), build_statics(network)
     return respond(network, statics, motion, columns[None], solution)

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from functools import cache
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, Ints, frozen
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._hands import Hands
 from seqopt.engines.rigid._operator import ComplianceOperator
+from seqopt.engines.rigid._pairs import (
+    Pairs,
+    as_rows,
+    brace,
+    by_grip,
+    count_grips,
+    pairs_of,
+    soften,
+)
 
 
 def _solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tuple[Floats, Floats]:
@@ -57,42 +64,6 @@ class _GripForces(NamedTuple):
         return np.asarray(self.pivot.min(axis=0, initial=1.0))
 
 
-class Pairs(NamedTuple):
-    """Two grips on one brick.
-
-    ``sets``, ``first``, ``second``, ``brick`` (p,): the grip set, which two of its grips, and the
-    brick; ``axis`` (p, d): unit vectors from the brick's first node to its second.
-    """
-
-    sets: Ints
-    first: Ints
-    second: Ints
-    brick: Ints
-    axis: Floats
-
-    def within(self, start: int, end: int) -> Pairs:
-        """Return those of some sets, counted from the first of these."""
-        here = (self.sets >= start) & (self.sets < end)
-        first, second, brick = self.first[here], self.second[here], self.brick[here]
-        return Pairs(self.sets[here] - start, first, second, brick, self.axis[here])
-
-
-def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
-    """Return all pairs of grips of the sets that share a brick."""
-    first, second = _couples(columns.shape[1])
-    bricks = columns.T // 2
-    couple, sets = np.divmod(np.flatnonzero(bricks[first] == bricks[second]), len(columns))
-    first, second = first[couple], second[couple]
-    brick = bricks[first, sets]
-    return Pairs(sets, first, second, brick, operator.axis[brick])
-
-
-@cache
-def _couples(grips: int) -> Ints:
-    """Return all couples (2, c) of a number of grips."""
-    return frozen(np.array([*combinations(range(grips), 2)], dtype=np.int64).reshape(-1, 2).T)
-
-
 def grip_forces(
     operator: ComplianceOperator,
     columns: Ints,
@@ -100,9 +71,9 @@ def grip_forces(
     pairs: Pairs | None = None,
     hands: Hands | None = None,
 ) -> _GripForces:
-    """Return the forces with which grips hold their nodes still, or where hands are.
+    """Return the forces with which grips hold their nodes still, or where their hands let them be.
 
-    Two grips on one rigid brick leave the force between them along the brick undetermined:
+    Two rigid grips on one rigid brick leave the force between them along the brick undetermined:
     `share_pairs` says how they share it.
 
     ``index`` (S, k): the loads at the grips, from `ComplianceOperator.load_index`; ``pairs``: of
@@ -110,10 +81,9 @@ def grip_forces(
     """
     pairs = pairs_of(operator, columns) if pairs is None else pairs
     rows = np.ascontiguousarray(index.T)
-    dead = operator.dead_displacement.take(rows)
-    if hands is not None:
-        dead[: len(dead) - operator.loose] -= _in_rows(hands.moved)
-    force, pivot = _solved(operator, pairs, rows, dead)
+    asked = _Asked(operator, pairs, rows, hands)
+    off = None if hands is None or hands.moved is None else _in_rows(operator, -hands.moved)
+    force, pivot = _solved(asked, operator.dead_displacement.take(rows), off)
     return _GripForces(force.T, pivot)
 
 
@@ -130,13 +100,14 @@ def trusted(
     """
     lowest = found.lowest
     out = np.zeros(len(lowest), dtype=bool)
-    if hands is None:  # where hands move, forces may undo what the weight does
-        out = np.asarray(most * lowest >= len(found.pivot) * operator.worst_doubt)
+    if hands is None or hands.moved is None:  # else forces may undo what the weight does
+        own = 0.0 if hands is None else 2.0  # of what hands give, that forces undo as well
+        out = np.asarray(most * lowest >= len(found.pivot) * operator.worst_doubt + own)
     rest = np.flatnonzero(~out & (lowest > 0))
     if rest.size:
         part = _GripForces(found.force[rest], found.pivot[:, rest])
-        own = None if hands is None else hands.of(rest)
-        out[rest] = _doubts(operator, index[rest], part, own) <= most
+        own_hands = None if hands is None else hands.of(rest)
+        out[rest] = _doubts(operator, index[rest], part, own_hands) <= most
     return out
 
 
@@ -153,28 +124,58 @@ def _doubts(
     root, own, scale = operator.shares.take(np.ascontiguousarray(index.T), axis=1)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         own += (root * size).sum(axis=0)
-        if hands is not None:
-            nodes = len(own) - operator.loose
-            own[:nodes] += np.abs(_in_rows(hands.moved)) / root[:nodes]
         own *= scale
+        if hands is not None:
+            own = _with_hands(operator, own, size, root / scale, hands)
         own /= found.pivot
         most = size.max(axis=0, initial=np.finfo(float).tiny)
         return np.asarray(own.max(axis=0, initial=0.0) / most)
 
 
-def _in_rows(moved: Floats) -> Floats:
-    """Return what hands move (S, r, d) as rows (rd, S)."""
-    return np.ascontiguousarray(moved.reshape(len(moved), moved.shape[1] * moved.shape[2]).T)
+def _with_hands(
+    operator: ComplianceOperator, own: Floats, size: Floats, flexibility: Floats, hands: Hands
+) -> Floats:
+    """Return errors of forces (k, S), as of `_doubts`, that hands add to and give way to.
+
+    ``size`` (k, S): of the forces, N; ``flexibility`` (k, S): the diagonal, m/N.
+    """
+    given, softer = np.zeros_like(own), np.zeros_like(own)
+    nodes, grips = len(own) - operator.loose, count_grips(operator, len(own))
+    if hands.moved is not None:
+        moved = _in_rows(operator, np.abs(hands.moved))
+        given[: len(moved)] += moved
+    if hands.give is not None:
+        parts = np.abs(hands.each_give(own.shape[1], grips))
+        bears = by_grip(operator, size.T, grips)
+        given[:nodes] += as_rows(operator, np.einsum("srij,srj->sri", parts, bears))
+        softer[:nodes] = as_rows(operator, np.diagonal(parts, axis1=2, axis2=3))
+    return np.asarray((own * flexibility + given) / (flexibility + softer))
 
 
-def still_forces(operator: ComplianceOperator, columns: Ints, index: Ints, moved: Floats) -> Floats:
+def _in_rows(operator: ComplianceOperator, moved: Floats) -> Floats:
+    """Return what hands move (S, r, d) as rows of all unknowns (k, S), loose motions left out."""
+    rows = as_rows(operator, moved)
+    return np.pad(rows, ((0, moved.shape[1] * operator.moments), (0, 0)))
+
+
+def still_forces(
+    operator: ComplianceOperator,
+    columns: Ints,
+    index: Ints,
+    moved: Floats,
+    hands: Hands | None = None,
+    off: Floats | None = None,
+) -> Floats:
     """Return the forces (S, k) with which grips undo given displacements of their nodes.
 
-    ``moved`` (S, k): m; of loose motions, the force that pulls at them, N. Between two grips on one
-    brick there is no force.
+    ``moved`` (S, k): m; of loose motions, the force that pulls at them, N; ``hands``: how they
+    give way; ``off`` (S, r, w): how far they are from where they should be, m, what they give
+    counted. Between two rigid grips on one brick there is no force.
     """
     pairs, rows = pairs_of(operator, columns), np.ascontiguousarray(index.T)
-    return _solved(operator, pairs, rows, np.ascontiguousarray(moved.T))[0].T
+    apart = None if off is None else as_rows(operator, off)
+    asked = _Asked(operator, pairs, rows, hands)
+    return _solved(asked, np.ascontiguousarray(moved.T), apart)[0].T
 
 
 def share_pairs(
@@ -205,16 +206,27 @@ def share_pairs(
         between = found[np.arange(len(sets)), edges]
     shift = between[:, None] * pairs.axis
     shift[columns[sets, pairs.first] % 2 == 1] *= -1.0  # the axis leads to the second node
-    own = force.shape[1] - operator.loose
+    own = count_grips(operator, force.shape[1]) * operator.directions
     nodes = force[:, :own].reshape(len(force), -1, pairs.axis.shape[1])
     nodes[sets, pairs.first] += shift
     nodes[sets, pairs.second] -= shift
 
 
-def _solved(
-    operator: ComplianceOperator, pairs: Pairs, rows: Ints, dead: Floats
-) -> tuple[Floats, Floats]:
-    """Return forces at loads (k, S) that undo displacements (k, S), and scaled pivots (k, S)."""
+class _Asked(NamedTuple):
+    """Grip sets whose forces are to be found."""
+
+    operator: ComplianceOperator
+    pairs: Pairs
+    rows: Ints  # (k, S); loads at the grips
+    hands: Hands | None  # in the operator's directions
+
+
+def _solved(asked: _Asked, dead: Floats, off: Floats | None = None) -> tuple[Floats, Floats]:
+    """Return forces at loads (k, S) that undo displacements (k, S), and scaled pivots (k, S).
+
+    ``off`` (n, S): by how much hands already let their nodes move, where they bear something.
+    """
+    operator, pairs, rows, hands = asked
     count, sets = rows.shape
     size = len(operator.flexibility)
     system = np.empty((count + 1, count, sets))
@@ -224,21 +236,14 @@ def _solved(
         part = system[mine, : mine.stop]
         operator.flexibility.take(entries, out=part, mode="clip")  # others copy once more
     np.negative(dead, out=system[-1])
-    if len(pairs.sets):
-        nodes = count - operator.loose
-        _brace(system[:nodes, :nodes], pairs)
     scale = 1 / operator.softness if operator.loose else 1.0
+    if hands is not None and hands.give is not None:
+        spread = soften(system, operator, pairs, hands, off)
+        force, pivot = _solve_positive(system, operator.loose, scale)
+        return spread(force, pivot)
+    if off is not None:
+        system[-1, : len(off)] -= off
+    if len(pairs.sets):
+        nodes = count_grips(operator, count) * operator.directions
+        brace(system[:nodes, :nodes], pairs)
     return _solve_positive(system, operator.loose, scale)
-
-
-def _brace(system: Floats, pairs: Pairs) -> None:
-    """Give the force between two grips on one brick a flexibility, so that there is one answer."""
-    count, sets = system.shape[1:]
-    width = pairs.axis.shape[1]
-    blocks = system.reshape(count // width, width, count // width, width, sets)
-    every = np.arange(count)[:, None]
-    scaled = system[every, every, pairs.sets].sum(axis=0)[:, None] * pairs.axis
-    block = scaled[:, :, None] * pairs.axis[:, None]
-    rows = np.array([pairs.first, pairs.second, pairs.second])
-    columns = np.array([pairs.first, pairs.second, pairs.first])
-    blocks[rows, :, columns, :, pairs.sets] += np.array([block, block, -block])

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import linalg, sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
+from seqopt.engines._hands import Hands
 from seqopt.errors import MechanismError
 from seqopt.network._mechanics import (
     Statics,
@@ -180,20 +181,36 @@ def rigid_structure(network: Network, bricks: int) -> RigidStructure:
     return RigidStructure(acting, gap, stiffness, matrix, motion, inner, build_statics(network))
 
 
-def require_resistance(network: Network, bricks: int, columns: Ints) -> None:
+def require_resistance(
+    network: Network, bricks: int, columns: Ints, hands: Hands | None = None
+) -> None:
     """Raise `MechanismError` if one grip set leaves a motion that nothing resists.
 
     The assembled stiffness settles most cases at once. It cannot tell a soft support from none;
-    `free_motion` can.
+    `free_motion` can. A hand that gives way resists as one that does not. ``hands``: of this set.
     """
     parts = rigid_structure(network, bricks)
+    held = np.vstack([parts.forbidden(columns), _kept_from_turning(columns, bricks, hands)])
     with one_thread():
-        values, vectors, motions = resisting_modes(parts.matrix, parts.forbidden(columns))
-    if lost_to_rounding(values) and free_motion(network, bricks, columns) is not None:
+        values, vectors, motions = resisting_modes(parts.matrix, held)
+    if lost_to_rounding(values) and free_motion(network, bricks, columns, hands) is not None:
         raise mechanism_error(network, motions @ vectors[:, 0])
 
 
-def free_motion(network: Network, bricks: int, columns: Ints) -> Floats | None:
+def _kept_from_turning(columns: Ints, bricks: int, hands: Hands | None) -> Floats:
+    """Return the turns (n, 6b) of bricks that hands of one set resist."""
+    turns = np.zeros(len(columns), dtype=bool)
+    if hands is not None:
+        turns = hands.each_turns(1, len(columns))[0]
+    out = np.zeros((3 * int(turns.sum()), 6 * bricks))
+    for n, brick in enumerate(columns[turns] // 2):
+        out[3 * n : 3 * n + 3, 6 * brick + 3 : 6 * brick + 6] = np.eye(3)
+    return out
+
+
+def free_motion(
+    network: Network, bricks: int, columns: Ints, hands: Hands | None = None
+) -> Floats | None:
     """Return a motion that deforms no spring with any stiffness and moves no held node.
 
     How stiff springs are does not count: a soft one ties as well as a stiff one, so that rounding
@@ -203,7 +220,8 @@ def free_motion(network: Network, bricks: int, columns: Ints) -> Floats | None:
     """
     parts = ungripped_system(network, bricks)
     node = 3 * network.inner.ravel()[columns][:, None] + np.arange(3)
-    held = parts.motion[node.ravel()].toarray() * parts.twist_unit
+    held = parts.motion[node.ravel()].toarray()
+    held = np.vstack([held, _kept_from_turning(columns, bricks, hands)]) * parts.twist_unit
     ties = np.vstack([parts.deformation[parts.stiffness > 0].toarray(), held])
     with one_thread():
         _, sizes, motions = np.linalg.svd(ties, full_matrices=len(ties) < ties.shape[1])

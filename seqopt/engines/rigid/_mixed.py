@@ -38,6 +38,7 @@ from seqopt.engines.rigid._mechanism import (
 from seqopt.errors import SolverError
 from seqopt.network._mechanics import Statics
 from seqopt.network.network import Network
+from seqopt.scene._checks import settle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,12 +47,20 @@ class Solution(FrozenValue):
 
     ``twist`` (S, 6b): of the bricks, m and rad. ``wrench`` (S, J, 6): of every spring of the
     network on its second body, N and N m; zero where it does not act. ``force`` (S, r, 3): of the
-    grips, N; two on one brick may share theirs in any way.
+    grips, N; two rigid ones on one brick may share theirs in any way. ``moment`` (S, r, 3): of the
+    grips, N m. ``soft`` (S, r): which grips give way.
     """
 
     twist: Floats
     wrench: Floats
     force: Floats
+    moment: Floats = None  # type: ignore[assignment]  # none where none is given
+    soft: Bools | None = None
+
+    def __post_init__(self) -> None:
+        if self.moment is None:
+            settle(self, moment=np.zeros_like(self.force))
+        super().__post_init__()
 
 
 def respond(
@@ -67,7 +76,7 @@ def respond(
     load = np.tile(network.inner_load(bricks), (sets, 1, 1))
     load[np.arange(sets)[:, None], columns] += force
     carried = edge_forces(network, statics, wrench, load)
-    split_pairs(network, columns, force, carried)
+    split_pairs(network, columns, force, carried, solution.soft)
     moved = (motion @ twist.T).T.reshape(sets, motion.shape[0] // 3, 3)
     return Fields(
         edge_force=carried,
@@ -76,6 +85,7 @@ def respond(
         support=reactions(network, statics, wrench),
         joint_wrench=wrench,
         brick_twist=twist.reshape(sets, bricks, 6),
+        grip_moment=solution.moment,
     )
 
 
@@ -99,16 +109,21 @@ def reactions(network: Network, statics: Statics, wrench: Floats) -> Floats:
     return np.asarray(np.einsum("gij,sgj->sgi", statics.support_of_spring, at_spring))
 
 
-def split_pairs(network: Network, columns: Ints, force: Floats, carried: Floats) -> None:
-    """Let each of two grips on one brick take what reaches its own node, in place.
+def split_pairs(
+    network: Network, columns: Ints, force: Floats, carried: Floats, soft: Bools | None = None
+) -> None:
+    """Let each of two rigid grips on one brick take what reaches its own node, in place.
 
-    ``force`` (S, r, 3): of the grips; ``carried`` (S, E): by the edges.
+    ``force`` (S, r, 3): of the grips; ``carried`` (S, E): by the edges; ``soft`` (S, r): which
+    grips give way.
     """
+    soft = np.zeros(columns.shape, dtype=bool) if soft is None else soft
     inner = np.flatnonzero(network.edge_spring < 0)
     edge_of = np.empty(len(network.inner), dtype=np.int64)
     edge_of[network.edge_brick[inner]] = inner
     for i, j in permutations(range(columns.shape[1]), 2):
-        sets = np.flatnonzero((columns[:, i] % 2 == 0) & (columns[:, j] == columns[:, i] + 1))
+        pair = (columns[:, i] % 2 == 0) & (columns[:, j] == columns[:, i] + 1)
+        sets = np.flatnonzero(pair & ~soft[:, i] & ~soft[:, j])
         edge = edge_of[columns[sets, i] // 2]
         shift = carried[sets, edge][:, None] * network.edge_axis[edge]
         force[sets, i] += shift
@@ -122,14 +137,17 @@ class MixedSystem(FrozenValue):
 
     forbidden: sparse.csr_array  # (c, 6b); scaled twists that the grips forbid
     matrix: sparse.csc_array  # (6s + 6b + c,)
-    force: Floats  # (3r, c); forces of the grips for unit multipliers
+    force: Floats  # (wr, c); forces of the grips, then moments over a lever, for unit multipliers
+    weight: Floats  # (c,); by which the grips' equations are multiplied
 
 
-def mixed_system(parts: Ungripped, grips: Ints, shift: Floats | None = None) -> MixedSystem:
+def mixed_system(
+    parts: Ungripped, grips: Ints, shift: Floats | None = None, hands: Hands | None = None
+) -> MixedSystem:
     """Return the system of one grip set.
 
     ``shift`` (6b,): added to the diagonal of the scaled stiffness, so that a mechanism can be
-    factored.
+    factored; ``hands``: of this set.
     """
     network = parts.network
     motion = parts.motion[(3 * network.inner.ravel()[grips, None] + np.arange(3)).ravel()]
@@ -140,21 +158,83 @@ def mixed_system(parts: Ungripped, grips: Ints, shift: Floats | None = None) -> 
             directions[i] = linalg.null_space(step)
     force = linalg.block_diag(*directions) if len(grips) else np.zeros((0, 0))
     rows = sparse.csr_array(sparse.csr_array(force.T) @ motion)
+    corner, weight = None, np.ones(force.shape[1])
+    if hands is not None and hands.give is not None:
+        rows, force, give = _given(parts, grips, rows, force, hands)
+        corner = parts.unit * give
+        weight = 1 / np.maximum(1.0, np.diag(corner))
+        corner *= weight[:, None]
     forbidden = sparse.csr_array(rows @ sparse.diags_array(parts.twist_unit))
     matrix = parts.matrix
     if shift is not None:
         below = sparse.diags_array(np.concatenate([np.zeros(len(parts.wrench_unit)), shift]))
         matrix = sparse.csc_array(matrix + below)
-    return MixedSystem(forbidden, bordered(matrix, forbidden), force)
+    return MixedSystem(forbidden, bordered(matrix, forbidden, corner, weight), force, weight)
 
 
-def bordered(matrix: sparse.csc_array, rows: sparse.csr_array) -> sparse.csc_array:
-    """Return a system (6s + 6b,) in which products of rows (c, 6b) with twists are zero too."""
+def _given(
+    parts: Ungripped, grips: Ints, rows: sparse.csr_array, force: Floats, hands: Hands
+) -> tuple[sparse.csr_array, Floats, Floats]:
+    """Return rows of motions, forces and flexibilities of a set whose hands give way.
+
+    After the multipliers of rigid grips, ``rows`` (c, 6b) and ``force`` (3r, c), there is one for
+    the force between two hands on one brick of which one gives way, which moves no brick, and those
+    of moments. Results: ``rows`` (n, 6b); ``force`` (wr, n): forces, then moments over the lever;
+    ``give`` (n, n): m/N.
+    """
+    network, count = parts.network, len(grips)
+    soft, turns = hands.soft(1, count)[0], hands.each_turns(1, count)[0]
+    between = []
+    for i, j in permutations(range(count), 2):
+        if i < j and grips[i] // 2 == grips[j] // 2 and (soft[i] or soft[j]):
+            step = np.diff(network.node_position[network.inner[grips[i] // 2]], axis=0)[0]
+            pull = np.zeros((count, 3))
+            pull[i], pull[j] = -step / np.linalg.norm(step), step / np.linalg.norm(step)
+            between.append(pull.ravel())
+    shifts = np.column_stack([force, *between])
+    turned = np.zeros((3 * int(turns.sum()), 6 * parts.bricks))
+    bearing = np.zeros((3 * count, len(turned)))
+    for n, grip in enumerate(np.flatnonzero(turns)):
+        brick, own = grips[grip] // 2, slice(3 * n, 3 * n + 3)
+        turned[own, 6 * brick + 3 : 6 * brick + 6] = hands.lever * np.eye(3)
+        bearing[3 * grip : 3 * grip + 3, own] = np.eye(3)
+    still = np.zeros((len(between), 6 * parts.bricks))
+    out = linalg.block_diag(shifts, bearing)
+    if not turns.any():
+        out = out[: 3 * count]
+    whole = hands.each_give(1, count)[0]
+    give = linalg.block_diag(*whole[:, :3, :3]) if count else np.zeros((0, 0))
+    if turns.any():
+        corner = [linalg.block_diag(*whole[:, a, b]) for a, b in _QUARTERS]
+        give = np.block([corner[:2], corner[2:]])
+    every = sparse.csr_array(sparse.vstack([rows, sparse.csr_array(np.vstack([still, turned]))]))
+    return every, out, out.T @ give @ out
+
+
+_FORCE, _MOMENT = slice(3), slice(3, 6)
+_QUARTERS = ((_FORCE, _FORCE), (_FORCE, _MOMENT), (_MOMENT, _FORCE), (_MOMENT, _MOMENT))
+
+
+def bordered(
+    matrix: sparse.csc_array,
+    rows: sparse.csr_array,
+    corner: Floats | None = None,
+    weight: Floats | None = None,
+) -> sparse.csc_array:
+    """Return a system (6s + 6b,) in which products of rows (c, 6b) with twists are zero too.
+
+    ``corner`` (c, c): what multipliers add to them; ``weight`` (c,): by which these equations,
+    all but the corner, are multiplied.
+    """
     if not rows.shape[0]:
         return sparse.csc_array(matrix)
     entries = rows.data, rows.indices + matrix.shape[0] - rows.shape[1], rows.indptr
     wide = sparse.csr_array(entries, shape=(rows.shape[0], matrix.shape[0]))
-    return sparse.csc_array(sparse.block_array([[matrix, -wide.T], [wide, None]], format="csc"))
+    last, below = wide, None
+    if corner is not None and weight is not None:
+        last = sparse.csr_array(sparse.diags_array(weight) @ wide)
+        below = sparse.csr_array(corner)
+    return sparse.csc_array(sparse.block_array([[matrix, -wide.T], [last, below]], format="csc"))
 
 
 def unscaled(parts: Ungripped, states: Floats) -> tuple[Floats, Floats]:
@@ -210,30 +290,43 @@ def solve_load(
     `SolverError` if the answer still changes by more than `LAST_CORRECTION`.
     """
     network, bricks = parts.network, parts.bricks
-    system = mixed_system(parts, grips)
+    system = mixed_system(parts, grips, hands=hands)
     joints, last = len(parts.wrench_unit), len(parts.wrench_unit) + len(parts.twist_unit)
     load = np.zeros(system.matrix.shape[0])
     load[:joints], load[joints:last] = moved, pull
-    if hands is not None:
-        load[last:] = system.force.T @ hands.moved.ravel()
+    if hands is not None and hands.moved is not None:
+        load[last:] = system.weight * (system.force[: 3 * len(grips)].T @ hands.moved.ravel())
     try:
         factors = splu(system.matrix)
     except RuntimeError as error:
-        require_resistance(network, bricks, grips)
+        require_resistance(network, bricks, grips, hands)
         raise SolverError(f"{bricks} bricks: exactly singular in double precision") from error
     result = factors.solve(load)
     for _ in range(_CORRECTIONS):
         correction = factors.solve(load - system.matrix @ result)
         result += correction
     if not unchanged(parts, *np.stack([result, correction])[:, None, :last])[0]:
-        require_resistance(network, bricks, grips)
+        require_resistance(network, bricks, grips, hands)
         raise SolverError(
             f"{bricks} bricks: too close to a mechanism for double precision; "
             "add a grip or stiffness"
         )
     wrench, twist = unscaled(parts, result[None, :last])
     force = system.force @ (result[last:] * parts.unit)
-    return Solution(twist, wrench, force.reshape(1, -1, 3))
+    return Solution(twist, wrench, *borne(force[None], len(grips), hands))
+
+
+def borne(force: Floats, grips: int, hands: Hands | None) -> tuple[Floats, Floats, Bools | None]:
+    """Return forces, N, and moments, N m, of grips (S, r, 3), and which hands are soft.
+
+    ``force`` (S, wr): forces, then moments over the lever if hands bear any.
+    """
+    sets = len(force)
+    moment = np.zeros((sets, grips, 3))
+    if hands is not None and force.shape[1] > 3 * grips:
+        moment = hands.lever * force[:, 3 * grips :].reshape(sets, grips, 3)
+    soft = None if hands is None else hands.soft(sets, grips)
+    return force[:, : 3 * grips].reshape(sets, grips, 3), moment, soft
 
 
 def unchanged(
@@ -267,7 +360,9 @@ def solve_dense(network: Network, bricks: int, columns: Ints, hands: Hands | Non
     little for the assembled stiffness to tell, or the backward error is larger than `_BACKWARD`.
     """
     parts = rigid_structure(network, bricks)
-    far = np.zeros((*columns.shape, 3)) if hands is None else hands.moved
+    if hands is not None and hands.give is not None:
+        raise SolverError("direct solve: it holds rigidly; take another engine for soft grips")
+    far = (hands or Hands()).far(*columns.shape)
     each = zip(columns, far, strict=True)
     answers = [_solve_one_dense(network, parts, *one) for one in each]
     return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])

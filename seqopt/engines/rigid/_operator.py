@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
+from seqopt.engines._hands import lever_of
 from seqopt.engines.interface import SPACE, Basis
 from seqopt.engines.rigid._growth import Growth, SpanningTree
 from seqopt.engines.rigid._response_maps import (
@@ -34,8 +35,10 @@ class ComplianceOperator(FrozenValue):
 
     Row ``dm + i`` is a unit force in direction ``i`` of d at the ``m``-th inner node
     (`Network.inner`) of the h bricks that are loaded, l = 2dh loads in all: d = 3 in space, 2 in a
-    plane. One more row at the end of all but the first two arrays is the weight of the b bricks,
-    with what else loads them and how the ground moves.
+    plane. Where hands bear moments, those on a brick, over a lever, follow the forces at its nodes,
+    and what they move are rotations times the lever: `load_rows` counts. One more row at the end of
+    all but the first two arrays is the weight of the b bricks, with what else loads them and how
+    the ground moves.
 
     ``held`` (h,): the bricks that are loaded, ascending. ``flexibility`` (l, l): displacements of
     their inner nodes, m/N. ``dead_displacement`` (l,): displacements of these under the weight with
@@ -60,6 +63,7 @@ class ComplianceOperator(FrozenValue):
     loss: Floats
     loose: int = 0
     softness: float = 0.0
+    moments: int = 0  # of each brick that is loaded
 
     @property
     def bricks(self) -> int:
@@ -108,11 +112,10 @@ class ComplianceOperator(FrozenValue):
         return len(self.held) == self.bricks or bool((self.place[bricks] >= 0).all())
 
     def load_index(self, columns: Ints) -> Ints:
-        """Return which loads act at every grip, and after them all loose motions, (S, rd + m)."""
+        """Return which loads act at every grip, and after them all loose motions, (S, k)."""
         every = len(self.held) == self.bricks
         nodes = columns if every else 2 * self.place[columns // 2] + columns % 2
-        rows = self.directions * nodes[:, :, None] + np.arange(self.directions)
-        rows = rows.reshape(len(columns), columns.shape[1] * self.directions)
+        rows = load_rows(nodes, self.directions, self.moments)
         if self.loose:
             after = len(self.flexibility) - self.loose + np.arange(self.loose)
             rows = np.hstack([rows, np.tile(after, (len(rows), 1))])
@@ -148,11 +151,11 @@ class ComplianceOperator(FrozenValue):
 
     def _add_grips(self, index: Ints, force: Floats, out: Floats) -> None:
         """Add to edge forces (S, E) what forces (S, k) at second nodes send into inner edges."""
-        width = self.directions
-        nodes = (index.shape[1] - self.loose) // width
-        at = index[:, : nodes * width : width] // width
-        brick, own = self.held[at // 2], force[:, : nodes * width].reshape(len(index), nodes, width)
-        along = np.einsum("snd,snd->sn", own, self.axis[brick]) * (at % 2)
+        width, moments = self.directions, self.moments
+        nodes = (index.shape[1] - self.loose) // (width + moments)
+        place, at = np.divmod(index[:, : nodes * width : width], 2 * width + moments)
+        brick, own = self.held[place], force[:, : nodes * width].reshape(len(index), nodes, width)
+        along = np.einsum("snd,snd->sn", own, self.axis[brick]) * (at // width)
         for i in range(nodes):  # two may share an edge
             out[np.arange(len(index)), self.inner_edge[brick[:, i]]] += along[:, i]
 
@@ -163,7 +166,8 @@ class ComplianceOperator(FrozenValue):
             if name == "edge_force":
                 width = self.directions
                 out[-1, self.inner_edge] += self.at_second
-                rows = 2 * width * np.arange(len(self.held))[:, None] + width + np.arange(width)
+                each = 2 * width + self.moments
+                rows = each * np.arange(len(self.held))[:, None] + width + np.arange(width)
                 out[rows, self.inner_edge[self.held][:, None]] += self.axis[self.held]
             if name == "displacement":
                 out[-1] += self.maps.ground
@@ -179,6 +183,20 @@ class ComplianceOperator(FrozenValue):
         return self.twist if name in _OF_TWISTS else self.wrench
 
 
+def load_rows(nodes: Ints, directions: int, moments: int) -> Ints:
+    """Return the loads (S, k) at nodes (S, r): forces at all of them, then moments on bricks.
+
+    ``nodes``: as indices into ``network.inner.ravel()`` of the bricks that are loaded.
+    """
+    if not moments:
+        rows = directions * nodes[:, :, None] + np.arange(directions)
+        return np.asarray(rows.reshape(len(nodes), nodes.shape[1] * directions))
+    first = (2 * directions + moments) * (nodes // 2)
+    force = (first + directions * (nodes % 2))[:, :, None] + np.arange(directions)
+    moment = (first + 2 * directions)[:, :, None] + np.arange(moments)
+    return np.hstack([force.reshape(len(nodes), -1), moment.reshape(len(nodes), -1)])
+
+
 class OperatorBuilder:
     """Makes the operator of any brick count of a tree from what grows with it."""
 
@@ -187,6 +205,11 @@ class OperatorBuilder:
         self.growth = Growth(network, tree, basis)
         self._maps = scene_maps(network, basis)
         self._nodes = inner_motions(network, basis)
+        self._moments = len(basis.moment) if network.scene.grip_kinds.turns.any() else 0
+        if self._moments:
+            turned = np.zeros((len(self._nodes), self._moments, len(basis.wrench)))
+            turned[..., -self._moments :] = lever_of(network) * np.eye(self._moments)
+            self._nodes = np.concatenate([self._nodes, turned], axis=1)
 
     def operator(self, bricks: int, held: Ints | None = None) -> ComplianceOperator:
         """Return the operator of at most as many bricks as the tree has.
@@ -223,4 +246,5 @@ class OperatorBuilder:
             axis=axis @ self.basis.force.T,
             inner_edge=inner_edge,
             loss=np.repeat(self.growth.loss[held], nodes.shape[1]),
+            moments=self._moments,
         )

@@ -30,7 +30,7 @@ from scipy.sparse import csgraph
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._hands import Hands
+from seqopt.engines._hands import Hands, lever_of
 from seqopt.engines.interface import SPACE, Basis, Fields, join_sets, merge_sets, no_sets
 from seqopt.engines.rigid._grip_equations import grip_forces, still_forces
 from seqopt.engines.rigid._mechanism import Shared, Ungripped, require_resistance, ungripped_system
@@ -38,13 +38,15 @@ from seqopt.engines.rigid._mixed import (
     LAST_CORRECTION,
     Solution,
     bordered,
+    borne,
     rescaled,
     respond,
     solve_mixed,
     unchanged,
     unscaled,
 )
-from seqopt.engines.rigid._operator import ComplianceOperator
+from seqopt.engines.rigid._operator import ComplianceOperator, load_rows
+from seqopt.engines.rigid._pairs import by_grip
 from seqopt.engines.rigid._response_maps import ResponseMaps, inner_edges, loads_of, scene_maps
 from seqopt.errors import SolverError
 from seqopt.network._mechanics import point_motion
@@ -143,17 +145,21 @@ def _clusters(parts: Ungripped, firm: Bools) -> tuple[Ints, Ints]:
 _TIED = 0.1  # most that what resists loose motions may be of the springs that they stand on
 
 
-def _held_operator(system: _HeldSystem) -> ComplianceOperator:
+def _held_operator(
+    system: _HeldSystem, inner: sparse.csr_array | None = None
+) -> ComplianceOperator:
     """Return the operator of a partial structure whose loose motions are unknowns of grip sets.
 
     It is of all directions of space, with a load for each loose motion after those of the nodes.
+    ``inner`` (l, 6b): what the loads do to scaled twists; by default forces at the inner nodes.
     """
     parts, loose = system.parts, system.loose
-    joints, loads = len(parts.wrench_unit), 6 * parts.bricks
-    right = np.zeros((loads + loose, joints + loads))
-    right[:loads, joints:] = parts.inner.toarray() / parts.unit
+    inner = parts.inner if inner is None else inner
+    joints, loads = len(parts.wrench_unit), inner.shape[0]
+    right = np.zeros((loads + loose, joints + 6 * parts.bricks))
+    right[:loads, joints:] = inner.toarray() / parts.unit
     states, pull = system.solve(right, np.eye(loads + loose, loose, -loads))
-    motion = (parts.inner @ states[:, joints:].T).T
+    motion = (inner @ states[:, joints:].T).T
     reach, resistance = motion[loads:], pull[loads:]
     softness = _softness(motion[:loads], reach, resistance, parts.unit)
     states[:loads] += softness * (reach.T @ states[loads:])
@@ -162,7 +168,7 @@ def _held_operator(system: _HeldSystem) -> ComplianceOperator:
     flexibility[loads:, :loads], flexibility[:loads, loads:] = reach, reach.T
     corner = np.linalg.solve(np.eye(loose) - softness * resistance, resistance)
     flexibility[loads:, loads:] = -0.5 * (corner + corner.T)
-    return _operator(parts, states, flexibility, softness)
+    return _operator(parts, states, flexibility, softness, loose)
 
 
 def _softness(flexibility: Floats, reach: Floats, resistance: Floats, unit: float) -> float:
@@ -180,16 +186,17 @@ def _softness(flexibility: Floats, reach: Floats, resistance: Floats, unit: floa
 
 
 def _operator(
-    parts: Ungripped, states: Floats, flexibility: Floats, softness: float
+    parts: Ungripped, states: Floats, flexibility: Floats, softness: float, loose: int
 ) -> ComplianceOperator:
     """Return the operator whose loads and loose motions lead to scaled states (l + m, n).
 
     Its last row is the weight alone: corrections add what else there is.
     """
     network, bricks = parts.network, parts.bricks
-    loads = 6 * bricks
+    moments = (len(states) - loose) // bricks - 6
     weight = np.zeros(len(states))
-    weight[:loads] = network.inner_weight[: 2 * bricks].ravel()
+    at = load_rows(np.arange(2 * bricks)[None], 3, moments)[0]
+    weight[at[: 6 * bricks]] = network.inner_weight[: 2 * bricks].ravel()
     wrench, twist = unscaled(parts, states)
     wrench = wrench[:, parts.acting].reshape(len(states), -1)
     inner_edge, axis, at_second = inner_edges(network, bricks)
@@ -204,8 +211,9 @@ def _operator(
         axis=axis,
         inner_edge=inner_edge,
         loss=np.ones(len(states)),
-        loose=len(states) - loads,
+        loose=loose,
         softness=softness,
+        moments=moments,
     )
 
 
@@ -225,14 +233,14 @@ class Refinement:
     ) -> None:
         self.network, self.bricks = network, bricks
         self.parts = ungripped_system(network, bricks, shared)
-        self.held, self.inner = _hold_loose(self.parts, tied=tied), self.parts.inner
+        self.held, self.inner = _hold_loose(self.parts, tied=tied), _loaded(self.parts)
         weighed = sparse.csr_array(self.parts.load[None])
         self.pulls = sparse.vstack([self.inner / self.parts.unit, weighed], format="csr")
 
     @cached_property
     def own(self) -> ComplianceOperator:
         """Of all nodes and directions, from the factored system; for where something is loose."""
-        return _held_operator(self.held)
+        return _held_operator(self.held, self.inner)
 
     def solve(
         self,
@@ -258,12 +266,34 @@ class Refinement:
         return join_sets([no_sets(self.network, self.bricks, columns.shape[1]), *parts])
 
 
+def _loaded(parts: Ungripped) -> sparse.csr_array:
+    """Return what loads do to scaled twists, (l, 6b), as `load_rows` numbers them in space."""
+    network, size = parts.network, 6 * parts.bricks
+    if not network.scene.grip_kinds.turns.any():
+        return parts.inner
+    turned = np.zeros((3 * parts.bricks, size))
+    turned[np.arange(3 * parts.bricks), _turns(parts.bricks)] = lever_of(network)
+    both = sparse.vstack([parts.inner, sparse.csr_array(turned * parts.twist_unit)], format="csr")
+    each = np.hstack([np.arange(size).reshape(-1, 6), size + np.arange(size // 2).reshape(-1, 3)])
+    return sparse.csr_array(both[each.ravel()])
+
+
+def _turns(bricks: int) -> Ints:
+    """Return which of their twists (6b,) are turns."""
+    return (6 * np.arange(bricks)[:, None] + np.arange(3, 6)).ravel()
+
+
 class _Asked(NamedTuple):
     """Grip sets that are corrected together."""
 
     columns: Ints  # (S, r)
     loads: Ints  # (S, k); rows of the operator's loads at the grips
     hands: Hands | None  # in the operator's directions
+
+    @property
+    def grips(self) -> int:
+        """How many each holds."""
+        return int(self.columns.shape[1])
 
     def of(self, which: Ints) -> _Asked:
         """Return some of the sets."""
@@ -289,17 +319,18 @@ class _Corrector:
         """Return the fields of a few sets."""
         operator, parts, bricks = self.operator, self.parts, self.bricks
         index = operator.load_index(columns)
-        own = None if hands is None else hands.within(self.basis.force)
+        own = None if hands is None else hands.within(self.basis)
         found = grip_forces(operator, columns, index, hands=own)
         if operator.loose:
-            for row in columns[~(found.lowest >= _HARDLY_HELD)]:
-                require_resistance(self.network, bricks, row)
+            for at in np.flatnonzero(~(found.lowest >= _HARDLY_HELD)):
+                mine = None if hands is None else hands.of(slice(at, at + 1))
+                require_resistance(self.network, bricks, columns[at], mine)
         states = self._states(index, found.force)
         force = self._in_space(found.force, columns.shape[1])
         done = self._correct(_Asked(columns, index, own), states, force)
         wrench, twist = unscaled(parts, states[done])
-        held = force[done].reshape(int(done.sum()), columns.shape[1], 3)
-        solution = Solution(twist, wrench, held)
+        mine = None if hands is None else hands.of(done)
+        solution = Solution(twist, wrench, *borne(force[done], columns.shape[1], mine))
         motion = operator.maps.motion if self.basis is SPACE else parts.motion
         fields = respond(self.network, parts.statics, motion, columns[done], solution)
         if done.all():
@@ -316,10 +347,17 @@ class _Corrector:
         return rescaled(self.parts, wrench, twist.reshape(len(index), -1))
 
     def _in_space(self, force: Floats, grips: int) -> Floats:
-        """Return forces of grips (S, 3r) that are given in the operator's directions (S, k)."""
-        width = len(self.basis.force)
-        nodes = force[:, : grips * width].reshape(len(force), grips, width)
-        return np.asarray(nodes @ self.basis.force).reshape(len(force), 3 * grips)
+        """Return forces of grips, then moments if any, given in the operator's directions (S, k).
+
+        Result (S, 3r) or (S, 6r).
+        """
+        sets, width = len(force), len(self.basis.force)
+        nodes = force[:, : grips * width].reshape(sets, grips, width)
+        out = np.asarray(nodes @ self.basis.force).reshape(sets, 3 * grips)
+        if not self.operator.moments:
+            return out
+        borne = by_grip(self.operator, force, grips)[..., width:] @ self.basis.moment
+        return np.hstack([out, borne.reshape(sets, 3 * grips)])
 
     def _correct(self, asked: _Asked, states: Floats, force: Floats) -> Bools:
         """Correct answers in place until they no longer change; return which have come so far.
@@ -343,8 +381,8 @@ class _Corrector:
         """Return what must be added to scaled answers (S, n) and grip forces (S, 3r)."""
         operator, parts, columns = self.operator, self.parts, asked.columns
         joints, grips = len(parts.wrench_unit), columns.shape[1]
-        at = (3 * columns[:, :, None] + np.arange(3)).reshape(force.shape)
-        pulled = loads_of(at, force, 6 * self.bricks + 1).matrix @ self.pulls
+        at = load_rows(columns, 3, 3 if operator.moments else 0)
+        pulled = loads_of(at, force, self.pulls.shape[0]).matrix @ self.pulls
         missing = -(parts.matrix @ states.T).T
         missing[:, joints:] += pulled
         missing[:, :joints] += parts.moved
@@ -353,11 +391,32 @@ class _Corrector:
         loose = -operator.softness * pull  # how far what is missing moves loose parts
         if operator.loose:
             moved += loose @ operator.flexibility[-operator.loose :, : -operator.loose]
-        at_grips = np.take_along_axis(moved, at, axis=1).reshape(-1, 3) @ self.basis.force.T
-        if asked.hands is not None:
-            at_grips -= asked.hands.moved.reshape(at_grips.shape)
-        moved = np.hstack([at_grips.reshape(len(moved), -1), -pull])
-        change = still_forces(operator, columns, asked.loads, moved)
+        at_grips = self._at_grips(np.take_along_axis(moved, at, axis=1), grips)
+        moved, off = np.hstack([at_grips, -pull]), self._off(asked, force)
+        change = still_forces(operator, columns, asked.loads, moved, asked.hands, off)
         more = self._in_space(change, grips)
         change[:, change.shape[1] - operator.loose :] += loose
         return answer + self._states(asked.loads, change, 0.0), more
+
+    def _at_grips(self, moved: Floats, grips: int) -> Floats:
+        """Return motions at grips, (S, 3r) or (S, 6r) in space, in the operator's directions."""
+        sets = len(moved)
+        shift = moved[:, : 3 * grips].reshape(-1, 3) @ self.basis.force.T
+        if not self.operator.moments:
+            return shift.reshape(sets, -1)
+        turn = moved[:, 3 * grips :].reshape(-1, 3) @ self.basis.moment.T
+        return np.hstack([shift.reshape(sets, -1), turn.reshape(sets, -1)])
+
+    def _off(self, asked: _Asked, force: Floats) -> Floats | None:
+        """Return how far hands let their nodes be, (S, r, w); None if they are rigid and still."""
+        hands, grips = asked.hands, asked.grips
+        if hands is None:
+            return None
+        width, moments = self.operator.directions, self.operator.moments
+        out = np.zeros((len(force), grips, width + moments))
+        if hands.give is not None:
+            bears = by_grip(self.operator, self._at_grips(force, grips), grips)
+            out += np.einsum("srij,srj->sri", hands.each_give(len(force), grips), bears)
+        if hands.moved is not None:
+            out[..., :width] -= hands.moved
+        return out

@@ -34,11 +34,12 @@ from seqopt.engines.interface import (
     names_wanted,
     require_finite,
 )
-from seqopt.engines.rigid._grip_equations import Pairs, grip_forces, pairs_of, share_pairs, trusted
+from seqopt.engines.rigid._grip_equations import grip_forces, share_pairs, trusted
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mechanism import Shared, share
 from seqopt.engines.rigid._mixed import LAST_CORRECTION
 from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder
+from seqopt.engines.rigid._pairs import Pairs, by_grip, pairs_of
 from seqopt.engines.rigid._refinement import Refinement
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
@@ -58,7 +59,8 @@ class _Tried:
     columns: Ints  # (S, r); grips as indices into ``network.inner.ravel()``
     index: Ints  # (S, k); its loads at the grips
     force: Floats  # (S, k); there, N; zero where it cannot be trusted
-    pairs: Pairs  # of grips on one brick
+    pairs: Pairs  # of rigid grips on one brick
+    lever: float  # of moments, m
     trusted: Bools  # (S,); which sets it answers well enough
 
     def fields(self, want: Want) -> dict[str, Floats]:
@@ -75,6 +77,10 @@ class _Tried:
         share_pairs(operator, columns, self.index, force, found["edge_force"], self.pairs)
         nodes = force[:, : columns.shape[1] * operator.directions]
         found["grip_force"] = nodes.reshape(*columns.shape, operator.directions)
+        found["grip_moment"] = np.zeros((*columns.shape, 3))
+        if operator.moments:
+            borne = by_grip(operator, force, columns.shape[1])[..., operator.directions :]
+            found["grip_moment"] = self.lever * borne
         return found
 
 
@@ -102,9 +108,11 @@ def _try_forces(
         force[part] = found.force
         good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN, own)
     force[~good] = 0.0
+    pairs = pairs.only(pairs.rigid(hands, *columns.shape))
     if not even:
         good &= ~_cancels(operator, index, force)
-    return _Tried(operator, columns, index, force, pairs, good)
+    lever = 1.0 if hands is None else hands.lever
+    return _Tried(operator, columns, index, force, pairs, lever, good)
 
 
 def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
@@ -154,7 +162,7 @@ class ComplianceEngine(NamedEngine):
     ) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self._network, bricks, grips)
-        hands = read_hands(self._network, columns, moved)
+        hands = read_hands(self._network, columns, grips, moved)
         found = self._found(bricks, columns, hands, want)
         return require_finite(found, bricks, grips)
 
@@ -164,13 +172,15 @@ class ComplianceEngine(NamedEngine):
         if bricks <= len(self._tree.spring):
             operator, even = self._operator(bricks, columns), bricks <= self._even
             accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
-            own = None if hands is None else hands.within(self._basis.force)
+            own = None if hands is None else hands.within(self._basis)
             tried = _try_forces(operator, columns, own, even=even, accuracy=accuracy)
         if tried is None or (len(columns) and not tried.trusted.any()):
             return self._refined(bricks, columns, hands, want)
         found = tried.fields(want)
         if self._basis is not SPACE:
             found["grip_force"] = found["grip_force"] @ self._basis.force
+            if tried.operator.moments:
+                found["grip_moment"] = found["grip_moment"] @ self._basis.moment
         if not tried.trusted.all():
             wrong = ~tried.trusted
             rest = None if hands is None else hands.of(wrong)

@@ -340,6 +340,13 @@ class States(Shown):
         return np.concatenate([np.full(len(kind.robots), kind.cap) for kind in kinds])
 
     @cached_property
+    def _beyond(self) -> Ints:
+        """How far the places of grips of the robot of every column are after those of nodes."""
+        of_robot = self.network.scene.grip_kinds.of_robot
+        robots = [robot for kind in self.space.kinds for robot in kind.robots]
+        return np.asarray(2 * len(self.network.inner) * of_robot[robots])
+
+    @cached_property
     def _payloads(self) -> Floats:
         """What the robot of every column may carry where states must stand, N."""
         if isinstance(self.rules, FreeRules):
@@ -348,8 +355,13 @@ class States(Shown):
         return np.asarray(np.minimum(payloads, self._caps))
 
     def _grips(self, states: Ints, *, stand: bool = False) -> tuple[Ints, Floats]:
-        """Return the nodes held, ascending, and the largest force at each, (n, r)."""
+        """Return the nodes held, ascending, and the largest force at each, (n, r).
+
+        ``stand``: whether stability is asked, for which the kinds of grips do not count.
+        """
         held = states[:, : len(self._caps)].clip(min=0)
+        if not stand and self._beyond.any():
+            held = np.where(held > 0, held + self._beyond, 0)
         order = np.argsort(held, axis=1, kind="stable")
         most: Floats = self._payloads if stand else self._caps
         return np.take_along_axis(held, order, axis=1), np.asarray(most[order])

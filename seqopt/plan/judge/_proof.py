@@ -141,6 +141,10 @@ class Passable:
         self._most = np.array([most[r] for r in self.tables.team])
         self._payload = np.array([own[r] for r in self.tables.team])
         self._known = KnownRows()
+        kinds, nodes = problem.network.scene.grip_kinds, self.tables.nodes
+        more = [kind * kinds.span for kind in range(len(kinds.turns))]
+        self._numbers = np.concatenate([nodes + each for each in more])  # of grips, by place
+        self._beyond = len(nodes) * kinds.of_robot[list(self.tables.team)]
         self.margins = sum(goal.of_margins for goal in problem.goals)
         self._exact = not _screens(problem)  # whether all digits count
 
@@ -195,7 +199,7 @@ class Passable:
         goals = self.problem.goals
         if not level:
             return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
-        held, payload = self._held(states, self._most)
+        held, payload = self._held(states, self._most, self._beyond)
         most, margins, _ = asked
         k = self.margins
         below = np.inf
@@ -207,9 +211,13 @@ class Passable:
             ok[ok] = self.may_stand(level, states[ok], margins)
         return values, ok
 
-    def _held(self, states: Ints, most: Floats) -> tuple[Ints, Floats]:
-        """Return nodes held, ascending, and the most that those may carry who hold them, (n, r)."""
+    def _held(self, states: Ints, most: Floats, beyond: Ints | int = 0) -> tuple[Ints, Floats]:
+        """Return nodes held, ascending, and the most that those may carry who hold them, (n, r).
+
+        ``beyond`` (r,): how far places of robots' grips come after those of the nodes.
+        """
         grips = states[:, : self.tables.robots].clip(min=0)
+        grips = np.where(grips > 0, grips + beyond, 0)
         order = np.argsort(grips, axis=1, kind="stable")
         return np.take_along_axis(grips, order, axis=1), most[order]
 
@@ -232,10 +240,10 @@ class Passable:
         for taken in np.unique(count).tolist():
             rows = np.flatnonzero(count == taken)
             nodes = held[rows, robots - taken :]
-            codes = nodes @ len(self.tables.nodes) ** np.arange(taken)
+            codes = nodes @ len(self._numbers) ** np.arange(taken)
 
             def compute(new: Ints, nodes: Ints = nodes) -> Floats:
-                return self._computed(bricks, self.tables.nodes[nodes[new]], asked, below)
+                return self._computed(bricks, self._numbers[nodes[new]], asked, below)
 
             key = (bricks, taken, below, asked.exact, *asked.values)
             found = self._known.of(key, codes, compute)
@@ -286,7 +294,9 @@ def _alike(book: RuleBook, most: Mapping[int, float]) -> list[tuple[int, ...]]:
     for r in book.team:
         may = not book.rules.placers or scene.robots[r].name in book.rules.placers
         nodes = [book.newest_nodes[r, b] for b in range(1, last + 1)]
-        key = (book.reached[r, last], tuple(nodes), may, most[r])
+        own = scene.robots[r]
+        gives = (own.stiffness, own.rotational_stiffness)
+        key = (book.reached[r, last], tuple(nodes), may, most[r], gives)
         groups.setdefault(key, []).append(r)
     return [tuple(group) for group in groups.values() if len(group) > 1]
 

@@ -1,0 +1,91 @@
+"""Rigid bodies on springs, held by springs: a dense solver that shares nothing with the package.
+
+Forces of a joint or a hand are its stiffness times its stretch, all of them and the weights
+balance: one matrix, factored in double precision, the answer corrected with residuals in extended
+precision. For the grips' forces and the nodes' displacements alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import linalg
+
+LONG = np.longdouble
+
+
+def _reach(arm):
+    """Motions (3, 6) of a point for unit twists of its body."""
+    x, y, z = arm
+    turn = np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]], dtype=LONG)
+    return np.hstack([np.eye(3, dtype=LONG), turn])
+
+
+class SoftBodies:
+    """A partial structure of ``bricks`` of a scene."""
+
+    def __init__(self, scene, bricks):
+        self.bricks = bricks
+        self.placed = scene.placed[:bricks]
+        self.body = {node: i for i, b in enumerate(self.placed) for node in b.nodes}
+        self.center = [np.array(b.position, dtype=LONG) for b in self.placed]
+        self.at = {n: np.array(scene.node_position(n), dtype=LONG) for n in self.body}
+        index = {b.name: i for i, b in enumerate(self.placed)}
+        size = 6 * bricks
+        self.maps, self.stiffness = [], []
+        standing = {*index}
+        for joint in scene.joints:
+            if {*joint.bricks} <= standing:
+                first, second = (index[name] for name in joint.bricks)
+                self._spring(joint, second, first, size)
+        for ground in scene.grounds:
+            closes = ground.brick if ground.closes_with is None else ground.closes_with
+            if {ground.brick, closes} <= standing:
+                self._spring(ground, index[ground.brick], None, size)
+        self.load = np.zeros(size, dtype=LONG)
+        for i, brick in enumerate(self.placed):
+            pull = brick.mass * scene.weight_factor * np.array(scene.gravity)
+            self.load[6 * i : 6 * i + 3] = pull
+
+    def _spring(self, spring, second, first, size):
+        x, y = np.array(spring.along, dtype=LONG), np.array(spring.across, dtype=LONG)
+        axes = np.stack([x, y, np.cross(x, y)])
+        both = np.zeros((6, size), dtype=LONG)
+        for body, sign in ((second, 1), (first, -1)):
+            if body is not None:
+                arm = np.array(spring.position, dtype=LONG) - self.center[body]
+                both[:3, 6 * body : 6 * body + 6] += sign * axes @ _reach(arm)
+                both[3:, 6 * body + 3 : 6 * body + 6] += sign * axes
+        self.maps.append(both)
+        self.stiffness.append([*spring.translational_stiffness, *spring.rotational_stiffness])
+
+    def solve(self, nodes, hands, moved):
+        """Return forces and moments of grips (r, 6), and displacements of inner nodes.
+
+        ``hands``: stiffness along or about each of six axes, for every node; zero where there is
+        none. ``moved`` (r, 3).
+        """
+        maps, stiffness, stretch = [*self.maps], [*self.stiffness], [np.zeros(6)] * len(self.maps)
+        for node, hand, far in zip(nodes, hands, moved, strict=True):
+            body = self.body[node]
+            own = np.zeros((6, len(self.load)), dtype=LONG)
+            own[:3, 6 * body : 6 * body + 6] = _reach(self.at[node] - self.center[body])
+            own[3:, 6 * body + 3 : 6 * body + 6] = np.eye(3)
+            maps.append(own)
+            stiffness.append(hand)
+            stretch.append([*far, 0, 0, 0])
+        rows = np.concatenate(maps)
+        stiff = np.concatenate([np.array(s, dtype=LONG) for s in stiffness])
+        apart = np.concatenate([np.array(s, dtype=LONG) for s in stretch])
+        matrix = rows.T @ (stiff[:, None] * rows)
+        scale = 1 / np.sqrt(np.diag(matrix))
+        factors = linalg.cho_factor((scale[:, None] * matrix * scale).astype(float))
+        answer = np.zeros_like(self.load)
+        for _ in range(30):
+            left = self.load - rows.T @ (stiff * (rows @ answer - apart))
+            answer += scale * linalg.cho_solve(factors, (scale * left).astype(float))
+        force = -(stiff * (rows @ answer - apart)).reshape(-1, 6)
+        shifts = [
+            _reach(self.at[n] - self.center[i]) @ answer[6 * i : 6 * i + 6]
+            for n, i in self.body.items()
+        ]
+        return force[len(self.maps) :].astype(float), np.array(shifts, dtype=float)
