@@ -10,7 +10,7 @@ import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import asked_standing, mortar_word, parse_robots
+from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_robots
 from seqopt.contact.mortar import Mortar
 from seqopt.engines._auto import AutoEngine
 from seqopt.engines.interface import Engine
@@ -54,7 +54,8 @@ def asked_scene(options: argparse.Namespace) -> Scene:
         raise ProblemError(
             "--order search: only the free schedule has it; give optimize --schedule free"
         )
-    return in_order(load_scene(options.scene), options.order)
+    scene = in_order(load_scene(options.scene), options.order)
+    return scene if options.grips is None else parse_grips(options.grips, scene)
 
 
 def asked_engine(options: argparse.Namespace, network: Network) -> Engine:

@@ -80,7 +80,12 @@ def scene_options(takes: Takes) -> None:
         f"{', '.join(ORDERS)} (from all ground ends at once), or the names of all bricks, as "
         "1..12,25..13"
     )
-    declare(takes, {"--order ORDER": order})
+    grips = (
+        "how stiff the grips of all robots are, if not as the scene says: rigid, or N/m, as 1e6, "
+        "or three along its axes, as 1e6x1e6x5e5; turning=N m/rad after a comma keeps held bricks "
+        "from turning"
+    )
+    declare(takes, {"--order ORDER": order, "--grips STIFFNESS": grips})
 
 
 def engine_options(command: argparse.ArgumentParser) -> Takes:

@@ -41,7 +41,7 @@ from seqopt.workflow import SEARCH, posed
 
 ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone
 COUNT = 30
-SPREADS = ("stiffness", "density", "position")
+SPREADS = ("stiffness", "density", "position", "grips")
 _NOT_FREE = "the free schedule has no such; leave it out"
 _NOT_STATES = "aims and --stands have no such; leave it out"
 _MORE = f"it needs more; give --stands MORTAR, or --schedule {FREE}"
@@ -166,6 +166,11 @@ def _asked_scenarios(options: argparse.Namespace, scene: Scene) -> tuple[Scenari
 def _drawn(scene: Scene, options: argparse.Namespace, count: int, seed: int) -> Scenarios:
     asked = parse_numbers("--vary", options.vary, SPREADS, zero=True, advice=", as stiffness=3")
     factor = asked.pop("stiffness", 3.0)
-    if factor < 1:
-        raise ProblemError(f"--vary stiffness={factor:g}: give a factor from 1")
-    return scenarios(scene, stiffness=(1 / factor, factor), count=count, seed=seed, **asked)
+    grips = asked.pop("grips", 1.0)
+    for name, each in (("stiffness", factor), ("grips", grips)):
+        if each < 1:
+            raise ProblemError(f"--vary {name}={each:g}: give a factor from 1")
+    if grips > 1 and scene.grip_kinds.rigid:
+        raise ProblemError(f"--vary grips={grips:g}: they are rigid; say how stiff with --grips")
+    drawn = scenarios(scene, stiffness=(1 / factor, factor), count=count, seed=seed, **asked)
+    return drawn if grips == 1 else drawn.with_grips((1 / grips, grips))

@@ -18,6 +18,7 @@ from seqopt.problem.requirements import NEVER, Criterion, Limit, payload_limits
 from seqopt.problem.standing import Standing
 from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses.resources import Resources
+from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
 from seqopt.study.published import CRITERIA
@@ -91,6 +92,32 @@ def _response_word(name: str, where: str) -> str:
 def parse_robots(text: str) -> tuple[str, ...]:
     """Return names of robots from words with commas between them; nothing for none."""
     return tuple(name.strip() for name in text.split(",")) if text else ()
+
+
+def parse_grips(text: str, scene: Scene) -> Scene:
+    """Return a scene with grips as stiff as a word says, ``rigid``, ``1e6`` or ``1e6x1e6x5e5``.
+
+    ``turning=1e4`` after a comma is the rotational stiffness.
+    """
+    where = f"--grips {short(text)[1:-1]}"
+    shift, *rest = text.split(",")
+    ways: list[tuple[float, ...] | None] = [None, None]
+    for at, word in enumerate((shift, *(part.removeprefix("turning=") for part in rest))):
+        if at > 1 or (at and word == rest[0]):
+            raise SceneError(f"{where}: give a stiffness, and after a comma turning=STIFFNESS")
+        try:
+            numbers = [float(number) for number in word.split("x")]
+        except ValueError:
+            numbers = []
+        if at == 0 and word == "rigid":
+            continue
+        if len(numbers) not in (1, 3):
+            raise SceneError(f"{where}: {word!r} is no stiffness; give rigid, 1e6 or 1e6x1e6x5e5")
+        ways[at] = (*numbers,) * (3 // len(numbers))
+    try:
+        return scene.with_grips(*ways)  # type: ignore[arg-type]
+    except SceneError as error:
+        raise SceneError(f"{where}: {str(error).partition(': ')[2]}") from None
 
 
 def parse_numbers(

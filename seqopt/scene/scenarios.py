@@ -1,8 +1,8 @@
 """Scenarios: random variations of a scene, reproducible by a seed.
 
-Stiffnesses, weights and positions vary; topology, names, build order, robots, forces of loads and
-movements of ground ends stay, so the choices of a schedule mean the same in all scenarios. Wind
-varies as weights do.
+Stiffnesses, weights and positions vary, those of grips too if that is asked for; topology, names,
+build order, robots, forces of loads and movements of ground ends stay, so the choices of a schedule
+mean the same in all scenarios. Wind varies as weights do.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene._checks import short, whole_between
 from seqopt.scene.boxes import as_vector
-from seqopt.scene.parts import Brick, Ground, Joint
+from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.scene import Scene
 
 _End = TypeVar("_End", Joint, Ground)
@@ -41,6 +41,19 @@ def _stiffened(scene: Scene, translational: Floats, rotational: Floats) -> Scene
     joints = map(stiffer, scene.joints, shift[:count], turn[:count])
     grounds = map(stiffer, scene.grounds, shift[count:], turn[count:])
     return replace(scene, joints=tuple(joints), grounds=tuple(grounds))
+
+
+def _gripped(scene: Scene, factors: Floats) -> Scene:
+    """Return a scene whose grips are stiffer by factors (K,), one for every kind of them."""
+
+    def stiffer(robot: Robot, factor: float) -> Robot:
+        ways = {"stiffness": robot.stiffness, "rotational_stiffness": robot.rotational_stiffness}
+        given = {name: each for name, each in ways.items() if each is not None}
+        new = {name: as_vector(factor * np.array(each)) for name, each in given.items()}
+        return replace(robot, **new)
+
+    own = factors[scene.grip_kinds.of_robot].tolist()
+    return replace(scene, robots=tuple(map(stiffer, scene.robots, own)))
 
 
 def weighed(scene: Scene, factors: Floats) -> Scene:
@@ -79,6 +92,7 @@ def shifted(scene: Scene, size: float, rng: np.random.Generator) -> Scene:
 
 MOST = 100_000  # scenarios; more are a slip of the finger
 _LARGEST_FACTOR = 1e6
+_ALIKE = (1.0, 1.0)  # factors of what does not vary
 
 
 @dataclass(frozen=True)
@@ -86,7 +100,7 @@ class Scenarios:
     """Samples of a scene, and how they were drawn.
 
     ``stiffness``: least and largest factor; ``density``: largest relative change; ``position``:
-    largest shift, m.
+    largest shift, m; ``grips``: least and largest factor of grips' stiffness.
     """
 
     nominal: Scene
@@ -95,13 +109,16 @@ class Scenarios:
     position: float
     seed: int
     scenes: tuple[Scene, ...]
+    grips: tuple[float, float] = _ALIKE
 
     def __repr__(self) -> str:
         low, high = self.stiffness
+        least, most = self.grips
+        held = f", grips times {least:.3g} to {most:.3g}" if least < most else ""
         return (
             f"<{len(self.scenes)} scenarios of {self.nominal.name}: stiffness times {low:.3g} to "
             f"{high:.3g}, density within {100 * self.density:g} %, position within "
-            f"{1000 * self.position:g} mm, seed {self.seed}>"
+            f"{1000 * self.position:g} mm{held}, seed {self.seed}>"
         )
 
     @property
@@ -113,7 +130,26 @@ class Scenarios:
             "density": self.density,
             "position_m": self.position,
             "seed": self.seed,
-        }
+        } | ({"grips": list(self.grips)} if self.grips != _ALIKE else {})
+
+    def with_grips(self, factors: tuple[float, float]) -> Scenarios:
+        """Return the same scenarios with grips that vary as well.
+
+        ``factors``: the least and the largest by which the stiffness of grips is multiplied, the
+        same for all robots that give way alike; log-uniform. Rigid grips stay rigid.
+
+        Examples
+        --------
+        >>> import seqopt
+        >>> drawn = seqopt.scenarios(seqopt.load_scene("arch25").with_grips(1e6), count=2)
+        >>> [f"{each.robots[0].stiffness[0]:.3g}" for each in drawn.with_grips((0.5, 2)).scenes]
+        ['1.44e+06', '1.72e+06']
+        """
+        held = _factors("grips", factors)
+        if self.grips != _ALIKE:
+            raise SceneError("grips of these scenarios vary already; give factors once")
+        scenes = tuple(_held(s, held, (self.seed, i)) for i, s in enumerate(self.scenes))
+        return replace(self, scenes=scenes, grips=held)
 
 
 def scenarios(
@@ -159,7 +195,7 @@ def scenarios(
     >>> scenarios(load_scene("arch25"), count=5, seed=1)  # doctest: +ELLIPSIS
     <5 scenarios of arch25: stiffness times 0.333 to 3, density within 10 %, ... seed 1>
     """
-    low, high = _factors(stiffness)
+    low, high = _factors("stiffness", stiffness)
     spread = _from_zero("density", density, most=1.0)
     shift = _from_zero("position", position, most=math.inf)
     number = whole_between("count", count, 1, MOST)
@@ -190,7 +226,14 @@ def _sample(
         ) from error
 
 
-def _factors(given: Sequence[float]) -> tuple[float, float]:
+def _held(scene: Scene, factors: tuple[float, float], stream: tuple[int, int]) -> Scene:
+    """Return a scenario whose grips vary as well, with random numbers of their own."""
+    low, high = map(math.log, factors)
+    logs = np.random.default_rng([*stream, 3]).uniform(low, high, len(scene.grip_kinds.turns))
+    return _gripped(scene, np.exp(logs))
+
+
+def _factors(name: str, given: Sequence[float]) -> tuple[float, float]:
     """Return the least and the largest factor."""
     try:
         low, high = (float(value) for value in given)
@@ -198,7 +241,7 @@ def _factors(given: Sequence[float]) -> tuple[float, float]:
         low, high = math.nan, math.nan
     if not 1 / _LARGEST_FACTOR <= low <= high <= _LARGEST_FACTOR:
         raise SceneError(
-            f"stiffness is {short(given)}; give the least and the largest factor, from "
+            f"{name} is {short(given)}; give the least and the largest factor, from "
             f"{1 / _LARGEST_FACTOR:g} to {_LARGEST_FACTOR:g}"
         )
     return low, high

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
@@ -144,3 +144,29 @@ def test_scenarios_are_frozen_and_say_how_they_were_drawn():
 def test_numbers_that_cannot_be_meant(given, match):
     with pytest.raises(SceneError, match=match):
         scenarios(six_bricks(), **given)
+
+
+def test_grips_vary_by_kind_and_leave_all_else():
+    """Rigid ones stay rigid, equally stiff ones equally stiff."""
+    scene = six_bricks()
+    first, *others = scene.robots
+    soft = [replace(robot, stiffness=1e6, rotational_stiffness=1e4) for robot in others]
+    scene = scene.with_robots(first, *soft)
+    plain = scenarios(scene, count=20, seed=1)
+    drawn = plain.with_grips((0.5, 4.0))
+    ratios = []
+    for before, after in zip(plain.scenes, drawn.scenes, strict=True):
+        assert replace(after, robots=scene.robots) == before
+        rigid, *rest = after.robots
+        assert rigid == first
+        assert len({(robot.stiffness, robot.rotational_stiffness) for robot in rest}) == 1
+        assert after.grip_kinds.of_robot.tolist() == scene.grip_kinds.of_robot.tolist()
+        ratios.append(rest[0].stiffness[0] / 1e6)
+        assert rest[0].rotational_stiffness[2] == pytest.approx(1e4 * ratios[-1])
+    assert 0.5 <= min(ratios) < 0.8 < 2.5 < max(ratios) <= 4.0
+    assert drawn.settings["grips"] == [0.5, 4.0]
+    assert "grips times 0.5 to 4, seed 1" in repr(drawn)
+    with pytest.raises(SceneError, match="grips is 3; give the least and the largest"):
+        plain.with_grips(3)
+    with pytest.raises(SceneError, match="vary already"):
+        drawn.with_grips((0.5, 2.0))

@@ -102,7 +102,8 @@ ROBUST = {
     "--seed N": "which samples are drawn (default: 0)",
     "--vary NAME=VALUE ...": "how far samples are from the scene: stiffness=3 (of each joint, by a "
     "factor up to it, up or down), density=0.1 (of each brick, up to this share), position=0.002 "
-    "(of each brick and joint, up to so many m); these are the defaults",
+    "(of each brick and joint, up to so many m); these are the defaults; grips=2 (of grips that "
+    "are not rigid, by a factor up to it)",
 }
 TIME = {
     "--time-limit SECONDS": "stop choosing after it, with the best choice so far and a bound; with "

@@ -15,6 +15,7 @@ from seqopt._cli.outputs import keep_apart
 from seqopt._files import write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
+from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, dump_scene, load_scene
 from seqopt.work.progress import with_progress
@@ -73,6 +74,8 @@ def _network_facts(network: Network) -> dict[str, object]:
         "weight_N": float(np.linalg.norm(network.weight.sum(axis=0))),
         "loading": scene.loading,
         "payloads_N": {robot.name: robot.payload for robot in scene.robots},
+        "grips_N_per_m": {robot.name: robot.stiffness for robot in scene.robots},
+        "grips_Nm_per_rad": {robot.name: robot.rotational_stiffness for robot in scene.robots},
         "reaches": {robot.name: type(robot.reach).__name__.lower() for robot in scene.robots},
         "provenance": scene.provenance,
     }
@@ -96,13 +99,26 @@ def _list(options: argparse.Namespace) -> Answer:
     return Answer(facts=facts, text="\n".join(lines))
 
 
+def _grip(robot: Robot) -> str:
+    """Return how stiff a robot's grip is, in words; nothing where it is rigid."""
+
+    def said(stiffness: Any) -> str:
+        each = stiffness if len({*stiffness}) > 1 else stiffness[:1]
+        return " x ".join(f"{one:g}" for one in each)
+
+    out = "" if robot.stiffness is None else f", grip of {said(robot.stiffness)} N/m"
+    if robot.rotational_stiffness is not None:
+        out += f", which resists turning by {said(robot.rotational_stiffness)} N m/rad"
+    return out
+
+
 def _described(scene: Scene, facts: dict[str, Any]) -> Iterator[str]:
     """Yield what is in a scene, line by line."""
     yield size_line(scene)
     yield f"network: {facts['nodes']} nodes, {facts['edges']} edges"
     for robot in scene.robots:
         reach = facts["reaches"][robot.name]
-        yield f"{robot.name}: payload {robot.payload:g} N, reach {reach}"
+        yield f"{robot.name}: payload {robot.payload:g} N, reach {reach}{_grip(robot)}"
     yield f"weight: {facts['weight_N']:.1f} N"
     if scene.loading:
         yield f"beside the weight: {scene.loading}"
