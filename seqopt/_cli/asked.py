@@ -48,14 +48,18 @@ def size_line(scene: Scene) -> str:
     return f"{scene.name}: {size}, {len(scene.grounds)} ground ends"
 
 
-def asked_scene(options: argparse.Namespace) -> Scene:
-    """Return the scene that a command is asked for, in the order that it is asked for."""
+def asked_scene(options: argparse.Namespace, *, ranged: bool = False) -> Scene:
+    """Return the scene that a command is asked for, in the order that it is asked for.
+
+    ``ranged``: whether a range of stiffnesses leaves the scene's own.
+    """
     if options.order == "search":
         raise ProblemError(
             "--order search: only the free schedule has it; give optimize --schedule free"
         )
     scene = in_order(load_scene(options.scene), options.order)
-    return scene if options.grips is None else parse_grips(options.grips, scene)
+    own = options.grips is None or (ranged and ".." in options.grips)
+    return scene if own else parse_grips(options.grips, scene)
 
 
 def asked_engine(options: argparse.Namespace, network: Network) -> Engine:

@@ -48,6 +48,17 @@ def comparison_files(result: Comparison) -> dict[str, bytes | str]:
     return files
 
 
+def softness_files(table: pd.DataFrame) -> dict[str, bytes | str]:
+    """Return what builds come to for grips of several stiffnesses, as table and picture."""
+    files: dict[str, bytes | str] = {"grips.csv": csv_text(table)}
+    if figure_notes():
+        return files
+    from seqopt.report._style import picture_files  # noqa: PLC0415
+    from seqopt.report.charts import softness_chart  # noqa: PLC0415  # matplotlib is an extra
+
+    return files | picture_files("grips", softness_chart(table, [*dict.fromkeys(table["build"])]))
+
+
 def plan_files(
     plan: Plan, report: Mapping[str, object], prover: BuildProver, trial: Trial | None = None
 ) -> dict[str, bytes | str]:

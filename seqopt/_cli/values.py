@@ -16,6 +16,7 @@ from seqopt.plan.calling.formulation import Formulation, as_formulation
 from seqopt.problem.criteria import Among, Ranked, RankSum
 from seqopt.problem.requirements import NEVER, Criterion, Limit, payload_limits
 from seqopt.problem.standing import Standing
+from seqopt.report.softness import stiffnesses
 from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses.resources import Resources
 from seqopt.scene._checks import short
@@ -94,12 +95,24 @@ def parse_robots(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",")) if text else ()
 
 
+def parse_grip_range(text: str) -> tuple[float, ...]:
+    """Return the stiffnesses of a range, as ``1e5..1e9``, N/m."""
+    ends = [number_word(end, f"--grips {short(text)[1:-1]}") for end in text.split("..")]
+    if len(ends) != 2 or not ends[0] < ends[1]:
+        raise SceneError(
+            f"--grips {short(text)[1:-1]}: give the softest and the stiffest, 1e5..1e9"
+        )
+    return stiffnesses(*ends)
+
+
 def parse_grips(text: str, scene: Scene) -> Scene:
     """Return a scene with grips as stiff as a word says, ``rigid``, ``1e6`` or ``1e6x1e6x5e5``.
 
     ``turning=1e4`` after a comma is the rotational stiffness.
     """
     where = f"--grips {short(text)[1:-1]}"
+    if ".." in text:
+        raise SceneError(f"{where}: a range goes with compare; give one stiffness")
     shift, *rest = text.split(",")
     ways: list[tuple[float, ...] | None] = [None, None]
     for at, word in enumerate((shift, *(part.removeprefix("turning=") for part in rest))):

@@ -7,12 +7,12 @@ so that they are forces and lengths.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import GripError
@@ -22,36 +22,47 @@ if TYPE_CHECKING:
     from seqopt.engines.interface import Basis
 
 
+_Number = TypeVar("_Number", np.float64, np.bool_)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Hands(FrozenValue):
-    """The hands of S grip sets; a first axis of one holds for all sets, a second for all grips.
+    """The hands of S grip sets.
 
     ``moved`` (S, r, d): how far each is from where it should be, m; None if they are not.
-    ``give`` (S, r, w, w): how each gives way, m/N, first of forces in d directions, then of
-    moments over the lever if any hand of the scene bears any; None if all are rigid and turn.
-    ``turns`` (S, r): which bear moments; None if none of the scene does. ``lever``: m.
+    ``give`` (K, w, w): how hands of each kind give way, m/N, first of forces in d directions, then
+    of moments over the lever if any hand of the scene bears any; None if all are rigid and turn.
+    ``turns`` (K,): which kinds bear moments; None if none of the scene does. ``kind`` (S, r): of
+    every hand; (1, 1) if all are of one. ``lever``: m. ``directions``: of forces, d.
     """
 
     moved: Floats | None = None
     give: Floats | None = None
     turns: Bools | None = None
+    kind: Ints = field(default_factory=lambda: np.zeros((1, 1), dtype=np.int64))
     lever: float = 1.0
-    directions: int = 3  # of forces, d
+    directions: int = 3
 
     def of(self, which: Bools | Ints | slice) -> Hands:
         """Return those of some sets."""
         moved = None if self.moved is None else self.moved[which]
-        give = self.give if self.give is None or len(self.give) == 1 else self.give[which]
-        turns = self.turns if self.turns is None or len(self.turns) == 1 else self.turns[which]
-        return replace(self, moved=moved, give=give, turns=turns)
+        kind = self.kind if self.alike else self.kind[which]
+        return replace(self, moved=moved, kind=kind)
+
+    @property
+    def alike(self) -> bool:
+        """Whether all are of one kind."""
+        return self.give is None or len(self.give) == 1
 
     def within(self, basis: Basis) -> Hands:
-        """Return them in the directions of a basis."""
-        moved = None if self.moved is None else self.moved @ basis.force.T
+        """Return them in the directions of a basis: a plane's, or all."""
         give, count = self.give, len(basis.force)
+        if count == self.directions:
+            return self
         if give is not None:
             ways = basis.force if self.turns is None else basis.wrench
             give = ways @ give @ ways.T
+        moved = None if self.moved is None else self.moved @ basis.force.T
         return replace(self, moved=moved, give=give, directions=count)
 
     def far(self, sets: int, grips: int) -> Floats:
@@ -63,17 +74,22 @@ class Hands(FrozenValue):
         if self.give is None:
             return np.zeros((sets, grips), dtype=bool)
         d = self.directions
-        return np.broadcast_to(self.give[..., :d, :d].any(axis=(2, 3)), (sets, grips))
+        return self._each(np.asarray(self.give[:, :d, :d].any(axis=(1, 2))), sets, grips)
 
     def each_give(self, sets: int, grips: int) -> Floats:
-        """Return ``give`` of every hand; it must not be none."""
+        """Return how every hand gives way, (S, r, w, w); they must not all be rigid."""
         assert self.give is not None
-        return np.broadcast_to(self.give, (sets, grips, *self.give.shape[2:]))
+        return self._each(self.give, sets, grips)
 
     def each_turns(self, sets: int, grips: int) -> Bools:
-        """Return ``turns`` of every hand; false where none of the scene does."""
-        turns = np.zeros((1, 1), dtype=bool) if self.turns is None else self.turns
-        return np.broadcast_to(turns, (sets, grips))
+        """Return which hands (S, r) bear moments."""
+        if self.turns is None:
+            return np.zeros((sets, grips), dtype=bool)
+        return self._each(self.turns, sets, grips)
+
+    def _each(self, of_kind: NDArray[_Number], sets: int, grips: int) -> NDArray[_Number]:
+        """Return what kinds have (K, ...) of every hand, (S, r, ...)."""
+        return np.broadcast_to(of_kind[self.kind], (sets, grips, *of_kind.shape[1:]))
 
 
 def lever_of(network: Network) -> float:
@@ -111,10 +127,10 @@ def _giving(network: Network, grips: ArrayLike) -> Hands:
     turns = kinds.turns if kinds.turns.any() else None
     if turns is None:
         give = give[:, :3, :3]
-    which = np.zeros((1, 1), dtype=np.int64)
+    kind = np.zeros((1, 1), dtype=np.int64)
     if len(give) > 1:
-        _, which = kinds.split(np.asarray(grips))
-    return Hands(None, give[which], None if turns is None else turns[which], lever)
+        _, kind = kinds.split(np.asarray(grips))
+    return Hands(None, give, turns, kind, lever)
 
 
 def _lengths(columns: Ints, moved: ArrayLike) -> Floats:

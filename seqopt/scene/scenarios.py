@@ -47,10 +47,11 @@ def _gripped(scene: Scene, factors: Floats) -> Scene:
     """Return a scene whose grips are stiffer by factors (K,), one for every kind of them."""
 
     def stiffer(robot: Robot, factor: float) -> Robot:
-        ways = {"stiffness": robot.stiffness, "rotational_stiffness": robot.rotational_stiffness}
-        given = {name: each for name, each in ways.items() if each is not None}
-        new = {name: as_vector(factor * np.array(each)) for name, each in given.items()}
-        return replace(robot, **new)
+        shift, turn = (
+            None if each is None else as_vector(factor * np.array(each))
+            for each in (robot.stiffness, robot.rotational_stiffness)
+        )
+        return replace(robot, stiffness=shift, rotational_stiffness=turn)
 
     own = factors[scene.grip_kinds.of_robot].tolist()
     return replace(scene, robots=tuple(map(stiffer, scene.robots, own)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,9 +30,15 @@ from seqopt._cli.options import (
     robots_option,
     scene_options,
 )
-from seqopt._cli.outputs import comparison_files, figure_notes, require_out, write_outputs
+from seqopt._cli.outputs import (
+    comparison_files,
+    figure_notes,
+    require_out,
+    softness_files,
+    write_outputs,
+)
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import asked_criterion, parse_robots
+from seqopt._cli.values import asked_criterion, parse_grip_range, parse_robots
 from seqopt.engines.registry import provenance
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import FormulationKind, formulations
@@ -40,6 +46,7 @@ from seqopt.problem.criteria import RankSum
 from seqopt.problem.requirements import Criterion
 from seqopt.report._pages import PAGE, comparison_page
 from seqopt.report.comparison import CLOSED, Comparison, compare
+from seqopt.report.softness import held_softly, softness_lines, turning_points
 from seqopt.report.text import format_details
 from seqopt.responses.table import builds_in_words
 from seqopt.scene.scene import Scene
@@ -59,6 +66,7 @@ EXAMPLES = (
     "seqopt compare",
     "seqopt compare wall:columns=6,courses=4 --out wall",
     "seqopt compare arch25 --criteria worst-ratio --json",
+    "seqopt compare arch25 --grips 1e5..1e9",
 )
 WRITTEN = {
     "--out DIR": "write tables, figures and a page with all builds",
@@ -76,6 +84,13 @@ RESPONSES = {
     "T_max": ("", "tension, N", 14),
     "D_max": ("displacement,", "0.001 mm", 14),
 }  # above each column of responses, and how wide it is
+SOFTLY = "The same builds, by the stiffness of grips in N/m"
+TURNS = "What turns as grips become softer"
+NO_TURN = "nothing does in this range"
+HOW_SOFT = (
+    "grips: how much this depends on how stiff they are: --grips 1e5..1e9; results for one "
+    "stiffness: --grips 1e6"
+)
 OF_PAPER = "In the paper: "  # with which notes about it begin
 MODIFIED = "modified-sequential"
 
@@ -93,7 +108,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Answer:
     """Compare all ways to build a scene."""
-    scene = asked_scene(options)
+    range_of_grips = options.grips if ".." in (options.grips or "") else ""
+    grips = parse_grip_range(range_of_grips) if range_of_grips else ()
+    scene = asked_scene(options, ranged=True)
     engine = asked_engine(options, build_network(scene))
     criterion = asked_criterion(options)
     require_out(options)
@@ -104,18 +121,32 @@ def run(options: argparse.Namespace) -> Answer:
     blocks = [text]
     if options.details:
         blocks.append(format_details(result, scene))
+    softly = held_softly(engine, _shown_tables(result), grips, options.tell) if grips else None
+    turns = turning_points(softly, _fixed(result)) if softly is not None else ()
+    if softly is not None:
+        blocks.append("\n".join([SOFTLY, *softness_lines(softly, [*_shown_tables(result)])]))
+        blocks.append("\n".join([TURNS, *_listed(turns or [NO_TURN])]))
+        headings = (*headings, SOFTLY, TURNS)
     written: tuple[Path, ...] = ()
     if options.out is not None:
         options.tell("drawing figures")
         files = comparison_files(result) | {"summary.json": json.dumps(about, indent=2) + "\n"}
         page = {PAGE: comparison_page(engine, result)}
+        if softly is not None:
+            files |= softness_files(softly)
         written = write_outputs(options, lambda: files | page)
         blocks.append(_where(options.out))
     else:
         more = "" if options.details else "; --details shows more here"
         blocks.append(wrapped(f"--out DIR writes tables, figures and a step viewer{more}."))
     answer = Answer(
-        facts={**about, "scene": scene_facts(scene), "criterion": criterion.name, **_facts(result)},
+        facts={
+            **about,
+            "scene": scene_facts(scene),
+            "criterion": criterion.name,
+            **_facts(result),
+            "grips": None if softly is None else {"rows": softly, "turns": list(turns)},
+        },
         text="\n\n".join(blocks),
         headings=headings,
         written=written,
@@ -123,12 +154,32 @@ def run(options: argparse.Namespace) -> Answer:
             *level_notes(engine),
             *result.enough.lines,
             *refused(prover),
+            *(() if grips else (HOW_SOFT,)),
             *(figure_notes() if written else ()),
         ),
     )
     over = exceeded(scene, *result.tables.values())
     left = builds_in_words(result.departures)
     return strictly(answer, options, over, left, result.verdicts)
+
+
+def _shown_tables(result: Comparison) -> dict[str, pd.DataFrame]:
+    """Return the responses of the builds that differ in their largest ones, by name."""
+    figures = result.table[[*RESPONSES]].round(3).apply(tuple, axis=1)
+    ranked = figures[sorted(figures.index, key=_plainness)]
+    shown = {*ranked.index[~ranked.duplicated()]}
+    return {name: table for name, table in result.tables.items() if name in shown}
+
+
+def _fixed(result: Comparison) -> list[str]:
+    """Return the methods that leave nothing to choose."""
+    fixed = result.table.index[result.table["problem"] == CLOSED]
+    return [name for name in map(str, fixed) if name in _shown_tables(result)]
+
+
+def _listed(lines: Sequence[str]) -> list[str]:
+    """Return lines as entries of a list."""
+    return [wrapped(line, first="- ") for line in lines]
 
 
 def _where(folder: Path) -> str:

@@ -107,8 +107,8 @@ def soften(
 ) -> _Spread:
     """Let hands give way in equations (k + 1, k, S), as of `_solve_positive`, in place.
 
-    Two hands on one brick, of which one gives way, share what acts along it as they give; told
-    apart from what both bear, that stays accurate however stiff they are.
+    Two hands on one brick, of which one gives way, share what acts along it as they give. Where
+    they are nearly rigid that is told apart from what both bear, so that it stays accurate.
 
     ``off`` (n, S): by how much hands already let their nodes move. Result: the function that
     returns forces (k, S) and pivots (k, S) of the grips from those of the equations.
@@ -116,16 +116,41 @@ def soften(
     count, sets = system.shape[1:]
     grips = count_grips(operator, count)
     rigid = pairs.rigid(hands, sets, grips)
-    apart = _told_apart(system, operator, pairs.only(~rigid), hands, off)
+    close = _nearly_rigid(system, operator, pairs, hands) & ~rigid
+    apart = _told_apart(system, operator, pairs.only(close), hands, off) if close.any() else None
     _add_give(system, operator, hands)
     if off is not None:
         system[-1, : len(off)] -= off
-    system[:, :, apart.sets] = apart.system
+    if apart is not None:
+        system[:, :, apart.sets] = apart.system
     if rigid.any():
         nodes = grips * operator.directions
         brace(system[:nodes, :nodes], pairs.only(rigid))
     _let_turn(system, operator, hands)
-    return apart.joined
+    return _as_they_are if apart is None else apart.joined
+
+
+_CLOSE = 1e-4  # give of two hands on one brick, over its flexibility, below which digits are lost
+
+
+def _as_they_are(force: Floats, pivot: Floats) -> tuple[Floats, Floats]:
+    """Return forces and pivots of equations in which no pair is told apart."""
+    return force, pivot
+
+
+def _nearly_rigid(
+    system: Floats, operator: ComplianceOperator, pairs: Pairs, hands: Hands
+) -> Bools:
+    """Return which pairs (p,) give so little along their bricks that digits would be lost."""
+    if not len(pairs.sets):
+        return np.zeros(0, dtype=bool)
+    width = operator.directions
+    give = hands.each_give(system.shape[2], count_grips(operator, system.shape[1]))
+    own = give[pairs.sets, pairs.first] + give[pairs.sets, pairs.second]
+    along = np.einsum("pi,pij,pj->p", pairs.axis, own[:, :width, :width], pairs.axis)
+    rows = width * pairs.second[:, None] + np.arange(width)
+    stands = system[rows, rows, pairs.sets[:, None]].mean(axis=1)
+    return np.asarray(along < _CLOSE * stands)
 
 
 def _rows_of(operator: ComplianceOperator, grips: int, grip: int, ways: int) -> list[int]:
@@ -140,14 +165,13 @@ def _add_give(system: Floats, operator: ComplianceOperator, hands: Hands) -> Non
     """Add to equations, in place, how every hand gives way."""
     grips = count_grips(operator, system.shape[1])
     assert hands.give is not None
-    ways = hands.give.shape[2]
-    each = np.broadcast_to(hands.give, (len(hands.give), grips, ways, ways))
-    used = np.asarray(each.any(axis=(0, 1)))
+    ways, used = hands.give.shape[2], np.asarray(hands.give.any(axis=0))
     for grip in range(grips):
         rows = _rows_of(operator, grips, grip, ways)
         for a, b in _lower(ways):
             if used[a, b]:
-                system[rows[a], rows[b]] += each[:, grip, a, b]
+                own = hands.kind[:, 0 if hands.alike else grip]
+                system[rows[a], rows[b]] += hands.give[own, a, b]
 
 
 def _lower(ways: int) -> list[tuple[int, int]]:
@@ -185,9 +209,8 @@ class _Apart(NamedTuple):
 
     def joined(self, force: Floats, pivot: Floats) -> tuple[Floats, Floats]:
         """Return the forces (k, S) of grips and their pivots (k, S) from those of unknowns."""
-        if len(self.sets):
-            force[:, self.sets] = np.einsum("nij,jn->in", self.forces, force[:, self.sets])
-            pivot[:, self.sets] /= self.factor
+        force[:, self.sets] = np.einsum("nij,jn->in", self.forces, force[:, self.sets])
+        pivot[:, self.sets] /= self.factor
         return force, pivot
 
 
