@@ -18,6 +18,7 @@ from seqopt.problem.requirements import NEVER, Criterion, Limit, payload_limits
 from seqopt.problem.standing import Standing
 from seqopt.report.softness import stiffnesses
 from seqopt.responses._choices import CHOICE_RESPONSES
+from seqopt.responses.quantities import TOLERANCE
 from seqopt.responses.resources import Resources
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
@@ -160,8 +161,16 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
         else:
             name, value = _split_word(text)
             response = _response_word(name, "--limit")
-            out.append(Limit(response, number_word(value, f"--limit {text}")))
+            out.append(Limit(response, _size_word(response, value, f"--limit {text}")))
     return tuple(out)
+
+
+def _size_word(response: str, text: str, where: str) -> float:
+    """Return a positive number, SI units, of a tolerance from a length such as ``0.4mm``."""
+    unit = next((u for u in ("mm", "um", "µm", "m") if text.endswith(u)), "")
+    if response != TOLERANCE or not unit:
+        return number_word(text, where)
+    return number_word(text.removesuffix(unit), where) * {"m": 1.0, "mm": 1e-3}.get(unit, 1e-6)
 
 
 def parse_time_limit(text: str | None) -> float:

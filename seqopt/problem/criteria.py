@@ -20,7 +20,7 @@ import numpy as np
 from seqopt.arrays import Floats, Terse
 from seqopt.errors import ProblemError, message_of
 from seqopt.problem.requirements import NEVER, ROUNDED, SCALED, ChoiceResponses, SceneFacts
-from seqopt.responses.quantities import robot_response
+from seqopt.responses.quantities import is_tolerance, robot_response
 from seqopt.scene._checks import short
 
 
@@ -190,6 +190,8 @@ class RankSum(Terse):
 
     def for_scene(self, facts: SceneFacts) -> RankSum:
         """Return the criterion with everything that it takes from a scene filled in."""
+        if any(is_tolerance(name) for name, _ in (*self.before, *self.after)):
+            raise ProblemError("tolerance has no ranks; make it an aim or a limit")
         crown = facts.crown + self.delay if self.crown is None else self.crown
         crown = NEVER if self.before == self.after else crown
         resolution = self.resolution

@@ -20,9 +20,9 @@ from seqopt.arrays import Floats
 from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.problem.requirements import Criterion, Limit, as_limits
+from seqopt.problem.requirements import Criterion, Limit, as_limits, with_other_limits
 from seqopt.problem.standing import MARGINS, Standing
-from seqopt.responses.quantities import robot_response
+from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, is_tolerance, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
@@ -196,7 +196,7 @@ def parse_robust(text: str) -> RobustAim:
 
 
 LARGEST = "F_largest"
-STATE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", LARGEST)
+STATE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", LARGEST, TOLERANCE)
 """Responses of a state, whoever moved last: those that goals, criteria and limits may name."""
 
 
@@ -233,7 +233,12 @@ class Goal:
         return self.response in MARGINS
 
     def shown(self, value: float) -> float:
-        """Return a value, SI units, as people read it: of a tilt, what is survived, in degrees."""
+        """Return a value, SI units, as people read it.
+
+        Of a tilt it is what is survived, in degrees, of a tolerance the length, m.
+        """
+        if is_tolerance(self.response) and self.measure is Measure.PEAK:
+            return 1 / value if 0 < value < NO_TOLERANCE else 0.0 if value else np.inf
         return degrees(pi / 2 - value) if self.response == "tilt" else value
 
 
@@ -410,6 +415,14 @@ class Problem(Shown):
     orders: Orders | None = None
     also: tuple[str, ...] = ()
     resources: Resources = HERE
+
+    def __post_init__(self) -> None:
+        """Let a tolerance keep to the limits on tension and displacements, too."""
+        said = [(each, with_other_limits([each.response], self.limits)[0]) for each in self.limits]
+        goals = [(each, with_other_limits([each.response], self.limits)[0]) for each in self.goals]
+        limits = tuple(replace(each, response=name) for each, name in said)
+        object.__setattr__(self, "limits", limits)
+        object.__setattr__(self, "goals", tuple(replace(e, response=name) for e, name in goals))
 
     def __repr__(self) -> str:
         parts = [f"{self.scene.name!r}, {self.method!r}, criterion {self.criterion.name!r}"]

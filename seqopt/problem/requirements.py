@@ -17,7 +17,15 @@ from seqopt.arrays import Bools, Floats, Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.network import Network
-from seqopt.responses.quantities import RESPONSES, robot_response, steps_in_words
+from seqopt.responses._tolerance import Allowed, misfits_along
+from seqopt.responses.quantities import (
+    NO_TOLERANCE,
+    RESPONSES,
+    is_tolerance,
+    length_text,
+    robot_response,
+    steps_in_words,
+)
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
@@ -215,9 +223,9 @@ class Limit:
     Parameters
     ----------
     response : str
-        A name as in `seqopt.problem.criteria`.
+        A name as in `seqopt.problem.criteria`, or ``tolerance``.
     bound : float
-        SI units.
+        SI units; of a tolerance, which no step may stay below, m.
 
     Raises
     ------
@@ -242,10 +250,17 @@ class Limit:
             )
         if math.isnan(self.bound):
             raise ProblemError(f"limit {self.response}: its bound is NaN; give a number")
+        if is_tolerance(self.response) and not self.bound > 0:
+            raise ProblemError(f"limit tolerance={self.bound:g}: give a length above zero, m")
+
+    @property
+    def counted(self) -> float:
+        """The bound as values are counted: of a tolerance, which is a least one, one over it."""
+        return 1 / self.bound if is_tolerance(self.response) else self.bound
 
     def exceeded(self, values: Floats) -> Bools:
         """Return where values exceed the limit; NaN, as of a robot without a grip, does not."""
-        return np.asarray(values > self.bound + LIMIT_TOLERANCE * abs(self.bound))
+        return np.asarray(values > self.counted + LIMIT_TOLERANCE * abs(self.counted))
 
 
 def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
@@ -257,6 +272,16 @@ def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
             "seqopt.problem.requirements.payload_limits(scene) has those of all payloads"
         )
     return tuple(limits)
+
+
+def with_other_limits(names: Sequence[str], limits: Sequence[Limit]) -> tuple[str, ...]:
+    """Return names of responses, that of a tolerance with what limits allow wherever grips are."""
+    least = {
+        name: min((each.bound for each in limits if each.response == name), default=math.inf)
+        for name in ("T_max", "D_max")
+    }
+    whole = Allowed(least["T_max"], least["D_max"]).name
+    return tuple(whole if is_tolerance(name) else name for name in names)
 
 
 def payload_limits(scene: Scene) -> tuple[Limit, ...]:
@@ -324,6 +349,9 @@ class Excess:
 
     def __str__(self) -> str:
         bound, where = self.limit.bound, steps_in_words(self.steps)
+        if is_tolerance(self.limit.response):
+            least = 1 / self.largest if self.largest < NO_TOLERANCE else 0.0
+            return f"tolerance is only {length_text(least)} of {length_text(bound)} ({where})"
         if not self.robot:
             return f"{self.limit.response} is up to {self.largest:.6g} of {bound:.6g} ({where})"
         return (
@@ -361,6 +389,8 @@ def _response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:
     """
     if name == "C_max":
         return np.asarray(np.maximum(-table[RESPONSES["F_min"].column].to_numpy(float), 0.0))
+    if is_tolerance(name):
+        return misfits_along(table)
     if name in RESPONSES:
         response = RESPONSES[name]
         return table[response.column].to_numpy(float) / response.scale

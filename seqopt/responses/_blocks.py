@@ -38,7 +38,14 @@ from seqopt.engines._auto import Level, LevelChoice
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
 from seqopt.errors import FileError, MemoryShortError, SceneError
-from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite, robot_response
+from seqopt.responses._tolerance import allowed_by, misfits, payloads_held
+from seqopt.responses.quantities import (
+    CHOSEN_BY,
+    is_tolerance,
+    lengths,
+    require_finite,
+    robot_response,
+)
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.work._threads import one_thread
 from seqopt.work._workers import free_memory
@@ -90,7 +97,7 @@ class Answers(FrozenValue):
 
 def answer(engine: Engine, block: Block) -> Answers:
     """Return the responses of a block of states. Raises what the engine does."""
-    asked = [CHOSEN_BY[name] for name in block.names]
+    asked = [CHOSEN_BY[name] for name in block.names if not is_tolerance(name)]
     want = reduce(or_, (r.needs for r in asked), Want.SCREEN if block.screen else Want(0))
     before = Counter(tally_of(engine))
     with one_thread():  # as many threads everywhere: sums in other orders differ in the last bit
@@ -98,6 +105,10 @@ def answer(engine: Engine, block: Block) -> Answers:
     forces = require_finite("grip force", lengths(fields.grip_force), block.bricks)
     network, bricks = engine.network, block.bricks
     values = {r.name: require_finite(r.name, r.of(network, fields), bricks) for r in asked}
+    for name in filter(is_tolerance, block.names):
+        payload = payloads_held(network, block.grips)
+        with one_thread():
+            values[name] = misfits(engine, bricks, block.grips, payload, allowed_by(name))
     return Answers(values, forces, tuple((Counter(tally_of(engine)) - before).items()))
 
 
@@ -319,7 +330,8 @@ class Batch(FrozenValue):
 
     def blocks(self) -> Iterator[Block]:
         """Yield the states in blocks, one at least."""
-        names = tuple(sorted(frozenset().union(*self.names) & CHOSEN_BY.keys()))
+        asked = sorted(frozenset().union(*self.names))
+        names = tuple(name for name in asked if name in CHOSEN_BY or is_tolerance(name))
         for start in range(0, max(len(self.states), 1), BLOCK):
             yield Block(self.steps[0].bricks, self.states[start : start + BLOCK].copy(), names)
 

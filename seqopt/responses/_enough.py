@@ -14,7 +14,8 @@ from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.registry import recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.responses.quantities import RESPONSES
+from seqopt.responses._tolerance import least_tolerance
+from seqopt.responses.quantities import NO_TOLERANCE, RESPONSES, length_text
 from seqopt.responses.table import LinearRange
 
 _KNOWN = AutoEngine, PlanarEngine, ComplianceEngine, DiscreteEngine
@@ -101,10 +102,22 @@ def _left_out(
     robots = [robot for robot in every if robot.stiffness is None]
     tables = builds.values()
     if any(table[f"{robot.name}_node"].notna().any() for table in tables for robot in robots):
-        yield "that robots give way"
+        yield f"that robots give way{_off(within, builds)}"
     if not staged and any(len(table) > 1 for table in tables):
         yield "what earlier steps lock in"
     if not isinstance(within.engine, DiscreteEngine):
         most = max(float(table[moved.column].max()) / moved.scale for table in tables) / within.far
         yield f"change of shape (bricks move by up to {100 * most:.2g} % of its limit)"
     yield "motion in time"
+
+
+def _off(within: LinearRange, builds: Mapping[str, pd.DataFrame]) -> str:
+    """Return by how much grips may be off, in brackets; nothing where that is not linear."""
+    engine = within.engine
+    if not isinstance(engine, AutoEngine | ComplianceEngine | PlanarEngine):
+        return ""
+    least, build, step = least_tolerance(engine, builds.values())
+    if not 1 / NO_TOLERANCE < least < np.inf:
+        return ""
+    where = f"step {step}{f' of {[*builds][build]}' if len(builds) > 1 else ''}"
+    return f" (rigid grips {length_text(least)} off exceed a payload: {where})"

@@ -35,10 +35,10 @@ def length_text(length: float) -> str:
 
     Examples
     --------
-    >>> length_text(2.79e-5), length_text(0.1163), length_text(0.0)
-    ('27.9 µm', '116.3 mm', '0 mm')
+    >>> length_text(2.79e-5), length_text(0.1163), length_text(3e-7), length_text(0.0)
+    ('27.9 µm', '116.3 mm', '300 nm', '0 mm')
     """
-    for unit, size in (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6)):
+    for unit, size in (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9)):
         if abs(length) >= 0.9999 * size:
             return f"{length / size:.4g} {unit}"
     return f"{length * 1e3:.4g} mm"
@@ -54,6 +54,17 @@ def steps_in_words(steps: Sequence[int]) -> str:
     """
     more = f" and {len(steps) - _LISTED} more" if len(steps) > _LISTED else ""
     return f"step{'s' * (len(steps) > 1)} {', '.join(map(str, steps[:_LISTED]))}{more}"
+
+
+TOLERANCE = "tolerance"
+"""A response like others, but that more is better: how far every grip may be off before a robot
+carries more than its payload, or a limit is exceeded. Counted by its reciprocal, 1/m."""
+NO_TOLERANCE = 1e30  # its reciprocal where there is none
+
+
+def is_tolerance(name: str) -> bool:
+    """Return whether a response is a tolerance, of payloads alone or also of limits."""
+    return name == TOLERANCE or name.startswith(f"{TOLERANCE}[")
 
 
 _SLACK = 1e-6  # an edge is in tension above this share of the mean weight of a brick

@@ -31,7 +31,8 @@ from seqopt.problem.requirements import (
     robots_of,
 )
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, StepChoices
-from seqopt.responses.quantities import robot_response
+from seqopt.responses._tolerance import with_tolerances
+from seqopt.responses.quantities import is_tolerance, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.responses.table import analyze
 from seqopt.sequence.schedule import OpenGrip, Schedule
@@ -282,6 +283,8 @@ class Layers(Shown):
         if not (self.limits and fixed):
             return
         table = analyze(self.engine, fixed)
+        for name in {each.response for each in self.limits if is_tolerance(each.response)}:
+            table = with_tolerances(self.engine, fixed, table, name)
         for excess in excesses(self.schedule.scene, table, self.limits):
             raise InfeasibleError(
                 f"{excess}, where no grip is left to choose; relax the limit or change the schedule"
@@ -346,7 +349,8 @@ def candidate_layers(
     """
     known = {*CHOICE_RESPONSES, *map(robot_response, robots_of(engine, schedule, criterion))}
     asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), as_limits(limits), tuple(also))
-    if unknown := {name for move in schedule.moves for name in asked(move.bricks)} - known:
+    names = {name for move in schedule.moves for name in asked(move.bricks)}
+    if unknown := {name for name in names if not is_tolerance(name)} - known:
         why = f"does not exist{did_you_mean(min(unknown), known)}"
         raise ProblemError(f"response {min(unknown)} {why}; give {', '.join(sorted(known))}")
     schedule.require_pairs()

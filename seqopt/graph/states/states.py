@@ -36,7 +36,7 @@ from seqopt.problem.requirements import (
 )
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._grip_sets import GripSets
-from seqopt.responses.quantities import robot_response
+from seqopt.responses.quantities import TOLERANCE, is_tolerance, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import as_float, short
 from seqopt.scene.scene import Scene
@@ -166,7 +166,8 @@ class States(Shown):
         if any(goal.of_states and not goal.response for goal in self.goals):
             names += self.criterion.wanted(1)
         names += [limit.response for limit in self.limits]
-        return tuple(name for name in STATE_RESPONSES if name in names)
+        own = sorted({name for name in names if is_tolerance(name)} - {TOLERANCE})
+        return tuple(name for name in (*STATE_RESPONSES, *own) if name in names)
 
     @property
     def aims(self) -> tuple[Goal, ...]:
@@ -234,7 +235,7 @@ class States(Shown):
         found = self._by_name(answers, forces)
         for limit in self.limits:
             if limit.response in found:
-                close |= _near(found[limit.response], limit.bound)
+                close |= _near(found[limit.response], limit.counted)
         return np.asarray(close)
 
     def values(
@@ -508,6 +509,6 @@ def _of_states(engine: Engine, criterion: Criterion) -> Criterion:
 
 
 def _require(name: str, known: set[str], where: str) -> None:
-    if name not in known:
+    if name not in known and not is_tolerance(name):
         listed = ", ".join(sorted(known))
         raise ProblemError(f"{where}: a state of a free schedule has no {name}; give {listed}")

@@ -25,6 +25,7 @@ from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.search._margin_search import WORST, bisected, with_margin
 from seqopt.problem.problem import STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
+from seqopt.responses.quantities import is_tolerance, length_text
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule
 
@@ -211,10 +212,12 @@ def _enough(problem: States, way: str, look: Look) -> str:
         digit = 10.0 ** (math.floor(math.log10(enough)) - 2) if enough else 1.0
         return f"a bond of {math.ceil(enough / digit) * digit:.10g} Pa"
     found = [limit for limit in problem.limits if limit.response == way]
-    if not found or way not in STATE_RESPONSES:
+    if not found or not (way in STATE_RESPONSES or is_tolerance(way)):
         return f"no limit on {way}" if found else way
     rest = tuple(limit for limit in problem.limits if limit not in found)
     least = worst_least(replace(problem, limits=rest), way, look)
+    if is_tolerance(way):
+        return f"a tolerance of {length_text(1 / least)} instead of {length_text(found[0].bound)}"
     return f"{way}={least:.6g} instead of {found[0].bound:g}"
 
 

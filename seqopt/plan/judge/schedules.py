@@ -25,7 +25,8 @@ from seqopt.plan.judge._standing_proof import proven_margins, require_margin
 from seqopt.plan.judge.certificate import Certificate
 from seqopt.problem.problem import LARGEST, Goal, Measure
 from seqopt.problem.standing import _size, slack
-from seqopt.responses.quantities import CHOSEN_BY
+from seqopt.responses._tolerance import misfits_along, with_tolerances
+from seqopt.responses.quantities import CHOSEN_BY, is_tolerance
 from seqopt.responses.table import analyze, force_column
 from seqopt.sequence._rule_check import check_free
 from seqopt.sequence.schedule import Schedule
@@ -160,7 +161,7 @@ def plan_values(
     """
     if problem.each:
         return _in_all(problem, steps, [plan_values(each, steps, claimed) for each in problem.each])
-    columns = _state_columns(problem, analyze(problem.engine, steps))
+    columns = _state_columns(problem, steps, analyze(problem.engine, steps))
     _require_limits(problem, columns)
     margins = _margins(problem, steps)
     regrips = sum(step.kind is StepKind.REPOSITION for step in steps)
@@ -206,7 +207,9 @@ def _margins(problem: States, steps: Sequence[Step]) -> Mapping[str, float]:
     return proven_margins(problem, steps)
 
 
-def _state_columns(problem: States, table: pd.DataFrame) -> Mapping[str, np.ndarray]:
+def _state_columns(
+    problem: States, steps: Sequence[Step], table: pd.DataFrame
+) -> Mapping[str, np.ndarray]:
     """Return the named responses of a table of steps, SI units.
 
     ``table``: from `seqopt.analyze`. Result (dict of str to (n,) float).
@@ -216,6 +219,8 @@ def _state_columns(problem: States, table: pd.DataFrame) -> Mapping[str, np.ndar
     for name in problem.named:
         if name == "C_max":
             out[name] = np.maximum(0.0, -table["F_min_N"].to_numpy(float))
+        elif is_tolerance(name):
+            out[name] = misfits_along(with_tolerances(problem.engine, steps, table, name))
         elif name != LARGEST:
             out[name] = table[CHOSEN_BY[name].column].to_numpy(float) / CHOSEN_BY[name].scale
     return out

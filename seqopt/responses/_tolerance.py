@@ -1,0 +1,264 @@
+"""How far grips may be from where they should be before something is more than it may be.
+
+Every grip may be off by as much, in any direction, each in another one. Forces and displacements
+are linear in that: one solution for every grip and direction tells the worst of all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.engines._auto import AutoEngine
+from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.interface import Engine, Want, grip_columns, select_sets
+from seqopt.errors import ProblemError, SceneError
+from seqopt.network.network import Network
+from seqopt.responses._worst_direction import proven_rates, worst_misplacement, worst_rates
+from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE
+from seqopt.sequence.steps import Step
+
+_AT_ONCE = 4096  # grip sets that are solved together
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """What must hold wherever grips are, besides the payloads of robots.
+
+    ``tension`` of any edge, N; ``shift`` of any node, m.
+    """
+
+    tension: float = np.inf
+    shift: float = np.inf
+
+    @property
+    def wanted(self) -> Want:
+        """The fields that it is about."""
+        edges = Want.EDGES if np.isfinite(self.tension) else Want(0)
+        return edges | (Want.DISPLACEMENTS if np.isfinite(self.shift) else Want(0))
+
+    @property
+    def name(self) -> str:
+        """The response that it is asked by: as ``tolerance[T_max=900,D_max=1e-05]``."""
+        said = (("T_max", self.tension), ("D_max", self.shift))
+        words = [f"{name}={most!r}" for name, most in said if np.isfinite(most)]
+        return f"{TOLERANCE}[{','.join(words)}]" if words else TOLERANCE
+
+
+ROBOTS_ALONE = Allowed()
+
+
+def allowed_by(name: str) -> Allowed:
+    """Return what a response allows, by its name."""
+    words = name[len(TOLERANCE) + 1 : -1].split(",") if name != TOLERANCE else []
+    said = dict(word.split("=") for word in words)
+    return Allowed(float(said.get("T_max", "inf")), float(said.get("D_max", "inf")))
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far the grips of a step may be off, and what stops them from being farther off.
+
+    Attributes
+    ----------
+    distance : float
+        m; zero where something is too large with all grips in their places, infinite where grips
+        change nothing.
+    proven : float
+        Up to which nothing is too large, m: at most a ten-thousandth below it, mostly a millionth.
+    what : str
+        What becomes too large first; empty if nothing does.
+    misplacement : tuple of (float, float, float)
+        Of every grip, in the order of the robots, the worst that is as far, m.
+    """
+
+    distance: float
+    proven: float
+    what: str = ""
+    misplacement: tuple[tuple[float, ...], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Values of one kind, n for each of S grip sets, that misplacements change."""
+
+    what: str
+    own: Floats  # (S, n, 3)
+    change: Floats  # (S, n, r, 3, 3); by component, for a meter in each direction
+    most: Floats  # (S, n)
+
+    def rates(self) -> tuple[Floats, Floats]:
+        """Return their rates (S, n) and directions (S, n, 3)."""
+        found, direction = worst_rates(*self._flat)
+        return found.reshape(self.most.shape), direction.reshape(self.own.shape)
+
+    @property
+    def _flat(self) -> tuple[Floats, Floats, Floats]:
+        shape = self.change.shape
+        return self.own.reshape(-1, 3), self.change.reshape(-1, *shape[2:]), self.most.ravel()
+
+    def proven(self, direction: Floats) -> float:
+        """Return what no rate of the one grip set exceeds."""
+        return float(proven_rates(*self._flat, direction.reshape(-1, 3))[1].max())
+
+
+class _Tensions(_Group):
+    """Axial forces, the first component of the three, which may be as low as they will."""
+
+    def rates(self) -> tuple[Floats, Floats]:
+        room = self.most - self.own[..., 0]
+        added = np.linalg.norm(self.change[..., 0, :], axis=3).sum(axis=2)
+        rate = np.where(room > 0, added / np.where(room > 0, room, 1.0), np.inf)
+        return rate, np.broadcast_to([1.0, 0.0, 0.0], self.own.shape)
+
+    def proven(self, direction: Floats) -> float:
+        return float(self.rates()[0].max())
+
+
+def _linear(engine: Engine) -> Engine:
+    """Return the engine whose answers are linear in misplacements: of joints that never fail."""
+    if isinstance(engine, DiscreteEngine):
+        raise ProblemError(
+            "tolerance: discrete elements are not linear in where grips are; take the engine "
+            "compliance or auto"
+        )
+    return engine.rigid if isinstance(engine, AutoEngine) else engine
+
+
+def _groups(
+    engine: Engine, bricks: int, grips: Ints, payload: Floats, allowed: Allowed
+) -> Iterator[_Group]:
+    """Yield what grip sets (S, r) may make too large."""
+    engine, (sets, held) = _linear(engine), grips.shape
+    fields = engine.solve(bricks, grips, allowed.wanted)
+    moved = np.zeros((sets, 3 * held, held, 3))
+    moved.reshape(sets, 3 * held, 3 * held)[:] = np.eye(3 * held)
+    again = np.repeat(np.arange(sets), 3 * held)
+    off = engine.solve(bricks, grips[again], allowed.wanted, moved.reshape(-1, held, 3))
+    dead = select_sets(fields, again)
+
+    def changes(name: str) -> Floats:
+        found = getattr(off, name) - getattr(dead, name)
+        return np.asarray(found.reshape(sets, held, 3, *found.shape[1:]))
+
+    def vectors(what: str, name: str, most: Floats) -> _Group:
+        return _Group(what, getattr(fields, name), changes(name).transpose(0, 3, 1, 4, 2), most)
+
+    yield vectors("payload", "grip_force", payload)
+    if np.isfinite(allowed.tension):
+        own, change = fields.edge_force, changes("edge_force").transpose(0, 3, 1, 2)
+        most, first = np.full(own.shape, allowed.tension), np.array([1.0, 0.0, 0.0])
+        parts = own[..., None] * first, change[..., None, :] * first[:, None]
+        yield _Tensions("tension", *parts, most)
+    if np.isfinite(allowed.shift):
+        most = np.full(fields.displacement.shape[:2], allowed.shift)
+        yield vectors("displacement", "displacement", most)
+
+
+def misfits(
+    engine: Engine, bricks: int, grips: Ints, payload: Floats, allowed: Allowed = ROBOTS_ALONE
+) -> Floats:
+    """Return one over how far the grips of sets may be off, (S,), 1/m.
+
+    `NO_TOLERANCE` where something is too large with all grips in their places, and where two rigid
+    grips hold one brick: they fit in one place alone.
+
+    ``grips`` (S, r): numbers of nodes; ``payload`` (S, r): of the robot at each, N.
+    """
+    held = grips.shape[1]
+    out = np.where(_tied(engine, bricks, grips), NO_TOLERANCE, 0.0)
+    rows = np.flatnonzero(out == 0) if held else np.arange(0)
+    step = max(1, _AT_ONCE // (3 * held + 1))
+    for start in range(0, len(rows), step):
+        part = rows[start : start + step]
+        groups = _groups(engine, bricks, grips[part], payload[part], allowed)
+        out[part] = np.max([group.rates()[0].max(axis=1) for group in groups], axis=0)
+    return np.asarray(np.minimum(out, NO_TOLERANCE))
+
+
+def payloads_held(network: Network, grips: Ints) -> Floats:
+    """Return the payloads (S, r) of the robots of grip sets, N."""
+    payloads = {robot.payload for robot in network.scene.robots}
+    if len(payloads) > 1:
+        raise SceneError("tolerance: robots have different payloads")
+    return np.full(grips.shape, payloads.pop())
+
+
+def _tied(engine: Engine, bricks: int, grips: Ints) -> Bools:
+    """Return which sets (S,) hold one brick with two rigid grips."""
+    brick = np.sort(grip_columns(engine.network, bricks, grips) // 2, axis=1)
+    return np.asarray((np.diff(brick, axis=1) == 0).any(axis=1))
+
+
+def step_tolerance(engine: Engine, step: Step, allowed: Allowed = ROBOTS_ALONE) -> Tolerance:
+    """Return how far the grips of a step may be off, with its proof."""
+    scene = engine.network.scene
+    holding = [r for r, node in zip(scene.robots, step.grips, strict=True) if node is not None]
+    grips = np.array([step.held], dtype=np.int64).reshape(1, -1)
+    if not holding:
+        return Tolerance(np.inf, np.inf)
+    if _tied(engine, step.bricks, grips)[0]:
+        return Tolerance(0.0, 0.0, "two rigid grips on one brick")
+    payload = np.array([[robot.payload for robot in holding]])
+    worst, rate, proven = Tolerance(np.inf, np.inf), 0.0, 0.0
+    for group in _groups(engine, step.bricks, grips, payload, allowed):
+        rates, direction = group.rates()
+        proven = max(proven, group.proven(direction))
+        at = int(rates[0].argmax())
+        if rates[0, at] > rate:
+            rate = float(rates[0, at])
+            far = worst_misplacement(group.change[:, at], direction[:, at])[0] / rate
+            what = f"payload of {holding[at].name}" if group.what == "payload" else group.what
+            worst = Tolerance(1 / rate, 0.0, what, tuple(map(tuple, far.tolist())))
+    return replace(worst, proven=1 / proven if proven else np.inf)
+
+
+def least_tolerance(engine: Engine, tables: Iterable[pd.DataFrame]) -> tuple[float, int, int]:
+    """Return how far grips may be off in all steps of builds, m, in which build, and which step.
+
+    ``tables``: of `seqopt.analyze`. All steps of a brick count with as many grips are solved at
+    once, and a step that several builds share is solved once.
+    """
+    robots = engine.network.scene.robots
+    asked: dict[Any, tuple[int, int]] = {}  # by brick count, nodes and payloads
+    for build, table in enumerate(tables):
+        nodes = table[[f"{robot.name}_node" for robot in robots]].to_numpy(object)
+        steps = zip(table["step"].astype(int), table["bricks"].astype(int), nodes, strict=True)
+        for step, bricks, row in steps:
+            held = [(int(n), r.payload) for n, r in zip(row, robots, strict=True) if pd.notna(n)]
+            if held:
+                key = bricks, *zip(*held, strict=True)
+                asked.setdefault(key, (build, step))
+    worst = (0.0, -1, -1)
+    keys = sorted(asked, key=lambda key: (key[0], len(key[1])))
+    for (bricks, _), same in groupby(keys, key=lambda key: (key[0], len(key[1]))):
+        mine = [*same]
+        grips, payload = np.array([k[1] for k in mine]), np.array([k[2] for k in mine])
+        found = misfits(engine, bricks, grips, payload)
+        at = int(found.argmax())
+        if found[at] > worst[0]:
+            worst = (float(found[at]), *asked[mine[at]])
+    return (1 / worst[0] if worst[0] else np.inf, *worst[1:])
+
+
+COLUMN = "tolerance_mm"
+
+
+def with_tolerances(
+    engine: Engine, steps: Sequence[Step], table: pd.DataFrame, name: str = TOLERANCE
+) -> pd.DataFrame:
+    """Return a table of steps with how far their grips may be off, mm, by a tolerance's name."""
+    found = [step_tolerance(engine, step, allowed_by(name)).distance for step in steps]
+    return table.assign(**{COLUMN: 1e3 * np.array(found)})
+
+
+def misfits_along(table: pd.DataFrame) -> Floats:
+    """Return one over the tolerances of a table of steps, 1/m."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.minimum(1e3 / table[COLUMN].to_numpy(float), NO_TOLERANCE))

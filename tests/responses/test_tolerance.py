@@ -1,0 +1,180 @@
+"""How far grips may be off: against closed forms, the engine itself, and every plan of a build."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import seqopt
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.problem.problem import parse_goals
+from seqopt.responses._tolerance import Allowed, allowed_by, misfits, step_tolerance
+from seqopt.responses._worst_direction import proven_rates, worst_misplacement, worst_rates
+from seqopt.responses.quantities import NO_TOLERANCE
+from tests.builders import block, small_arch
+
+EXACT = 1e-9
+
+
+@pytest.fixture(scope="module")
+def engine():
+    return seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
+
+
+def reached(engine, step, moved):
+    """Largest share of payloads, tension and displacement in misplacements (n, r, 3)."""
+    robots = engine.network.scene.robots
+    payload = [r.payload for r, node in zip(robots, step.grips, strict=True) if node is not None]
+    grips = np.repeat([step.held], len(moved), axis=0)
+    found = engine.solve(step.bricks, grips, moved=moved)
+    shares = np.linalg.norm(found.grip_force, axis=2) / payload
+    shift = np.linalg.norm(found.displacement, axis=2)
+    return shares.max(axis=1), found.edge_force.max(axis=1), shift.max(axis=1)
+
+
+@pytest.mark.parametrize("which", ["sequential", "cantilever"])
+def test_the_worst_direction_reaches_the_payload_and_none_exceeds_it(engine, which):
+    rng, steps = np.random.default_rng(1), getattr(seqopt, which)(engine.network)
+    tried = 0
+    for step in steps[:46:5]:
+        found = step_tolerance(engine, step)
+        assert found.what.startswith("payload of rob")
+        assert found.proven <= found.distance <= (1 + 2e-4) * found.proven
+        share, _, _ = reached(engine, step, np.array([found.misplacement]))
+        assert share[0] == pytest.approx(1.0, abs=EXACT)
+        off = rng.standard_normal((1000, len(step.held), 3))
+        off *= found.distance / np.linalg.norm(off, axis=2, keepdims=True)
+        share, _, _ = reached(engine, step, off)
+        assert share.max() <= 1 + EXACT
+        share, _, _ = reached(engine, step, 1.001 * np.array([found.misplacement]))
+        assert share[0] > 1  # the control: a little farther is too far
+        tried += 1
+    assert tried == 10
+
+
+def test_tension_and_displacement_bound_it_too(engine):
+    (step,) = seqopt.cantilever(engine.network)[20:21]
+    robots = step_tolerance(engine, step)
+    _, tension, shift = reached(engine, step, np.zeros((1, len(step.held), 3)))
+    first = step_tolerance(engine, step, Allowed(tension=1.01 * float(tension[0])))
+    assert first.what == "tension"
+    assert first.distance < robots.distance
+    _, most, _ = reached(engine, step, np.array([first.misplacement]))
+    assert most[0] == pytest.approx(1.01 * tension[0], rel=EXACT)
+    second = step_tolerance(engine, step, Allowed(shift=float(shift[0]) + 1e-9))
+    assert second.what == "displacement"
+    _, _, most = reached(engine, step, np.array([second.misplacement]))
+    assert most[0] == pytest.approx(shift[0] + 1e-9, rel=EXACT)
+    nothing = step_tolerance(engine, step, Allowed(tension=0.99 * float(tension[0])))
+    assert nothing.distance == 0
+
+
+def test_a_weightless_block_on_a_spring_is_a_closed_form():
+    scene = replace(block(size=(0.4, 0.3, 0.1)), gravity=(0.0, 0.0, 0.0))
+    scene = scene.with_robots(seqopt.Robot(name="one", payload=500.0))
+    engine = seqopt.make_engine("compliance", scene)
+    (spring,) = scene.grounds
+    arm = np.subtract(scene.node_position(2), spring.position)
+    x, y, z = arm
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])  # r × f
+    axes = np.stack([spring.along, spring.across, np.cross(spring.along, spring.across)])
+    flexible = axes.T @ np.diag(1 / np.array(spring.translational_stiffness)) @ axes
+    turning = axes.T @ np.diag(1 / np.array(spring.rotational_stiffness)) @ axes
+    flexible += cross.T @ turning @ cross
+    least = np.linalg.eigvalsh(flexible)[0]  # of the stiffest direction
+    found = misfits(engine, 1, np.array([[2]]), np.array([[500.0]]))
+    assert 1 / found[0] == pytest.approx(500.0 * least, rel=1e-9)
+
+
+def test_two_rigid_grips_on_a_brick_fit_in_one_place_alone(engine):
+    node, other = engine.network.scene.placed[4].nodes
+    found = misfits(engine, 9, np.array([[1, node, other], [1, 4, node]]), np.full((2, 3), 392.4))
+    assert found[0] == NO_TOLERANCE
+    assert found[1] < NO_TOLERANCE
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 10**9), st.integers(1, 4), st.sampled_from([0.0, 1e-3, 1.0, 50.0]))
+def test_no_direction_is_worse_than_the_worst(seed, grips, weight):
+    rng = np.random.default_rng(seed)
+    own = weight * rng.standard_normal((20, 3))
+    change = rng.standard_normal((20, grips, 3, 3)) * 10 ** rng.uniform(-2, 2, (20, 1, 1, 3))
+    most = np.linalg.norm(own, axis=1) * rng.uniform(1.001, 5, 20) + 1e-3
+    rate, direction = worst_rates(own, change, most)
+    low, high = proven_rates(own, change, most, direction)
+    assert (rate <= low * (1 + 1e-9)).all()
+    assert (low <= rate * (1 + 1e-6)).all()
+    assert (high <= low * 1.1).all()
+    off = rng.standard_normal((20, 200, grips, 3))
+    off /= np.linalg.norm(off, axis=3, keepdims=True) * high[:, None, None, None]
+    sizes = np.linalg.norm(own[:, None] + np.einsum("ngij,nsgj->nsi", change, off), axis=2)
+    assert (sizes <= most[:, None] * (1 + EXACT)).all()
+    worst = worst_misplacement(change, direction) / rate[:, None, None]
+    size = np.linalg.norm(own + np.einsum("ngij,ngj->ni", change, worst), axis=1)
+    assert np.allclose(size, most, rtol=EXACT)
+
+
+def test_a_direction_that_is_not_the_worst_is_found_out():
+    rng = np.random.default_rng(5)
+    own, change = rng.standard_normal((30, 3)), rng.standard_normal((30, 3, 3, 3))
+    most = 2 * np.linalg.norm(own, axis=1)
+    rate, _ = worst_rates(own, change, most)
+    low, high = proven_rates(own, change, most, rng.standard_normal((30, 3)))
+    assert (high >= rate * (1 - 1e-9)).all()  # whatever was thought to be the worst
+    assert (low > 0.99 * rate).all()
+
+
+def test_names_tell_what_is_allowed():
+    for allowed in (Allowed(), Allowed(900.0), Allowed(shift=1e-5), Allowed(900.0, 1e-5)):
+        assert allowed_by(allowed.name) == allowed
+
+
+SCENE = small_arch(4)
+
+
+def test_no_plan_has_more_tolerance_than_the_best():
+    plan = seqopt.optimize(SCENE, "free", aim="tolerance,steps")
+    assert plan.status.value == "optimal"
+    best = plan.objective["tolerance"]
+    along = [step_tolerance(plan.engine, step).distance for step in plan.steps]
+    assert best == pytest.approx(min(along), rel=1e-6)
+    within = seqopt.optimize(SCENE, "free", limits=[seqopt.Limit("tolerance", 0.999 * best)])
+    assert within.steps
+    with pytest.raises(InfeasibleError, match="tolerance of"):
+        seqopt.optimize(SCENE, "free", limits=[seqopt.Limit("tolerance", 1.01 * best)])
+
+
+def test_a_loop_keeps_to_a_tolerance_with_or_without_a_folder_of_answers(tmp_path):
+    scene = SCENE
+    free = seqopt.optimize(scene, formulation="minimax", criterion="worst-ratio")
+    usual = min(step_tolerance(free.engine, step).distance for step in free.steps)
+    limits = [seqopt.Limit("tolerance", 0.99 * usual)]
+    asked = {"formulation": "minimax", "criterion": "worst-ratio", "limits": limits}
+    plans = [seqopt.optimize(scene, **asked, cache=tmp_path) for _ in range(2)]
+    plans.append(seqopt.optimize(scene, **asked))
+    for plan in plans:
+        least = min(step_tolerance(plan.engine, step).distance for step in plan.steps)
+        assert least >= 0.99 * usual
+        assert plan.nodes == plans[0].nodes
+    asked["limits"] = [seqopt.Limit("tolerance", 1.05 * usual)]
+    with pytest.raises(InfeasibleError, match="relax a limit"):
+        seqopt.optimize(scene, **asked)
+
+
+def test_what_cannot_be_asked_is_a_line(engine):
+    with pytest.raises(ProblemError, match="above zero"):
+        seqopt.Limit("tolerance", 0.0)
+    with pytest.raises(ProblemError, match="no ranks"):
+        seqopt.pose(
+            engine,
+            seqopt.three_robot_loop(engine.network),
+            seqopt.problem.criteria.RankSum("own", (("tolerance", 1.0),), (("tolerance", 1.0),)),
+        )
+    discrete = seqopt.make_engine("discrete", SCENE)
+    with pytest.raises(ProblemError, match="not linear"):
+        misfits(discrete, 1, np.array([[SCENE.placed[0].nodes[1]]]), np.array([[400.0]]))
+    assert [str(goal) for goal in parse_goals("tolerance,steps")] == ["tolerance", "steps"]
