@@ -9,6 +9,8 @@ from math import isfinite
 from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.plan.calling.formulation import End
 from seqopt.plan.judge.certificate import TOLERANCE
+from seqopt.responses._tolerance import is_tolerance
+from seqopt.responses.quantities import length_text
 
 ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
 
@@ -69,4 +71,7 @@ class FoundOrder:
         if not isfinite(self.selection.bound):
             return "others are not looked at yet"
         claimed = "" if self.proven else " (claimed, not proven)"
+        goal = self.problem.states.goals[0]
+        if is_tolerance(goal.response):  # of which more is better
+            return f"no order above {length_text(goal.shown(self.selection.bound))}{claimed}"
         return f"no order below {self.selection.bound:.6g}{claimed}"

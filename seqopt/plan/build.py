@@ -12,6 +12,7 @@ from seqopt._showing import Page, Shown, display
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.responses._enough import Enough, what_was_enough
+from seqopt.responses._tolerance import tolerance_table
 from seqopt.responses.table import Departure, LinearRange, grips_table
 from seqopt.sequence.steps import Step
 from seqopt.stability._step_verdicts import step_verdicts
@@ -98,6 +99,15 @@ class ShownBuild(Shown):
         ``mortar``: of all joints; or its name, ``dry``, ``epoxy`` or ``bond=PASCAL``.
         """
         return step_verdicts(self.engine.network, self.steps, find_mortar(mortar))
+
+    def tolerances(self) -> pd.DataFrame:
+        """Return how far every grip may be from where it should be, in the worst direction.
+
+        Result: a row per step: ``tolerance_mm`` (infinite where nobody holds), ``proven_mm``, up to
+        which no robot exceeds its payload, and what ``stops`` grips from being farther off. Raises
+        `ProblemError` for discrete elements, which are not linear in that.
+        """
+        return tolerance_table(self.engine, self.steps)
 
     def plot(
         self, step: int | Sequence[int] | None = None, *, forces: bool = False, magnify: float = 0.0

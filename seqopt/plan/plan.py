@@ -42,7 +42,7 @@ from seqopt.plan.search._window_search import WindowSearch
 from seqopt.problem.problem import Aim, Problem, judged_by
 from seqopt.problem.requirements import Excess, overloads
 from seqopt.responses._choices import window_models
-from seqopt.responses.quantities import is_tolerance, length_text
+from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import analyze
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.schedule import Schedule
@@ -225,7 +225,9 @@ class Plan(ShownBuild):
     def result(self) -> str:
         """The value of the plan, and what is proven about it, in words."""
         if isinstance(self.graph, States):
-            values = ", ".join(f"{name} {_said(name, v)}" for name, v in self.objective.items())
+            values = ", ".join(
+                f"{name} {value_text(name, v)}" for name, v in self.objective.items()
+            )
             left = 0.0 if self.certificate is None else self.certificate.gap
             within = f" within {left:.2g}" if TOLERANCE < left < inf else ""
             among = f" among candidates {self.among}" if self.among else ""
@@ -404,11 +406,6 @@ def _summarized(plan: Plan) -> dict[str, object]:
         "seconds": dict(plan.seconds),
         **provenance(plan.engine),
     }
-
-
-def _said(goal: str, value: float) -> str:
-    """Return the value of a goal, of a tolerance as a length."""
-    return length_text(value) if is_tolerance(goal) else f"{value:.6g}"
 
 
 def _layers_asked(plan: Plan) -> dict[str, object]:

@@ -20,7 +20,8 @@ import numpy as np
 from seqopt.arrays import Floats, Terse
 from seqopt.errors import ProblemError, message_of
 from seqopt.problem.requirements import NEVER, ROUNDED, SCALED, ChoiceResponses, SceneFacts
-from seqopt.responses.quantities import is_tolerance, robot_response
+from seqopt.responses._tolerance import is_tolerance
+from seqopt.responses.quantities import robot_response
 from seqopt.scene._checks import short
 
 

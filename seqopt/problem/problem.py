@@ -22,7 +22,8 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.problem.requirements import Criterion, Limit, as_limits, with_other_limits
 from seqopt.problem.standing import MARGINS, Standing
-from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, is_tolerance, robot_response
+from seqopt.responses._tolerance import is_tolerance
+from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
@@ -254,8 +255,8 @@ def parse_goals(text: str) -> tuple[Goal, ...]:
 
     They are ``minmax`` (the worst of the criterion), ``sum`` (over all steps), ``steps``,
     ``regrips``, ``travel``, a response (its worst) or ``sum(RESPONSE)``; also ``bond`` and
-    ``friction`` (the least with which every state stands) and ``tilt`` (the largest that every
-    state survives).
+    ``friction`` (the least with which every state stands), ``tilt`` (the largest that every state
+    survives) and ``tolerance`` (how far grips may be off in every state).
 
     Examples
     --------
@@ -264,7 +265,7 @@ def parse_goals(text: str) -> tuple[Goal, ...]:
     """
     goals = [Goal(measure) for measure in Measure]
     goals += [Goal(Measure.PEAK, name) for name in (*STATE_RESPONSES, *MARGINS)]
-    goals += [Goal(Measure.SUM, name) for name in STATE_RESPONSES]
+    goals += [Goal(Measure.SUM, name) for name in STATE_RESPONSES if name != TOLERANCE]
     known = {str(goal): goal for goal in goals}
     words = [word.strip() for word in text.split(",")] if isinstance(text, str) else [text]
     for word in words:

@@ -17,11 +17,10 @@ from seqopt.arrays import Bools, Floats, Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.network import Network
-from seqopt.responses._tolerance import Allowed, misfits_along
+from seqopt.responses._tolerance import Allowed, is_tolerance, misfits_along
 from seqopt.responses.quantities import (
     NO_TOLERANCE,
     RESPONSES,
-    is_tolerance,
     length_text,
     robot_response,
     steps_in_words,

@@ -63,6 +63,7 @@ LABELS = {
     "bond": "bond needed [kPa]",
     "friction": "friction needed",
     "tilt": "tilt survived [deg]",
+    "tolerance": "tolerance of grips [mm]",
 }
 MARKERS = "sD^vP*"
 IN_A_ROW = 2  # charts

@@ -26,6 +26,7 @@ from seqopt.problem.criteria import RankSum, WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion, overloads
 from seqopt.responses._enough import Enough, what_was_enough
+from seqopt.responses._tolerance import COLUMN, is_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
 from seqopt.responses.resources import Resources
 from seqopt.responses.table import Departure, LinearRange, analyze, force_column
@@ -393,12 +394,16 @@ def in_shown_unit(value: pd.Series[float] | float, name: str) -> pd.Series[float
         return value * (-180.0 / np.pi) + 90.0
     if name == "bond":
         return value / 1e3
+    if is_tolerance(name):
+        return 1e3 / value
     return value * CHOSEN_BY[name].scale if name in CHOSEN_BY else value
 
 
 def shown_table(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the table of a Pareto set with the tilt that is survived, in degrees."""
-    if "tilt" not in table:
-        return table.copy()
-    out = table.assign(tilt=in_shown_unit(table["tilt"], "tilt"))
-    return out.rename(columns={"tilt": "tilt_survived_deg"})
+    """Return the table of a Pareto set with the tilt that is survived and tolerances, in units."""
+    out = table.copy()
+    for name in [str(name) for name in table]:
+        if name == "tilt" or is_tolerance(name):
+            out[name] = in_shown_unit(table[name], name)
+            out = out.rename(columns={name: "tilt_survived_deg" if name == "tilt" else COLUMN})
+    return out

@@ -38,14 +38,8 @@ from seqopt.engines._auto import Level, LevelChoice
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
 from seqopt.errors import FileError, MemoryShortError, SceneError
-from seqopt.responses._tolerance import allowed_by, misfits, payloads_held
-from seqopt.responses.quantities import (
-    CHOSEN_BY,
-    is_tolerance,
-    lengths,
-    require_finite,
-    robot_response,
-)
+from seqopt.responses._tolerance import allowed_by, is_tolerance, misfits, payloads_held
+from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite, robot_response
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.work._threads import one_thread
 from seqopt.work._workers import free_memory

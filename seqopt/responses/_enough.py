@@ -114,7 +114,7 @@ def _left_out(
 def _off(within: LinearRange, builds: Mapping[str, pd.DataFrame]) -> str:
     """Return by how much grips may be off, in brackets; nothing where that is not linear."""
     engine = within.engine
-    if not isinstance(engine, AutoEngine | ComplianceEngine | PlanarEngine):
+    if type(engine) not in (AutoEngine, ComplianceEngine):
         return ""
     least, build, step = least_tolerance(engine, builds.values())
     if not 1 / NO_TOLERANCE < least < np.inf:

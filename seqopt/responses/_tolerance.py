@@ -16,15 +16,26 @@ import pandas as pd
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._auto import AutoEngine
+from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Engine, Want, grip_columns, select_sets
 from seqopt.errors import ProblemError, SceneError
 from seqopt.network.network import Network
 from seqopt.responses._worst_direction import proven_rates, worst_misplacement, worst_rates
-from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE
+from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, length_text
 from seqopt.sequence.steps import Step
 
 _AT_ONCE = 4096  # grip sets that are solved together
+
+
+def is_tolerance(name: str) -> bool:
+    """Return whether a response is a tolerance, of payloads alone or also of limits."""
+    return name == TOLERANCE or name.startswith(f"{TOLERANCE}[")
+
+
+def value_text(name: str, value: float) -> str:
+    """Return what an aim or a response is worth: of a tolerance as a length, else six digits."""
+    return length_text(value) if is_tolerance(name) else f"{value:.6g}"
 
 
 @dataclass(frozen=True)
@@ -123,10 +134,11 @@ class _Tensions(_Group):
 
 def _linear(engine: Engine) -> Engine:
     """Return the engine whose answers are linear in misplacements: of joints that never fail."""
-    if isinstance(engine, DiscreteEngine):
+    why = {DiscreteEngine: "is not linear in where grips are", PlanarEngine: "has two directions"}
+    if type(engine) in why:
         raise ProblemError(
-            "tolerance: discrete elements are not linear in where grips are; take the engine "
-            "compliance or auto"
+            f"tolerance: a {type(engine).__name__} {why[type(engine)]}; take the engine compliance "
+            "or auto"
         )
     return engine.rigid if isinstance(engine, AutoEngine) else engine
 
@@ -256,6 +268,19 @@ def with_tolerances(
     """Return a table of steps with how far their grips may be off, mm, by a tolerance's name."""
     found = [step_tolerance(engine, step, allowed_by(name)).distance for step in steps]
     return table.assign(**{COLUMN: 1e3 * np.array(found)})
+
+
+def tolerance_table(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
+    """Return how far grips may be off in every step: a row each, mm, and what stops them."""
+    found = [step_tolerance(engine, step) for step in steps]
+    return pd.DataFrame(
+        {
+            "step": [step.number for step in steps],
+            COLUMN: [1e3 * each.distance for each in found],
+            "proven_mm": [1e3 * each.proven for each in found],
+            "stops": [each.what for each in found],
+        }
+    )
 
 
 def misfits_along(table: pd.DataFrame) -> Floats:

@@ -62,11 +62,6 @@ carries more than its payload, or a limit is exceeded. Counted by its reciprocal
 NO_TOLERANCE = 1e30  # its reciprocal where there is none
 
 
-def is_tolerance(name: str) -> bool:
-    """Return whether a response is a tolerance, of payloads alone or also of limits."""
-    return name == TOLERANCE or name.startswith(f"{TOLERANCE}[")
-
-
 _SLACK = 1e-6  # an edge is in tension above this share of the mean weight of a brick
 _LEVEL = 1e-9  # share of a force that may point down where it counts as level
 TO_1E_3MM = 1e6  # from m to the tables' unit of length, 1e-3 mm

@@ -37,6 +37,7 @@ from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.responses._enough import what_was_enough
 from seqopt.responses._staged import Placing, staged_fields
+from seqopt.responses._tolerance import with_tolerances
 from seqopt.responses.table import LinearRange, archive, response_table, step_fields
 from seqopt.sequence.steps import Step
 from seqopt.work.progress import with_progress
@@ -70,6 +71,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "scratch: bricks come without stress, fitted to the deformed structure or set down where "
         "they are planned, and grips close where they find their nodes",
     )
+    how.add_argument(
+        "--tolerance",
+        action="store_true",
+        help="also find how far every grip may be from where it should be before a robot carries "
+        "more than its payload, in the worst direction: a column tolerance_mm",
+    )
     about = {
         "--fields FILE": "also write every edge force, node displacement and reaction, as a NumPy "
         "archive (.npz)",
@@ -94,6 +101,8 @@ def run(options: argparse.Namespace) -> Answer:
     if table.empty:
         return Answer(facts={"steps": ()}, failures=late, status=ended)
     computed = steps[: len(table)]
+    if options.tolerance:
+        table = with_tolerances(engine, computed, table)
     staged = None if options.staged is None else staged_fields(network, computed, options.staged)
     outside = within.departures(table, staged)
     if options.fields is not None:

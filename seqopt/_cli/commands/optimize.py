@@ -43,6 +43,7 @@ from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve, usual
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import OWN
+from seqopt.responses._tolerance import value_text
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.three_robots import SCHEDULES
@@ -273,7 +274,7 @@ def _said(found: _Found) -> str:
     plan = found.plan
     how = f"{plan.formulation.name} ({plan.formulation.kind.value})"
     if plan.order is not None:
-        values = ", ".join(f"{name} {value:.6g}" for name, value in plan.objective.items())
+        values = ", ".join(f"{name} {value_text(name, v)}" for name, v in plan.objective.items())
         bound = plan.order.bound_said
         return f"{how}: {values}, {plan.status}, {bound}; {len(plan.steps)} steps"
     if found.trial is not None:

@@ -31,8 +31,8 @@ from seqopt.problem.requirements import (
     robots_of,
 )
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, StepChoices
-from seqopt.responses._tolerance import with_tolerances
-from seqopt.responses.quantities import is_tolerance, robot_response
+from seqopt.responses._tolerance import is_tolerance, with_tolerances
+from seqopt.responses.quantities import robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.responses.table import analyze
 from seqopt.sequence.schedule import OpenGrip, Schedule

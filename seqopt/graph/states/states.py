@@ -36,7 +36,8 @@ from seqopt.problem.requirements import (
 )
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._grip_sets import GripSets
-from seqopt.responses.quantities import TOLERANCE, is_tolerance, robot_response
+from seqopt.responses._tolerance import is_tolerance
+from seqopt.responses.quantities import TOLERANCE, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import as_float, short
 from seqopt.scene.scene import Scene

@@ -25,7 +25,8 @@ from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.search._margin_search import WORST, bisected, with_margin
 from seqopt.problem.problem import STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
-from seqopt.responses.quantities import is_tolerance, length_text
+from seqopt.responses._tolerance import is_tolerance
+from seqopt.responses.quantities import length_text
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule
 

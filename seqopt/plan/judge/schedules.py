@@ -25,8 +25,8 @@ from seqopt.plan.judge._standing_proof import proven_margins, require_margin
 from seqopt.plan.judge.certificate import Certificate
 from seqopt.problem.problem import LARGEST, Goal, Measure
 from seqopt.problem.standing import _size, slack
-from seqopt.responses._tolerance import misfits_along, with_tolerances
-from seqopt.responses.quantities import CHOSEN_BY, is_tolerance
+from seqopt.responses._tolerance import is_tolerance, misfits_along, with_tolerances
+from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.responses.table import analyze, force_column
 from seqopt.sequence._rule_check import check_free
 from seqopt.sequence.schedule import Schedule
