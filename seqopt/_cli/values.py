@@ -83,9 +83,10 @@ def _split_word(text: str) -> tuple[str, str]:
 
 
 def _response_word(name: str, where: str) -> str:
-    if name not in (*CHOICE_RESPONSES, "F_each") and not name.startswith("F_"):
+    known = (*CHOICE_RESPONSES, TOLERANCE)
+    if name not in (*known, "F_each") and not name.startswith("F_"):
         criteria = (*CRITERIA, *CHOICE_RESPONSES, "F_each")
-        names = criteria if where == "--criteria" else ("payload", *CHOICE_RESPONSES)
+        names = criteria if where == "--criteria" else ("payload", *known)
         hint = did_you_mean(name, names)
         raise ProblemError(f"{where} {name} does not exist{hint}; give {', '.join(names)}, F_ROBOT")
     return name

@@ -45,14 +45,12 @@ from seqopt.responses._blocks import (
     work,
     worker_for,
 )
-from seqopt.responses.quantities import TOLERANCE
 from seqopt.responses.resources import HERE, Resources
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.work._workers import Crew, Lanes, hire, map_ordered
 from seqopt.work.progress import Progress
 
-CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest", TOLERANCE)
-"""And one per robot."""
+CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest")  # and one per robot
 
 __all__ = ["CHOICE_RESPONSES", "Evaluation", "StepChoices", "Wanted", "evaluate_choices"]
 
