@@ -31,6 +31,7 @@ BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
 SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
 MOST_WORKERS = 1024
 LARGEST = 1e100  # number: products of larger ones overflow
+_LENGTHS = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9, "m": 1.0}
 COUNTS = ("least_grips", "regrips")
 UNBOUND = {("regrips", "any"): None, ("placers", "any"): (), ("candidates", "all"): ""}
 RULES = ("newest", "payload", "ending", "placers", "candidates", *COUNTS)
@@ -162,16 +163,15 @@ def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
         else:
             name, value = _split_word(text)
             response = _response_word(name, "--limit")
-            out.append(Limit(response, _size_word(response, value, f"--limit {text}")))
+            read = length_word if response == TOLERANCE else number_word
+            out.append(Limit(response, read(value, f"--limit {text}")))
     return tuple(out)
 
 
-def _size_word(response: str, text: str, where: str) -> float:
-    """Return a positive number, SI units, of a tolerance from a length such as ``0.4mm``."""
-    unit = next((u for u in ("mm", "um", "µm", "m") if text.endswith(u)), "")
-    if response != TOLERANCE or not unit:
-        return number_word(text, where)
-    return number_word(text.removesuffix(unit), where) * {"m": 1.0, "mm": 1e-3}.get(unit, 1e-6)
+def length_word(text: str, where: str) -> float:
+    """Return a positive length, m, from words such as ``0.4mm``; ``where``: for messages."""
+    unit = next((unit for unit in _LENGTHS if text.endswith(unit)), "")
+    return number_word(text.removesuffix(unit), where) * _LENGTHS.get(unit, 1.0)
 
 
 def parse_time_limit(text: str | None) -> float:

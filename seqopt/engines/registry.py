@@ -60,11 +60,11 @@ class Recipe:
         """What answers depend on, condensed: equal for equal scenes, options and arithmetic.
 
         Names and provenance of a scene change no answer and are left out; of robots only how their
-        grips give way counts.
+        grips give way counts, and what they carry: that makes kinds of grips, and tolerances.
         """
         scene = {k: v for k, v in scene_to_dict(self.scene).items() if k not in _WITHOUT_EFFECT}
-        ways = [(robot.stiffness, robot.rotational_stiffness) for robot in self.scene.robots]
-        scene["grips"] = [*dict.fromkeys(ways)] or [(None, None)]
+        ways = [(r.stiffness, r.rotational_stiffness, r.payload) for r in self.scene.robots]
+        scene["grips"] = [*dict.fromkeys(ways)] or None
         built = json.dumps(scene, sort_keys=True)
         parts = (self.engine, repr(sorted(self.options.items())), built, _arithmetic())
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()

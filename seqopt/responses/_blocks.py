@@ -38,7 +38,7 @@ from seqopt.engines._auto import Level, LevelChoice
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
 from seqopt.errors import FileError, MemoryShortError, SceneError
-from seqopt.responses._tolerance import allowed_by, is_tolerance, misfits, payloads_held
+from seqopt.responses._tolerance import allowed_by, is_tolerance, misfits
 from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite, robot_response
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.work._threads import one_thread
@@ -100,9 +100,8 @@ def answer(engine: Engine, block: Block) -> Answers:
     network, bricks = engine.network, block.bricks
     values = {r.name: require_finite(r.name, r.of(network, fields), bricks) for r in asked}
     for name in filter(is_tolerance, block.names):
-        payload = payloads_held(network, block.grips)
         with one_thread():
-            values[name] = misfits(engine, bricks, block.grips, payload, allowed_by(name))
+            values[name] = misfits(engine, bricks, block.grips, allowed_by(name))
     return Answers(values, forces, tuple((Counter(tally_of(engine)) - before).items()))
 
 

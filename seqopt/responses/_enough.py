@@ -14,7 +14,7 @@ from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.registry import recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.responses._tolerance import least_tolerance
+from seqopt.responses._tolerance import held_in_table, least_tolerance
 from seqopt.responses.quantities import NO_TOLERANCE, RESPONSES, length_text
 from seqopt.responses.table import LinearRange
 
@@ -116,7 +116,9 @@ def _off(within: LinearRange, builds: Mapping[str, pd.DataFrame]) -> str:
     engine = within.engine
     if type(engine) not in (AutoEngine, ComplianceEngine):
         return ""
-    least, build, step = least_tolerance(engine, builds.values())
+    scene = engine.network.scene
+    held = (held_in_table(scene, table) for table in builds.values())
+    least, build, step = least_tolerance(engine, held)
     if not 1 / NO_TOLERANCE < least < np.inf:
         return ""
     where = f"step {step}{f' of {[*builds][build]}' if len(builds) > 1 else ''}"

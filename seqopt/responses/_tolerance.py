@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from typing import Any
+from operator import itemgetter
 
 import numpy as np
 import pandas as pd
@@ -19,10 +19,13 @@ from seqopt.engines._auto import AutoEngine
 from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Engine, Want, grip_columns, select_sets
-from seqopt.errors import ProblemError, SceneError
+from seqopt.engines.registry import make_engine, recipe_of
+from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.responses._worst_direction import proven_rates, worst_misplacement, worst_rates
 from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, length_text
+from seqopt.responses.table import grips_of
+from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 
 _AT_ONCE = 4096  # grip sets that are solved together
@@ -173,17 +176,15 @@ def _groups(
         yield vectors("displacement", "displacement", most)
 
 
-def misfits(
-    engine: Engine, bricks: int, grips: Ints, payload: Floats, allowed: Allowed = ROBOTS_ALONE
-) -> Floats:
+def misfits(engine: Engine, bricks: int, grips: Ints, allowed: Allowed = ROBOTS_ALONE) -> Floats:
     """Return one over how far the grips of sets may be off, (S,), 1/m.
 
     `NO_TOLERANCE` where something is too large with all grips in their places, and where two rigid
     grips hold one brick: they fit in one place alone.
 
-    ``grips`` (S, r): numbers of nodes; ``payload`` (S, r): of the robot at each, N.
+    ``grips`` (S, r): numbers, as of `seqopt.Scene.grip_numbers`.
     """
-    held = grips.shape[1]
+    held, payload = grips.shape[1], _payloads(engine.network, grips)
     out = np.where(_tied(engine, bricks, grips), NO_TOLERANCE, 0.0)
     rows = np.flatnonzero(out == 0) if held else np.arange(0)
     step = max(1, _AT_ONCE // (3 * held + 1))
@@ -194,30 +195,32 @@ def misfits(
     return np.asarray(np.minimum(out, NO_TOLERANCE))
 
 
-def payloads_held(network: Network, grips: Ints) -> Floats:
+def _payloads(network: Network, grips: Ints) -> Floats:
     """Return the payloads (S, r) of the robots of grip sets, N."""
-    payloads = {robot.payload for robot in network.scene.robots}
-    if len(payloads) > 1:
-        raise SceneError("tolerance: robots have different payloads")
-    return np.full(grips.shape, payloads.pop())
+    kinds = network.scene.grip_kinds
+    return np.asarray(kinds.payload[kinds.split(grips)[1]])
 
 
 def _tied(engine: Engine, bricks: int, grips: Ints) -> Bools:
     """Return which sets (S,) hold one brick with two rigid grips."""
-    brick = np.sort(grip_columns(engine.network, bricks, grips) // 2, axis=1)
-    return np.asarray((np.diff(brick, axis=1) == 0).any(axis=1))
+    kinds = engine.network.scene.grip_kinds
+    gives: Bools = np.asarray(kinds.compliance[:, :3, :3].any(axis=(1, 2)))
+    brick = grip_columns(engine.network, bricks, grips) // 2
+    apart = -1 - np.arange(grips.shape[1])  # soft grips are on no brick together
+    brick = np.where(gives[kinds.split(grips)[1]], apart, brick)
+    return np.asarray((np.diff(np.sort(brick, axis=1), axis=1) == 0).any(axis=1))
 
 
 def step_tolerance(engine: Engine, step: Step, allowed: Allowed = ROBOTS_ALONE) -> Tolerance:
     """Return how far the grips of a step may be off, with its proof."""
     scene = engine.network.scene
     holding = [r for r, node in zip(scene.robots, step.grips, strict=True) if node is not None]
-    grips = np.array([step.held], dtype=np.int64).reshape(1, -1)
+    grips = grips_of(scene, step)
     if not holding:
         return Tolerance(np.inf, np.inf)
     if _tied(engine, step.bricks, grips)[0]:
         return Tolerance(0.0, 0.0, "two rigid grips on one brick")
-    payload = np.array([[robot.payload for robot in holding]])
+    payload = _payloads(engine.network, grips)
     worst, rate, proven = Tolerance(np.inf, np.inf), 0.0, 0.0
     for group in _groups(engine, step.bricks, grips, payload, allowed):
         rates, direction = group.rates()
@@ -231,32 +234,68 @@ def step_tolerance(engine: Engine, step: Step, allowed: Allowed = ROBOTS_ALONE) 
     return replace(worst, proven=1 / proven if proven else np.inf)
 
 
-def least_tolerance(engine: Engine, tables: Iterable[pd.DataFrame]) -> tuple[float, int, int]:
+_Held = tuple[int, int, tuple[int, ...]]  # a step's number, its bricks, its grips by number
+
+
+def held_in_table(scene: Scene, table: pd.DataFrame) -> list[_Held]:
+    """Return what is held in every step of a table of `seqopt.analyze`."""
+    nodes = table[[f"{robot.name}_node" for robot in scene.robots]].to_numpy(object)
+    held = (scene.grip_numbers([int(n) if pd.notna(n) else None for n in row]) for row in nodes)
+    return [*zip(map(int, table["step"]), map(int, table["bricks"]), held, strict=True)]
+
+
+def held_in_steps(scene: Scene, steps: Sequence[Step]) -> list[_Held]:
+    """Return what is held in every step."""
+    return [(step.number, step.bricks, scene.grip_numbers(step.grips)) for step in steps]
+
+
+def least_tolerance(engine: Engine, builds: Iterable[Sequence[_Held]]) -> tuple[float, int, int]:
     """Return how far grips may be off in all steps of builds, m, in which build, and which step.
 
-    ``tables``: of `seqopt.analyze`. All steps of a brick count with as many grips are solved at
-    once, and a step that several builds share is solved once.
+    All steps of a brick count with as many grips are solved at once, equal ones of several builds
+    once.
     """
-    robots = engine.network.scene.robots
-    asked: dict[Any, tuple[int, int]] = {}  # by brick count, nodes and payloads
-    for build, table in enumerate(tables):
-        nodes = table[[f"{robot.name}_node" for robot in robots]].to_numpy(object)
-        steps = zip(table["step"].astype(int), table["bricks"].astype(int), nodes, strict=True)
-        for step, bricks, row in steps:
-            held = [(int(n), r.payload) for n, r in zip(row, robots, strict=True) if pd.notna(n)]
-            if held:
-                key = bricks, *zip(*held, strict=True)
-                asked.setdefault(key, (build, step))
+    asked: dict[tuple[int, int, tuple[int, ...]], tuple[int, int]] = {}
+    for build, steps in enumerate(builds):
+        for step, bricks, held in steps:
+            asked.setdefault((bricks, len(held), held), (build, step))
     worst = (0.0, -1, -1)
-    keys = sorted(asked, key=lambda key: (key[0], len(key[1])))
-    for (bricks, _), same in groupby(keys, key=lambda key: (key[0], len(key[1]))):
+    for (bricks, _), same in groupby(sorted(asked), key=itemgetter(0, 1)):
         mine = [*same]
-        grips, payload = np.array([k[1] for k in mine]), np.array([k[2] for k in mine])
-        found = misfits(engine, bricks, grips, payload)
+        found = misfits(engine, bricks, np.array([held for *_, held in mine], dtype=np.int64))
         at = int(found.argmax())
         if found[at] > worst[0]:
             worst = (float(found[at]), *asked[mine[at]])
     return (1 / worst[0] if worst[0] else np.inf, *worst[1:])
+
+
+_SOFTEST, _STIFFEST = 1e2, 1e12  # N/m, between which a stiffness is sought
+_CLOSE = 1.01  # ratio of stiffnesses that are told apart
+
+
+def stiffness_for(engine: Engine, steps: Sequence[Step], distance: float) -> float | None:
+    """Return the largest stiffness of all grips, N/m, with which they may be so far off, m.
+
+    It is found by bisection: stiffer grips are not all tried. Infinite where rigid ones may be,
+    None where no stiffness from `_SOFTEST` on may.
+    """
+    recipe, scene = recipe_of(engine), engine.network.scene
+    name = "compliance" if recipe is None else recipe.engine
+
+    def enough(stiffness: float | None) -> bool:
+        soft = scene.with_grips(stiffness)
+        found = least_tolerance(make_engine(name, soft), [held_in_steps(soft, steps)])
+        return found[0] >= distance
+
+    if enough(None):
+        return np.inf
+    low, high = _SOFTEST, _STIFFEST
+    if not enough(low):
+        return None
+    while high > _CLOSE * low:
+        middle = (low * high) ** 0.5
+        low, high = (middle, high) if enough(middle) else (low, middle)
+    return low
 
 
 COLUMN = "tolerance_mm"

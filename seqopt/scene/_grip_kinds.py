@@ -1,8 +1,8 @@
 """Kinds of grips: how robots of a scene give way at the nodes that they hold.
 
-Robots that give way alike are one kind, in the order of their first robots. Engines are asked about
-grips by number: that of the node, and for a robot of kind k more by k times the span of all node
-numbers. Where all robots are alike, as where all are rigid, a grip is its node's number.
+Robots that give way alike and carry as much are one kind, in the order of their first robots.
+Engines are asked about grips by number: that of the node, and for a robot of kind k more by k times
+the span of all node numbers. Where all robots are alike a grip is its node's number.
 """
 
 from __future__ import annotations
@@ -22,12 +22,14 @@ class GripKinds(FrozenValue):
 
     ``compliance`` (K, 6, 6): how a node shifts and turns, m and rad, against the hand that holds
     it for a force and a moment on it, N and N m; zero where the hand is rigid. ``turns`` (K,):
-    whether hands of a kind bear moments; others let their nodes turn. ``of_robot`` (R,): the kind
-    of every robot. ``first``, ``span``: the least node number, and how far apart kinds are.
+    whether hands of a kind bear moments; others let their nodes turn. ``payload`` (K,): N.
+    ``of_robot`` (R,): the kind of every robot. ``first``, ``span``: the least node number, and how
+    far apart kinds are.
     """
 
     compliance: Floats
     turns: Bools
+    payload: Floats
     of_robot: Ints
     first: int
     span: int
@@ -55,13 +57,14 @@ class GripKinds(FrozenValue):
 
 def grip_kinds(robots: Sequence[Robot], nodes: Sequence[int]) -> GripKinds:
     """Return the kinds of robots; one that is rigid where there is none. ``nodes``: all numbers."""
-    ways = [(robot.stiffness, robot.rotational_stiffness) for robot in robots]
-    kinds = list(dict.fromkeys(ways)) or [(None, None)]
+    ways = [(robot.stiffness, robot.rotational_stiffness, robot.payload) for robot in robots]
+    kinds = list(dict.fromkeys(ways)) or [(None, None, np.inf)]
     compliance = np.zeros((len(kinds), 6, 6))
-    for own, (shift, turn) in zip(compliance, kinds, strict=True):
+    for own, (shift, turn, _) in zip(compliance, kinds, strict=True):
         for at, stiffness in ((0, shift), (3, turn)):
             if stiffness is not None:
                 own[range(at, at + 3), range(at, at + 3)] = 1 / np.array(stiffness)
-    turns = np.array([turn is not None for _, turn in kinds])
+    turns = np.array([turn is not None for _, turn, _ in kinds])
+    payload = np.array([most for *_, most in kinds])
     of_robot = np.array([kinds.index(way) for way in ways], dtype=np.int64)
-    return GripKinds(compliance, turns, of_robot, min(nodes), max(nodes) - min(nodes) + 1)
+    return GripKinds(compliance, turns, payload, of_robot, min(nodes), max(nodes) - min(nodes) + 1)

@@ -6,6 +6,8 @@ import argparse
 import time
 from collections.abc import Iterator, Sequence
 
+import pandas as pd
+
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import (
     asked_engine,
@@ -27,7 +29,7 @@ from seqopt._cli.options import (
     steps_options,
 )
 from seqopt._cli.outputs import keep_apart, put_table
-from seqopt._cli.values import parse_time_limit
+from seqopt._cli.values import length_word, parse_time_limit
 from seqopt._files import write_bytes
 from seqopt._interrupts import ending
 from seqopt.engines._auto import AutoEngine, Level
@@ -37,7 +39,8 @@ from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.responses._enough import what_was_enough
 from seqopt.responses._staged import Placing, staged_fields
-from seqopt.responses._tolerance import with_tolerances
+from seqopt.responses._tolerance import COLUMN, stiffness_for, with_tolerances
+from seqopt.responses.quantities import length_text, steps_in_words
 from seqopt.responses.table import LinearRange, archive, response_table, step_fields
 from seqopt.sequence.steps import Step
 from seqopt.work.progress import with_progress
@@ -73,9 +76,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )
     how.add_argument(
         "--tolerance",
-        action="store_true",
+        nargs="?",
+        const="",
+        metavar="LENGTH",
         help="also find how far every grip may be from where it should be before a robot carries "
-        "more than its payload, in the worst direction: a column tolerance_mm",
+        "more than its payload, in the worst direction: a column tolerance_mm; of a length, such "
+        "as 0.4mm, also how soft grips must be to be so far off",
     )
     about = {
         "--fields FILE": "also write every edge force, node displacement and reaction, as a NumPy "
@@ -101,8 +107,10 @@ def run(options: argparse.Namespace) -> Answer:
     if table.empty:
         return Answer(facts={"steps": ()}, failures=late, status=ended)
     computed = steps[: len(table)]
-    if options.tolerance:
+    off: tuple[str, ...] = ()
+    if options.tolerance is not None:
         table = with_tolerances(engine, computed, table)
+        off = _tolerance_notes(engine, computed, table, options.tolerance)
     staged = None if options.staged is None else staged_fields(network, computed, options.staged)
     outside = within.departures(table, staged)
     if options.fields is not None:
@@ -114,12 +122,36 @@ def run(options: argparse.Namespace) -> Answer:
     facts = {"scene": scene_facts(scene), "units": UNITS, "steps": table, **provenance(engine)}
     answer = Answer(
         facts={**facts, "enough": enough.facts()},
-        notes=(*level_notes(engine), *within.unchecked, *enough.lines, *idle_notes(scene, steps)),
+        notes=(
+            *off,
+            *level_notes(engine),
+            *within.unchecked,
+            *enough.lines,
+            *idle_notes(scene, steps),
+        ),
         failures=late,
         status=ended,
         **said,
     )
     return strictly(answer, options, exceeded(scene, table), outside)
+
+
+def _tolerance_notes(
+    engine: Engine, steps: Sequence[Step], table: pd.DataFrame, asked: str
+) -> tuple[str, ...]:
+    """Return how far grips may be off, and how soft they must be for what is asked."""
+    at = int(table[COLUMN].to_numpy(float).argmin())
+    least, number = 1e-3 * float(table[COLUMN].iloc[at]), int(table["step"].iloc[at])
+    said = f"tolerance: grips may be {length_text(least)} off (step {number})"
+    if not asked:
+        return (said,)
+    wanted = length_word(asked, f"--tolerance {asked}")
+    short = [int(n) for n in table["step"][1e-3 * table[COLUMN].to_numpy(float) < wanted]]
+    if not short:
+        return (f"{said}, no less than {length_text(wanted)}",)
+    found = stiffness_for(engine, steps, wanted)
+    how = "however soft they are" if found is None else f"unless softer than {found:.3g} N/m"
+    return (f"{said}, less than {length_text(wanted)} in {steps_in_words(short)}, {how}",)
 
 
 def _late(
