@@ -137,7 +137,7 @@ def _asked_builds(options: argparse.Namespace, scene: Scene) -> tuple[Builds, li
     if options.method is None and options.plan is None:
         return usual_builds(scene, options.tell)
     name = options.method or Path(options.plan).stem
-    return {name: asked_steps(options, scene)}, []
+    return {name: asked_steps(options, build_network(scene))}, []
 
 
 def _files(scene: Scene, builds: Builds, found: FailureMap) -> dict[str, bytes | str]:
