@@ -97,12 +97,10 @@ def frozen(content: _Content) -> _Content:
     elif isinstance(content, _COMPRESSED):
         for part in (content.data, content.indices, content.indptr):
             part.flags.writeable = False
-    elif isinstance(content, dict):
-        for part in content.values():
-            frozen(part)
-    elif isinstance(content, list | tuple):
-        for part in content:
-            frozen(part)
+    elif isinstance(content, dict | list | tuple):
+        for part in content.values() if isinstance(content, dict) else content:
+            if not isinstance(part, str):  # names are many
+                frozen(part)
     return content
 
 

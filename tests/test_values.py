@@ -13,7 +13,7 @@ from scipy import sparse
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.contact._elastic_limits import face_quadrature, find_elastic_limits
 from seqopt.contact.faces import step_assembly
-from seqopt.contact.mortar import EPOXY
+from seqopt.contact.mortar import DRY, EPOXY
 from seqopt.engines._hands import read_hands
 from seqopt.engines._planar import _Plane
 from seqopt.engines.diagnosis import diagnose
@@ -73,7 +73,7 @@ def values(arch25):
         *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),
         *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, EPOXY)),
         *(load_factor(assembly, EPOXY), read_hands(network, grips[None], np.ones((1, 1, 3)))),
-        *_Known(assembly, bonded(assembly, EPOXY)).motions_of(np.ones((2, 6))),
+        *_Known(assembly, bonded(assembly, DRY)).motions_of(-np.ones((2, 6))),
         *(_HoldingForces(0.0, np.zeros(1)), first_directions(4, 1)),
         *each_verdict(network, sequential(network)[:1], EPOXY),
     )

@@ -15,7 +15,7 @@ from seqopt._interrupts import answered
 from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, TimeUpError
 from seqopt.graph._budgets import Within, within_budgets
-from seqopt.graph._explore import Explorer, Visited
+from seqopt.graph._explore import Explorer, Key, Visited
 from seqopt.graph.graph import Graph
 from seqopt.graph.orders import (
     MOST_PARTS,
@@ -272,12 +272,12 @@ def after_margins(problem: States, search: Search, tell: Watching) -> StatePath:
     if not margins[0]:
         return search(problem)
     try:
-        value, bound, rest = best_margin(problem, tell)
+        value, bound, rest, states = best_margin(problem, tell)
     except StopError as stop:
         raise _too_little(stop) from None
+    if len(problem.goals) == 1:  # nothing else was wished
+        return StatePath(tuple(states), (value,), (bound,))
     after = after_margins(rest, search, tell)
-    if len(problem.goals) == 1:  # what was chosen after it was nobody's wish
-        after = replace(after, objective=(), bound=())
     prices = ((0.0,) * len(problem.budgets), *after.prices) if problem.budgets else ()
     objective, bounds = (value, *after.objective), (bound, *after.bound)
     return replace(after, objective=objective, bound=bounds, prices=prices)
@@ -322,10 +322,18 @@ def best_standing(problem: States, found: Explorer) -> StatePath:
             row = (level, *state.tolist())
             if row not in known and not problem.stand(level, state[None])[0]:
                 found.close((level, part), state[None])
+                _close_alike(problem, found, visited, (level, part))
                 fallen = True
             known.add(row)
         if not fallen:
             return _selection(visited, best)
+
+
+def _close_alike(problem: States, found: Explorer, visited: Visited, part: tuple[int, Key]) -> None:
+    """Leave out the visited states of a part that are known to fall, without asking any."""
+    for *which, states in visited.states:
+        if tuple(which) == part:
+            found.close(part, states[problem.recalled(part[0], states) < 0])
 
 
 def exact_best(found: Explorer, budgets: Sequence[float] = ()) -> tuple[Visited, Best | Within]:

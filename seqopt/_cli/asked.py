@@ -16,7 +16,6 @@ from seqopt.engines._auto import AutoEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import LIMITED, make_engine
 from seqopt.errors import ProblemError, SceneError, StepError
-from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.problem.requirements import overloads
 from seqopt.report.comparison import idle_note
@@ -73,13 +72,13 @@ def asked_engine(options: argparse.Namespace, network: Network) -> Engine:
         raise SceneError(f"--engine {options.engine}: {why}") from error
 
 
-def asked_steps(options: argparse.Namespace, scene: Scene) -> tuple[Step, ...]:
+def asked_steps(options: argparse.Namespace, network: Network) -> tuple[Step, ...]:
     """Return the closed sequence that a command is asked for.
 
     Raises `SceneError`, `StepError` if the method is not for the scene, or robots are named beside
     a plan.
     """
-    robots = parse_robots(options.robots)
+    scene, robots = network.scene, parse_robots(options.robots)
     if robots and options.method not in METHODS:
         raise StepError(
             f"--robots {options.robots}: a plan says itself who holds; leave it out, or give "
@@ -88,7 +87,7 @@ def asked_steps(options: argparse.Namespace, scene: Scene) -> tuple[Step, ...]:
     if options.plan is not None:
         return read_plan(scene, options.plan)
     if options.method != PUBLISHED:
-        return METHODS[options.method](build_network(scene), robots)
+        return METHODS[options.method](network, robots)
     if not is_reference_arch(scene):
         raise SceneError(
             f"scene {scene.name}: --method {PUBLISHED} is the printed plan for arch25; "

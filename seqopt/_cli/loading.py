@@ -29,7 +29,8 @@ def answer_load_factor(options: argparse.Namespace) -> Answer:
     """Answer how much load every step of a sequence bears."""
     scene = asked_scene(options)
     require_out(options)
-    network, steps = build_network(scene), asked_steps(options, scene)
+    network = build_network(scene)
+    steps = asked_steps(options, network)
     found = load_factors(network, steps, asked_mortar(options), options.tell)
     table, said = load_factor_table(steps, found), format_load_factors(steps, found)
 

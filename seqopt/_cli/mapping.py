@@ -11,23 +11,29 @@ from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
 from seqopt._cli.outputs import figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import mortar_word, number_word
+from seqopt._cli.values import count_word, mortar_word, number_word
 from seqopt._files import csv_text
 from seqopt.engines.registry import USUAL, make_engine, versions
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, SceneError, SeqoptError
 from seqopt.network.build import build_network
 from seqopt.report._failures import AXIS_WORDS, Builds, cure_words, failure_page, usual_builds
 from seqopt.report._pages import PAGE
-from seqopt.scene.scene import Scene
-from seqopt.stability.failure_map import AXES, FailureMap, failure_map
+from seqopt.scene._checks import MOST_BRICKS
+from seqopt.scene._counts import scene_of_bricks
+from seqopt.scene.scene import Scene, in_order
+from seqopt.stability.failure_map import FailureMap, brick_map, failure_map
 
 MAP = {
-    "--map AXIS": "map where builds fail, over what holds their joints and over friction or tilt "
-    "(degrees), with values of your own as tilt=0,2,5: of the fixed methods, a loop and a free "
-    "schedule, or of --method or --plan alone",
+    "--map AXIS": "map where builds fail, over what holds their joints and over friction, tilt "
+    "(degrees) or bricks (of how many a scene in words is built; else how many are placed), with "
+    "values of your own as tilt=0,2,5: of the fixed methods, a loop and a free schedule, or of "
+    "--method or --plan alone",
     "--holds NAMES": "with --map: what holds the joints, of dry, bond=STRENGTH (Pa) and epoxy, "
     "with commas between them (default: dry,epoxy)",
 }
+BRICKS = "bricks"
+WAYS = ("friction", "tilt")
+SHARES = (0.5, 0.75, 1.0, 1.25, 1.5)  # of the bricks of a scene, by default
 STEEPEST = 45.0  # degrees
 NAME = 26  # columns of a build with what holds it
 
@@ -41,7 +47,11 @@ def answer_map(options: argparse.Namespace) -> Answer:
         mortar_word(name, "--holds")
     require_out(options)
     builds, notes = _asked_builds(options, scene)
-    found = failure_map(scene, builds, holds, axis, values, options.tell)
+    if axis == BRICKS:
+        scene, builds, found, more = _over_bricks(options, (scene, builds), holds, values)
+        notes += more
+    else:
+        found = failure_map(scene, builds, holds, axis, values, options.tell)
     written = write_outputs(options, lambda: _files(scene, builds, found))
     blocks = ["\n".join(block) for block in (_table(scene, found), _cures(found)) if block]
     if written:
@@ -68,10 +78,12 @@ def answer_map(options: argparse.Namespace) -> Answer:
 def _asked_axis(text: str) -> tuple[str, tuple[float, ...]]:
     """Return the axis of a map, and its values; none where the usual ones are meant."""
     axis, _, values = text.partition("=")
-    if axis not in AXES:
-        raise ProblemError(
-            f"--map {text}: give {' or '.join(AXES)}, with values as friction=0.3,0.6"
-        )
+    if axis not in (*WAYS, BRICKS):
+        known = f"{', '.join(WAYS)} or {BRICKS}"
+        raise ProblemError(f"--map {text}: give {known}, with values as friction=0.3,0.6")
+    if axis == BRICKS:
+        words = values.split(",") if values else ()
+        return axis, tuple(sorted({count_word(n, "--map bricks", MOST_BRICKS) for n in words}))
     numbers = [
         number_word(value, f"--map {text}", zero=True) for value in values.split(",") if values
     ]
@@ -82,12 +94,50 @@ def _asked_axis(text: str) -> tuple[str, tuple[float, ...]]:
     return axis, tuple(sorted({*numbers}))
 
 
+def _over_bricks(
+    options: argparse.Namespace,
+    asked: tuple[Scene, Builds],
+    holds: Sequence[str],
+    counts: Sequence[float],
+) -> tuple[Scene, Builds, FailureMap, list[str]]:
+    """Return the map over the number of bricks, and why it is not possible, or not for all.
+
+    With it the scene and the builds of which it is shown how steps fall. A scene whose bricks
+    cannot be counted otherwise, or a plan, is mapped along its build.
+    """
+    scene, now = asked[0], len(asked[0].bricks)
+    try:
+        if options.plan is not None:
+            raise SceneError(f"plan {options.plan}: it is for {now} bricks alone")
+        scene_of_bricks(options.scene, now)
+    except SceneError as error:
+        note = f"{error}; this maps steps by how many bricks are placed"
+        placed = [count for count in counts if count <= now]
+        found = failure_map(scene, asked[1], holds, "bricks placed", placed, options.tell)
+        return *asked, found, [note]
+    scenes, notes = {now: asked}, list[str]()
+    for count in counts or [round(share * now) for share in SHARES]:
+        try:
+            other = in_order(scene_of_bricks(options.scene, int(count)), options.order)
+            if len(other.bricks) not in scenes:
+                builds, _ = _asked_builds(options, other)
+                scenes[len(other.bricks)] = other, builds
+        except SeqoptError as error:
+            notes.append(f"{count:g} bricks: {error}")
+    if counts and now not in counts:
+        del scenes[now]
+    if not scenes:
+        raise ProblemError(f"--map {options.map}: {'; '.join(notes)}")
+    ordered, usual = dict(sorted(scenes.items())), min(scenes, key=lambda n: abs(n - now))
+    return *scenes[usual], brick_map(ordered, usual, holds, options.tell), notes
+
+
 def _asked_builds(options: argparse.Namespace, scene: Scene) -> tuple[Builds, list[str]]:
     """Return the builds that are asked for, by name, and why others are not possible."""
     if options.method is None and options.plan is None:
         return usual_builds(scene, options.tell)
     name = options.method or Path(options.plan).stem
-    return {name: asked_steps(options, scene)}, []
+    return {name: asked_steps(options, build_network(scene))}, []
 
 
 def _files(scene: Scene, builds: Builds, found: FailureMap) -> dict[str, bytes | str]:
@@ -111,12 +161,22 @@ def _table(scene: Scene, found: FailureMap) -> Iterator[str]:
     cases = found.cases
     axis = AXIS_WORDS[str(cases["axis"].iloc[0])]
     yield f"{scene.name}: steps that fall, by {axis}"
-    values = cases["value"].unique()
+    values = sorted(cases["value"].unique())
     yield f"{'':{NAME}}{'steps':>5}" + "".join(f"{value:8.3g}" for value in values)
     for (build, holds), rows in cases.groupby(["build", "holds"], sort=False):
-        falls = zip(rows["fall"], rows["undecided"], strict=True)
-        counts = "".join(f"{f'{fall} ({open_}?)' if open_ else fall:>8}" for fall, open_ in falls)
-        yield f"{f'{build}, {holds}':{NAME}}{rows['steps'].iloc[0]:5}{counts}"
+        steps = rows["steps"].unique()
+        counts = {
+            case["value"]: _count(case, differ=len(steps) > 1) for case in rows.to_dict("records")
+        }
+        cells = "".join(f"{counts.get(value, ''):>8}" for value in values)
+        yield f"{f'{build}, {holds}':{NAME}}{steps[0] if len(steps) == 1 else '':5}{cells}"
+
+
+def _count(case: Mapping[Any, Any], *, differ: bool) -> str:
+    """Return how many steps of a case fall, and of how many where numbers of steps differ."""
+    of = f"/{case['steps']}" if differ else ""
+    open_ = f" ({case['undecided']}?)" if case["undecided"] else ""
+    return f"{case['fall']}{of}{open_}"
 
 
 def _cures(found: FailureMap) -> Sequence[str]:

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import linprog
 from scipy.sparse.csgraph import dijkstra
 
 from seqopt.arrays import Floats, Ints
@@ -162,6 +161,8 @@ def _next_prices(planes: Sequence[tuple[float, Floats]], caps: Floats) -> tuple[
     matrix = np.column_stack([-over / size, np.ones(len(costs))])
     free = [(0.0, largest)] * len(caps) + [(None, None)]
     objective = np.array([0.0] * len(caps) + [-1.0])
+    from scipy.optimize import linprog  # noqa: PLC0415  # slow to import, for budgets only
+
     found = linprog(objective, A_ub=matrix, b_ub=costs, bounds=free, method="highs")
     if found.x is None or found.fun is None:
         return np.zeros(len(caps)), -np.inf

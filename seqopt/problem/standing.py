@@ -16,7 +16,7 @@ from seqopt.network.network import Network
 from seqopt.responses._grip_sets import KnownRows
 from seqopt.scene._checks import short
 from seqopt.stability._margins import Margins
-from seqopt.stability._screens import FALLS, OPEN, STANDS, Screen
+from seqopt.stability._screens import FALLS, OPEN, STANDS, Proofs, Screen
 
 MARGINS = ("bond", "friction", "tilt")
 """What goals may ask of the stability of states, each of them to be small: the least bond (Pa, in
@@ -84,8 +84,7 @@ class StandingSets:
 
     ``standing``: margins are those of its mortar; ``payloads`` (k,): all that robots may have, N;
     ``demands``: all of which what stands has to meet; by default the one; ``undecided``: how many
-    grip sets were neither proven to stand nor to fall; ``others``: of the same scene, with other
-    demands: what stands with more stands with less.
+    grip sets were neither proven to stand nor to fall.
     """
 
     def __init__(
@@ -102,14 +101,30 @@ class StandingSets:
                 "stands; give it a payload, or a limit on its force, and keep payloads"
             )
         self._demands = demands = _without_implied(demands or (standing,))
-        self._screens = [Screen(network, demand.mortar, demand.tilt) for demand in demands]
-        self.others: list[StandingSets] = []
-        self._margins = Margins(network, standing.mortar)
         self._network, self._mortar = network, standing.mortar
+        self._proofs, self._others = Proofs(network), list[StandingSets]()
+        self._screens = self._screened()
+        self._margins = Margins(network, standing.mortar)
         self._tilts_known: dict[int, Screen] = {}
         self._known: Mapping[str, KnownRows] = {name: KnownRows() for name in ("", *MARGINS)}
         self._most = 1 + 2 * len(network.inner)
         self.undecided = 0
+
+    def _screened(self) -> list[Screen]:
+        proofs = self._proofs
+        return [
+            Screen(self._network, demand.mortar, demand.tilt, proofs=proofs)
+            for demand in self._demands
+        ]
+
+    def share(self, other: StandingSets) -> None:
+        """Share what is proven with others of the same scene, with other demands, from now on.
+
+        What stands with more stands with less; forces and motions of one are tried for all.
+        """
+        self._proofs, self._others = other._proofs, other._others
+        self._others.append(self)
+        self._screens, self._tilts_known = self._screened(), {}
 
     @property
     def looked_at(self) -> int:
@@ -119,8 +134,7 @@ class StandingSets:
     @property
     def programs(self) -> int:
         """How many linear programs were solved."""
-        screens = (*self._screens, *self._tilts_known.values())
-        return sum(screen.solved for screen in screens) + self._margins.solved
+        return self._screens[0].solved + self._margins.solved
 
     def stand(self, bricks: int, held: Ints, payload: Floats) -> Bools:
         """Return which grip sets are proven to stand.
@@ -133,6 +147,11 @@ class StandingSets:
     def may_stand(self, bricks: int, held: Ints, payload: Floats) -> Bools:
         """Return which grip sets are not proven to fall, (S,); see `stand`."""
         return np.asarray(self._verdicts(bricks, held, payload) != FALLS)
+
+    def recalled(self, bricks: int, held: Ints, payload: Floats) -> Ints:
+        """Return which are known to stand, 1, or to fall, -1, by what others prove; see `stand`."""
+        found = [screen.recalled(bricks, held, payload) for screen in self._screens]
+        return np.asarray(np.min(found, axis=0))
 
     def _verdicts(self, bricks: int, held: Ints, payload: Floats) -> Floats:
         codes = self._codes(held, payload)
@@ -150,7 +169,7 @@ class StandingSets:
     def _by_others(self, bricks: int, codes: Ints) -> Floats:
         """Return the verdicts (n,) that what is known with other demands decides; else NaN."""
         out = np.full(len(codes), np.nan)
-        for other in self.others:
+        for other in self._others:
             found = other._known[""].known(bricks, codes)
             for one, weaker, verdict in ((other, self, STANDS), (self, other, FALLS)):
                 if one._demands_all_of(weaker):
@@ -189,7 +208,9 @@ class StandingSets:
 
     def _tilted(self, step: int) -> Screen:
         if step not in self._tilts_known:
-            self._tilts_known[step] = Screen(self._network, self._mortar, step * STEP)
+            self._tilts_known[step] = Screen(
+                self._network, self._mortar, step * STEP, proofs=self._proofs
+            )
         return self._tilts_known[step]
 
     def _ask(

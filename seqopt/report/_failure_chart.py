@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from seqopt.report._failures import AXIS_WORDS
 from seqopt.report._style import GRAY, SKY, SMALL, VERMILION, new_figure, styled
@@ -47,15 +48,15 @@ def _rows(table: pd.DataFrame) -> list[tuple[str, str]]:
 
 def _shares(axes: Axes, found: FailureMap, names: list[str]) -> None:
     """Draw how many steps of how many fall, a row for every build."""
-    cases, values = found.cases, [*found.cases["value"].unique()]
-    share = (cases["fall"] / cases["steps"]).to_numpy().reshape(len(names), len(values))
+    cases, values = found.cases, sorted(found.cases["value"].unique())
+    share = np.full((len(names), len(values)), np.nan)  # where a build is not possible
+    for case in cases.to_dict(orient="records"):
+        i, k = names.index(f"{case['build']}, {case['holds']}"), values.index(case["value"])
+        share[i, k] = case["fall"] / case["steps"]
+        color = "white" if share[i, k] > 0.6 else "black"
+        said = f"{case['fall']} of {case['steps']}"
+        axes.text(k + 0.5, i + 0.5, said, ha="center", va="center", fontsize=SMALL, color=color)
     axes.pcolormesh(share, cmap="OrRd", vmin=0.0, vmax=1.0, edgecolors="white", linewidth=1.0)
-    for i, row in enumerate(share):
-        for k, each in enumerate(row):
-            case = cases.iloc[i * len(values) + k]
-            color = "white" if each > 0.6 else "black"
-            said = f"{case['fall']} of {case['steps']}"
-            axes.text(k + 0.5, i + 0.5, said, ha="center", va="center", fontsize=SMALL, color=color)
     axes.set_xticks(np.arange(len(values)) + 0.5, [f"{value:.3g}" for value in values])
     _name(axes, names)
 
@@ -76,6 +77,7 @@ def _along(axes: Axes, steps: pd.DataFrame, names: list[str]) -> None:
         edges, np.arange(len(names) + 1), picture, cmap=colors, vmin=-0.5, vmax=3.5,
         edgecolors="white", linewidth=0.5,
     )  # fmt: skip
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     words = {"every step stands": Verdict.STANDS, "some step falls": Verdict.FALLS}
     if (steps["verdict"] == Verdict.UNDECIDED.value).any():
         words["some step is undecided"] = Verdict.UNDECIDED

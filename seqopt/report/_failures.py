@@ -24,7 +24,12 @@ from seqopt.stability.failure_map import FailureMap
 from seqopt.work.progress import Tell
 from seqopt.workflow import optimize
 
-AXIS_WORDS = {"friction": "friction", "tilt": "tilt, degrees"}
+AXIS_WORDS = {
+    "friction": "friction",
+    "tilt": "tilt, degrees",
+    "bricks placed": "bricks placed, at most",
+    "bricks": "number of bricks",
+}
 SHOWN = {
     "first_step": "first step",
     "bond_needed_Pa": "bond for all steps, kPa",

@@ -18,8 +18,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import least_squares
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from seqopt.arrays import Bools, Floats, Terse
 from seqopt.engines.interface import Want
@@ -91,6 +90,8 @@ def calibrate(tests: pd.DataFrame) -> StiffnessFit:
     >>> calibrate(pd.DataFrame(rows)).fixes.split(";")[0]
     'fixed: neither alone'
     """
+    from scipy.optimize import least_squares  # noqa: PLC0415  # slow to import, for this only
+
     missing = [name for name in _NEEDED if name not in tests]
     if missing or not len(tests):
         what = f"columns {', '.join(missing)} are missing" if missing else "there is none"
@@ -151,7 +152,7 @@ def _judged(logs: Floats, errors: Floats, share: Floats, table: pd.DataFrame) ->
     half, most = np.full(2, np.inf), np.inf
     if tests > 1 + apart:
         sigma = np.sqrt((errors**2).sum() / (tests - 1 - apart))
-        likely = float(t.ppf(0.975, tests - 1 - apart))
+        likely = float(stdtrit(tests - 1 - apart, 0.975))
         most = likely * sigma / np.sqrt(tests)
         if apart:
             half = likely * sigma * np.sqrt(np.linalg.inv(rows.T @ rows).diagonal())

@@ -11,7 +11,7 @@ import json
 import math
 import os
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib import resources
@@ -188,7 +188,22 @@ _READ: dict[Any, tuple[Callable[[str], Any], str]] = {
 
 
 def _scene_by_words(words: str) -> Scene:
-    """Return the scene of a key of `KINDS`, a colon, and ``name=value`` parted by commas.
+    """Return the scene of a key of `KINDS`, a colon, and ``name=value`` parted by commas."""
+    try:
+        scene = made_of_words(words.partition(":")[0], in_words(words))
+    except OverflowError as error:
+        raise SceneError(f"scene {words}: its numbers are too large; give smaller ones") from error
+    return replace(scene, provenance=f"{scene.provenance} In words: {words}.")
+
+
+def made_of_words(name: str, given: Mapping[str, Any]) -> Scene:
+    """Return the scene of a key of `KINDS` with the numbers that it takes."""
+    kind = KINDS[name]
+    return kind.make(kind.shape(**given)) if kind.shape else kind.make(**given)
+
+
+def in_words(words: str) -> dict[str, Any]:
+    """Return the numbers that words give a scene, by name.
 
     Three lengths are ``0.2x0.1x0.06``; lengths in m, angles in rad, densities in kg/m³.
     """
@@ -212,11 +227,7 @@ def _scene_by_words(words: str) -> Scene:
     needed = {name for name, number in numbers.items() if number.default is number.empty}
     if lacking := ", ".join(needed - given.keys()):
         raise SceneError(f"scene {words}: {lacking} is missing; {kind.about}")
-    try:
-        scene = kind.make(kind.shape(**given)) if kind.shape else kind.make(**given)
-        return replace(scene, provenance=f"{scene.provenance} In words: {words}.")
-    except OverflowError as error:
-        raise SceneError(f"scene {words}: its numbers are too large; give smaller ones") from error
+    return given
 
 
 def builtin_scenes() -> tuple[str, ...]:

@@ -175,6 +175,8 @@ class _Known:
         by_load, by_growth = (float(load @ flat) for load in case.loads(assembly))
         work, growth = by_load - low, by_growth - (high - low)
         closing = LARGEST_FORCE * float(np.maximum(-opening, 0).sum())
+        if not (work > ROUNDING if case.sense is Sense.SMALLEST else growth > 0):
+            return []  # with fewer grips it would prove no more
         speed = np.linalg.norm((assembly.grip_map.T @ flat).reshape(-1, 3), axis=1)
         return [_FallingMotion(work, growth, closing, speed)]
 
@@ -252,24 +254,40 @@ class HeldStates:
     """One question about one structure, asked of any number of grip sets.
 
     ``assembly``: its grips are all that may ever be held; ``case``: what is bracketed; ``easier``:
-    what a program is asked before that, as forces for a z of zero; ``solved``: how many times the
-    program was called.
+    what a program is asked before that, as forces for a z of zero; ``earlier``: answers to other
+    cases of the same assembly, with the payloads they were found for; what they prove here for a z
+    of zero is known, and new ones join them; ``solved``: how many times the program was called.
     """
 
     def __init__(
-        self, assembly: Assembly, case: Case, compiled: CompileHeld, easier: Case | None = None
+        self,
+        assembly: Assembly,
+        case: Case,
+        compiled: CompileHeld,
+        easier: Case | None = None,
+        earlier: list[tuple[Answer, Floats]] | None = None,
     ) -> None:
         self.assembly, self._case, self._compile = assembly, case, compiled
         self._asked = [case] if easier is None else [easier, case]
         self._programs: list[HeldProgram] = []
         self._known = _Known(assembly, case)
-        self._tried: set[bytes] = set()
+        self._tried: set[tuple[bytes, float]] = set()
         self.solved = 0
+        self._answers = [] if earlier is None else earlier
+        for answer, held in self._answers:
+            self._known.learn(replace(answer, value=0.0), held)
 
-    def bracket(self, places: Ints, payload: Floats, settled: _Settled) -> Floats:
+    def known(self, places: Ints, payload: Floats) -> Floats:
+        """Return proven brackets of z by what is known already; see `bracket`."""
+        return self._known.bracket(places, payload)
+
+    def bracket(
+        self, places: Ints, payload: Floats, settled: _Settled, wanted: float = 0.0
+    ) -> Floats:
         """Return proven brackets of z, as narrow as needed where the solver's answers allow it.
 
-        ``settled``: says which are narrow enough. The others, and the result: as of
+        ``settled``: says which are narrow enough; ``wanted``: a number for it: what is left open
+        for one is asked again for another. The others, and the result: as of
         `seqopt.stability._held_states._Known.bracket`.
         """
         out = self._known.bracket(places, payload)
@@ -279,7 +297,7 @@ class HeldStates:
                 continue
             held = np.zeros(len(self.assembly.payload) + 1)  # payload of every grip, and of none
             np.maximum.at(held, places[row], payload[row])
-            key, rows = held[:-1].tobytes(), np.flatnonzero(open_)
+            key, rows = (held[:-1].tobytes(), wanted), np.flatnonzero(open_)
             if key not in self._tried:
                 self._tried.add(key)
                 new = self._solve(held[:-1], settled)
@@ -301,7 +319,9 @@ class HeldStates:
             if i == len(self._programs):
                 self._programs.append(self._compile(self.assembly, self._asked[i]))
             self.solved += 1
-            new = new.joined(self._known.learn(self._programs[i](held, enough), held))
+            answer = self._programs[i](held, enough)
+            self._answers.append((answer, held))
+            new = new.joined(self._known.learn(answer, held))
             if settled(new.bracket(places, payload))[0]:
                 break
         return new

@@ -8,12 +8,12 @@ program, whose cones are inscribed polyhedra, is solved for few of them.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections import defaultdict
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seqopt.arrays import Bools, Floats, Ints, Vector
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar, find_mortar
@@ -22,12 +22,25 @@ from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.stability._held_states import CompileHeld, HeldStates, compile_held, node_assembly
-from seqopt.stability._prover import DIRECTIONS, FINE, sideways
+from seqopt.stability._tilted import TiltedStates
 from seqopt.stability.assessment import bonded
-from seqopt.stability.limit_analysis import EXACT
+from seqopt.stability.limit_analysis import EXACT, Answer
 
 STANDS, FALLS, OPEN = 1, -1, 0
-_Level = tuple[int, int, bool]  # bricks, directions, and whether corners are around them all
+
+
+class Proofs:
+    """What screens of one scene share: what one proves, another need not ask.
+
+    ``contacts``: of the scene; by brick count and mortar ``upright``, by these ``tilted``: what is
+    known of structures; ``answers``: by brick count, what the programs of all mortars found.
+    """
+
+    def __init__(self, network: Network) -> None:
+        self.contacts = Contacts(network)
+        self.upright: dict[tuple[int, Mortar], HeldStates] = {}
+        self.tilted: dict[tuple[int, Mortar], TiltedStates] = {}
+        self.answers = defaultdict[int, list[tuple[Answer, Floats]]](list)
 
 
 class Screen:
@@ -44,6 +57,8 @@ class Screen:
         in one; what survives between 0.998 and 1 of that acceleration may stay open.
     compiled : callable, optional
         Makes the programs to solve; the registered one by default.
+    proofs : Proofs, optional
+        Of the same network and program: what other screens found.
 
     Examples
     --------
@@ -59,16 +74,18 @@ class Screen:
         mortar: Mortar | str,
         tilt: float = 0.0,
         compiled: CompileHeld = compile_held,
+        proofs: Proofs | None = None,
     ) -> None:
         self.network, self.mortar = network_of(network), find_mortar(mortar)
         self.tilt = tilt
-        self._compile, self._contacts = compiled, Contacts(self.network)
-        self._levels: dict[_Level, tuple[HeldStates, ...]] = {}
+        self._compile, self._proofs = compiled, proofs or Proofs(self.network)
+        self._assemblies: dict[int, Assembly] = {}
 
     @property
     def solved(self) -> int:
-        """How many linear programs were solved."""
-        return sum(states.solved for level in self._levels.values() for states in level)
+        """How many linear programs were solved, also by others that share their proofs."""
+        upright, tilted = self._proofs.upright.values(), self._proofs.tilted.values()
+        return sum(one.solved for one in upright) + sum(one.solved for one in tilted)
 
     def stands(
         self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None
@@ -82,44 +99,54 @@ class Screen:
         that it falls, and 0 where neither is. Raises `GripError` as `held_places` does.
         """
         places, loads = held_places(self.network, bricks, held, payload)
-        out = self._verdicts((bricks, DIRECTIONS, True), places, loads)
-        if not self.tilt:
-            return out
-        out[out != STANDS] = OPEN
-        tries = (DIRECTIONS, False, FALLS), (FINE, True, STANDS), (FINE, False, FALLS)
-        for count, around, sure in tries:
-            rows = np.flatnonzero(out == OPEN)
-            found = self._verdicts((bricks, count, around), places[rows], loads[rows])
-            out[rows[found == sure]] = sure
+        out = _verdicts(self._upright(bricks).bracket(places, loads, _decided))
+        rows = np.flatnonzero(out == STANDS) if self.tilt else ()
+        if len(rows):
+            tilted = self._tilted(bricks)
+            out[rows] = _of_both(*tilted.survive(np.tan(self.tilt), places[rows], loads[rows]))
         return out
 
-    def _verdicts(self, level: _Level, places: Ints, loads: Floats) -> NDArray[np.int8]:
-        """Return which sets stand in all directions of a level."""
-        out = np.full(len(places), STANDS, dtype=np.int8)
-        for states in self._level(level):
-            rows = np.flatnonzero(out != FALLS)
-            bracket = states.bracket(places[rows], loads[rows], _decided)
-            fall, stand = bracket[:, 0] > EXACT, bracket[:, 1] <= EXACT
-            out[rows[fall]] = FALLS
-            out[rows[~fall & ~stand]] = OPEN
+    def recalled(
+        self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None
+    ) -> NDArray[np.int8]:
+        """Return the same by what is known already: no program is solved."""
+        places, loads = held_places(self.network, bricks, held, payload)
+        out = _verdicts(self._upright(bricks).known(places, loads))
+        rows = np.flatnonzero(out == STANDS) if self.tilt else ()
+        if len(rows):
+            tilted = self._tilted(bricks)
+            out[rows] = _of_both(*tilted.known(np.tan(self.tilt), places[rows], loads[rows]))
         return out
 
-    def _level(self, level: _Level) -> tuple[HeldStates, ...]:
-        if level not in self._levels:
-            bricks, count, around = level
-            upright = node_assembly(self.network, bricks, self._contacts)
-            pull = np.tan(self.tilt) / (np.cos(np.pi / count) if around else 1.0)
-            self._levels[level] = tuple(
-                _lacking(assembly, self.mortar, self._compile)
-                for assembly in _pulled(upright, pull, self.network.scene.up, count)
-            )
-        return self._levels[level]
+    def _upright(self, bricks: int) -> HeldStates:
+        known, key = self._proofs.upright, (bricks, self.mortar)
+        if key not in known:
+            answers = self._proofs.answers[bricks]
+            known[key] = _lacking(self._assembly(bricks), self.mortar, self._compile, answers)
+        return known[key]
+
+    def _tilted(self, bricks: int) -> TiltedStates:
+        known, key = self._proofs.tilted, (bricks, self.mortar)
+        if key not in known:
+            up = self.network.scene.up
+            known[key] = TiltedStates(self._assembly(bricks), self.mortar, up, self._compile)
+        return known[key]
+
+    def _assembly(self, bricks: int) -> Assembly:
+        if bricks not in self._assemblies:
+            self._assemblies[bricks] = node_assembly(self.network, bricks, self._proofs.contacts)
+        return self._assemblies[bricks]
 
 
-def _lacking(assembly: Assembly, mortar: Mortar, compiled: CompileHeld) -> HeldStates:
+def _lacking(
+    assembly: Assembly,
+    mortar: Mortar,
+    compiled: CompileHeld,
+    earlier: list[tuple[Answer, Floats]] | None = None,
+) -> HeldStates:
     """Return the question whether a structure stands: whether it lacks any bond."""
     case = bonded(assembly, mortar)
-    return HeldStates(assembly, case, compiled, case.fixed())
+    return HeldStates(assembly, case, compiled, case.fixed(), earlier)
 
 
 def _decided(bracket: Floats) -> Bools:
@@ -127,14 +154,14 @@ def _decided(bracket: Floats) -> Bools:
     return np.asarray((bracket[:, 1] <= EXACT) | (bracket[:, 0] > EXACT))
 
 
-def _pulled(assembly: Assembly, pull: float, up: Vector, count: int) -> tuple[Assembly, ...]:
-    """Return the assemblies to which sideways pulls, over gravity, turn one; itself for none."""
-    if not pull:
-        return (assembly,)
-    weight = np.linalg.norm(assembly.weight, axis=1, keepdims=True)
-    cases = sideways(bonded(assembly, Mortar(friction=0.0)), up, count)
-    loads = [pull * weight * np.array(case.pull) for case in cases]
-    return tuple(replace(assembly, weight=assembly.weight + load) for load in loads)
+def _verdicts(bracket: Floats) -> NDArray[np.int8]:
+    """Return verdicts by brackets (S, 2) of the bond that is lacking."""
+    return _of_both(bracket[:, 1] <= EXACT, bracket[:, 0] > EXACT)
+
+
+def _of_both(stands: Bools, falls: Bools) -> NDArray[np.int8]:
+    """Return verdicts, open where neither is proven; a fall counts before a stand."""
+    return np.where(falls, FALLS, np.where(stands, STANDS, OPEN)).astype(np.int8)
 
 
 def held_places(

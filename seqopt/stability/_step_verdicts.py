@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pickle
-from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
-from concurrent.futures import Executor
+from collections import Counter, deque
+from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
@@ -30,8 +30,10 @@ from seqopt.stability.assessment import (
     bonded,
 )
 from seqopt.stability.limit_analysis import Claim, Compile, compile_equilibrium
-from seqopt.work._workers import hire, map_ordered
+from seqopt.work._workers import Crew, hire, map_ordered
 
+_AHEAD = 2  # portions given out or waiting, for every worker
+_PATIENCE = 1.0  # s without an answer, after which workers are looked after
 _PORTIONS = 8  # for every worker, of neighboring steps, which are proven by one another
 
 
@@ -122,27 +124,84 @@ def each_stability(
     """
     numbers = {step.number for step in steps} if at is None else at
     whole = _Portion(tuple(steps), mortar, margins, numbers if margins else ())
-    with hire(*shared) as crew:
+    most = max((step.bricks for step in steps), default=1)
+    with hire(*shared, beside=True) as crew:
         if crew is None:
-            most = max((step.bricks for step in steps), default=1)
             yield from _each(PartialAssemblies(network, most), whole)
             return
-        size = -(-len(steps) // (_PORTIONS * crew.workers)) or 1
+        crew.submit(_ready)  # one starts while this prepares
+        parts = PartialAssemblies(network, most)
+        helpers = crew.workers + (shared[0] is None)
+        size = -(-len(steps) // (_PORTIONS * helpers)) or 1
         cut = [whole.steps[i : i + size] for i in range(0, len(steps), size)]
-        portions = (replace(whole, steps=part) for part in cut)
-        for found in map_ordered(partial(_sent, pickle.dumps(network)), portions, crew):
+        portions = [replace(whole, steps=part) for part in cut]
+        task = partial(_sent, pickle.dumps(parts))
+        if shared[0] is None:
+            yield from _beside(task, portions, crew, lambda portion: _each(parts, portion))
+            return
+        for found in map_ordered(task, portions, crew):
             yield from found
 
 
-def _sent(network: bytes, portion: _Portion) -> tuple[Stability, ...]:
-    return tuple(_each(_parts(network), portion))
+def _ready() -> None:
+    """Do nothing: a worker that can has started."""
+
+
+def _sent(parts: bytes, portion: _Portion) -> tuple[Stability, ...]:
+    return tuple(_each(_parts(parts), portion))
 
 
 @lru_cache(maxsize=1)
-def _parts(network: bytes) -> PartialAssemblies:
-    """Return what a worker prepares once for all portions of a build."""
-    whole: Network = pickle.loads(network)  # our own, of `each_stability`
-    return PartialAssemblies(whole, len(whole.inner))
+def _parts(parts: bytes) -> PartialAssemblies:
+    """Return what a worker is sent for all portions of a build."""
+    out: PartialAssemblies = pickle.loads(parts)  # our own, of `each_stability`
+    return out
+
+
+_Sent = Callable[[_Portion], tuple[Stability, ...]]
+_Here = Callable[[_Portion], Iterator[Stability]]
+
+
+def _beside(
+    task: _Sent, portions: Sequence[_Portion], crew: Crew, here: _Here
+) -> Iterator[Stability]:
+    """Yield what is found of portions, in their order: by workers, and meanwhile here."""
+    left, given = deque(range(len(portions))), dict[int, Future[tuple[Stability, ...]]]()
+    found, taken = dict[int, tuple[Stability, ...]](), 0
+    while taken < len(portions):
+        if taken in given and (given[taken].done() or not left):
+            found[taken] = _answered(given.pop(taken), crew) or tuple(here(portions[taken]))
+        if taken in found:
+            yield from found.pop(taken)
+            taken += 1
+            continue
+        mine = left.popleft()
+        while left and sum(not each.done() for each in given.values()) < _AHEAD * crew.workers:
+            given[left[0]] = _given_out(crew, task, portions[left[0]])
+            left.popleft()
+        if mine == taken:  # told as it is found
+            yield from here(portions[mine])
+            taken += 1
+        else:
+            found[mine] = tuple(here(portions[mine]))
+
+
+def _given_out(crew: Crew, task: _Sent, portion: _Portion) -> Future[tuple[Stability, ...]]:
+    """Return the call of a portion; one that has failed where workers take no more."""
+    try:
+        return crew.submit(task, portion)
+    except BrokenExecutor as error:
+        call = Future[tuple[Stability, ...]]()
+        call.set_exception(error)
+        return call
+
+
+def _answered(call: Future[tuple[Stability, ...]], crew: Crew) -> tuple[Stability, ...] | None:
+    """Return what a worker answers; None if it died, or an error that is then raised here."""
+    while not call.done():
+        wait([call], timeout=_PATIENCE)
+        crew.look_after()
+    return None if call.exception() else call.result()
 
 
 def _each(parts: PartialAssemblies, portion: _Portion) -> Iterator[Stability]:

@@ -33,7 +33,12 @@ from seqopt.work.progress import Tell, with_progress
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-AXES = {"friction": (0.2, 0.3, DRY.friction, 0.6, 0.8), "tilt": (0.0, 1.0, 2.0, 4.0, 8.0)}
+AXES = {
+    "friction": (0.2, 0.3, DRY.friction, 0.6, 0.8),
+    "tilt": (0.0, 1.0, 2.0, 4.0, 8.0),
+    "bricks placed": (),  # fifths of all
+}
+_FIFTHS = np.arange(1, 6) / 5
 _TILTED = 8  # directions, evenly spread
 _SURE = 1e-3  # share by which more is taken than a step is proven to need
 _TRIED = 24  # nodes where one more grip is tried, the fastest ones first
@@ -47,20 +52,20 @@ class FailureMap:
     Attributes
     ----------
     cases : pandas.DataFrame
-        A row for every ``build``, what ``holds`` and ``value`` of the ``axis`` (friction, or tilt
-        in degrees): how many ``steps`` there are, ``fall`` and are ``undecided``; of the
-        ``first_step`` that falls the ``bricks`` placed, ``brick`` and ``joint`` that fail first and
-        the ``motion`` there; the ``bond_needed_Pa`` and the ``friction_needed`` with which all
-        steps stand, inf if none is enough; and ``grip_node``, where one more robot would hold the
-        first step.
+        A row for every ``build``, what ``holds`` and ``value`` of the ``axis`` (friction, tilt in
+        degrees, bricks placed at most, or of how many bricks it is built): how many ``steps`` there
+        are, ``fall`` and are ``undecided``; of the ``first_step`` that falls the ``bricks`` placed,
+        ``brick`` and ``joint`` that fail first and the ``motion`` there; the ``bond_needed_Pa`` and
+        the ``friction_needed`` with which all steps stand, inf if none is enough; and
+        ``grip_node``, where one more robot would hold the first step.
     steps : pandas.DataFrame
         The ``verdict`` of every ``step`` of these, and of how many ``bricks`` it is.
     motions : mapping of str to (steps, B, 6) float
         By build, how its steps fall with what is first said to hold, at the ``usual`` value; zero
         for those that stand.
     usual : float
-        The value that is nearest to what is taken where nothing is said: the friction of `DRY`, or
-        no tilt.
+        The value that is nearest to what is taken where nothing is said: the friction of `DRY`, no
+        tilt, or all bricks.
     """
 
     cases: pd.DataFrame
@@ -84,17 +89,23 @@ class FailureMap:
 
 @dataclass(frozen=True)
 class _Case:
-    """A build with a mortar, and scenes turned so that gravity pulls as it does in the case."""
+    """A build with a mortar, and scenes turned so that gravity pulls as it does in the case.
+
+    ``whole``: of which this is the beginning, if it is of one.
+    """
 
     build: str
     steps: Sequence[Step]
     holds: str
     mortar: Mortar
     turned: tuple[PartialAssemblies, ...]
+    whole: _Case | None = None
 
     @cached_property
     def found(self) -> tuple[Stability, ...]:
         """What is proven of every step: that of the first scene in which it is worst."""
+        if self.whole is not None:
+            return self.whole.found[: len(self.steps)]
         each = [[*each_verdict(parts, self.steps, self.mortar)] for parts in self.turned]
         return tuple(min(same, key=_badness) for same in zip(*each, strict=True))
 
@@ -127,7 +138,8 @@ def failure_map(
     holds : sequence of str, optional
         What is in the joints: ``dry``, ``bond=PASCAL`` or ``epoxy``.
     axis : str, optional
-        ``friction`` (coefficients), or ``tilt`` (degrees, towards eight sides).
+        ``friction`` (coefficients), ``tilt`` (degrees, towards eight sides), or ``bricks placed``
+        (steps of at most so many).
     values : sequence of float, optional
         On the axis.
     progress : callable, optional
@@ -151,7 +163,7 @@ def failure_map(
     >>> found.cases[["value", "steps", "fall"]].to_numpy().tolist()
     [[0.1, 17.0, 13.0], [0.5, 17.0, 4.0]]
     """
-    values, usual = _values(axis, values)
+    values, usual = _values(scene, axis, values)
     asked = [*_cases(scene, builds, holds, axis, values)]
     told = with_progress("mapping failures", asked, progress)
     rows = [_row(case, axis, value) for value, case in told]
@@ -161,10 +173,53 @@ def failure_map(
     return FailureMap(pd.DataFrame(rows), steps, motions, usual)
 
 
-def _values(axis: str, values: Sequence[float]) -> tuple[Sequence[float], float]:
+def brick_map(
+    scenes: Mapping[int, tuple[Scene, Mapping[str, Sequence[Step]]]],
+    usual: int,
+    holds: Sequence[str] = ("dry", "epoxy"),
+    progress: Tell | None = None,
+) -> FailureMap:
+    """Return the same over the number of bricks of which something is built.
+
+    Parameters
+    ----------
+    scenes : mapping of int to (Scene, mapping of str to sequence of Step)
+        By how many bricks they have, with their builds; a build may be missing in some.
+    usual : int
+        Of which of them it is shown how steps fall.
+    holds, progress
+        As of `failure_map`.
+
+    Returns
+    -------
+    FailureMap
+    """
+    found = {
+        bricks: failure_map(scene, builds, holds, "bricks placed", [bricks], progress)
+        for bricks, (scene, builds) in scenes.items()
+    }
+    cases, steps = (
+        _side_by_side([getattr(each, name) for each in found.values()])
+        for name in ("cases", "steps")
+    )
+    return FailureMap(cases, steps, found[usual].motions, usual)
+
+
+def _side_by_side(tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """Return tables of several numbers of bricks as one, by build and what holds it."""
+    whole = pd.concat(tables).assign(axis="bricks")
+    groups = [rows for _, rows in whole.groupby(["build", "holds"], sort=False)]
+    return pd.concat(groups, ignore_index=True)
+
+
+def _values(scene: Scene, axis: str, values: Sequence[float]) -> tuple[Sequence[float], float]:
     """Return the values on an axis, by default the usual ones, and the one of `FailureMap`."""
     if axis not in AXES:
         raise SceneError(f"axis {axis!r}: give one of {', '.join(AXES)}")
+    if axis == "bricks placed":
+        count = len(scene.bricks)
+        values = values or sorted({*np.ceil(_FIFTHS * count).astype(int).tolist()})
+        return values, max(values)
     values, least = values or AXES[axis], DRY.friction if axis == "friction" else 0.0
     return values, min(values, key=lambda value: abs(value - least))
 
@@ -193,11 +248,15 @@ def _cases(
     turned = {value: _tilted(scene, value) if axis == "tilt" else upright for value in values}
     for name, steps in builds.items():
         for held in holds:
+            mortar = find_mortar(held)
+            whole = _Case(name, steps, held, mortar, upright)
             for value in values:
-                mortar = find_mortar(held)
-                if axis == "friction":
-                    mortar = _rougher(mortar, value)
-                yield value, _Case(name, steps, held, mortar, turned[value])
+                if axis == "bricks placed":
+                    first = [step for step in steps if step.bricks <= value]
+                    yield value, replace(whole, steps=first, whole=whole)
+                else:
+                    own = _rougher(mortar, value) if axis == "friction" else mortar
+                    yield value, _Case(name, steps, held, own, turned[value])
 
 
 def _parts(scene: Scene) -> PartialAssemblies:

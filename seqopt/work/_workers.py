@@ -265,7 +265,7 @@ class _Given:
 
 @contextmanager
 def hire(
-    executor: Executor | None = None, workers: int = 1, *, lanes: bool = False
+    executor: Executor | None = None, workers: int = 1, *, lanes: bool = False, beside: bool = False
 ) -> Iterator[Crew | None]:
     """Hire workers for the duration of a with block.
 
@@ -277,6 +277,8 @@ def hire(
         How many processes, or how many tasks the executor works on at once if it does not say.
     lanes : bool, optional
         Whether tasks have a ``lane``: each process of our own then gets those of one.
+    beside : bool, optional
+        Whether this process works as well, so that one of our own less is hired.
 
     Yields
     ------
@@ -291,7 +293,7 @@ def hire(
         most = known if isinstance(known, int) else 16  # where it does not say
         yield _Given(executor, workers if workers > 1 else most)
     elif workers > 1:
-        processes = Lanes(workers) if lanes else _Processes(workers)
+        processes = Lanes(workers) if lanes else _Processes(workers - beside)
         try:
             yield processes
         except BaseException:

@@ -80,8 +80,9 @@ def test_margins_of_some_steps(capsys, tmp_path, words, known):
         (["--steps", "a"], "--steps a: give numbers from 1 to 17, as 3:7"),
         (["--margins", "tillt"], "margin 'tillt' (did you mean tilt?): give all, or some of"),
         (["--workers", "0"], "--workers 0: give a whole number from 1"),
-        (["--map", "wind"], "--map wind: give friction or tilt, with values as friction=0.3,0.6"),
+        (["--map", "wind"], "--map wind: give friction, tilt or bricks, with values as"),
         (["--map", "tilt=60"], "--map tilt=60: 60 is too much; give tilt from 0 to 45"),
+        (["--map", "bricks=x"], "--map bricks x: give a whole number from 1 to 20000"),
         (["--map", "friction=x"], "--map friction=x: 'x' is not a positive number or zero"),
         (["--map", "friction", "--holds", "glue"], "--holds glue: give epoxy, dry, or bond="),
         (["--mortar", "bond=-1"], "--mortar bond=-1: give epoxy, dry, or bond=STRENGTH (Pa)"),
@@ -109,6 +110,23 @@ def test_a_map_of_one_method(capsys, tmp_path):
     (build,) = data["builds"]
     assert build["fall"]["width"] == 6 * 9
     assert "falls dry" in " ".join(build["marks"])
+
+
+def test_a_map_of_other_numbers_of_bricks(capsys, tmp_path):
+    """Of words, other scenes; of a file, along the build, which is said."""
+    words = ["--map", "bricks=8,12", "--holds", "dry", "--out", str(tmp_path / "map")]
+    assert main([*WORDS, *words]) == 1
+    out = capsys.readouterr().out
+    assert "steps that fall, by number of bricks" in out
+    assert "/23" in out
+    table = pd.read_csv(tmp_path / "map" / "map.csv")
+    assert table["value"].tolist() == [8, 12]
+    assert table["steps"].tolist() == [15, 23]
+    save_scene(load_scene(ARCH), path := tmp_path / "arch.json")
+    assert main(["assess", str(path), *WORDS[2:], "--map", "bricks", "--holds", "dry"]) == 1
+    out, err = capsys.readouterr()
+    assert "steps that fall, by bricks placed, at most" in out
+    assert "its number of bricks is fixed" in err
 
 
 def test_how_much_load_a_build_bears(capsys, tmp_path):

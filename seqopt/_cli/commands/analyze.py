@@ -97,7 +97,7 @@ def run(options: argparse.Namespace) -> Answer:
     keep_apart(options, options.out, options.fields)
     scene = asked_scene(options)
     network = build_network(scene)
-    engine, steps = asked_engine(options, network), asked_steps(options, scene)
+    engine, steps = asked_engine(options, network), asked_steps(options, network)
     limit = parse_time_limit(options.time_limit)
     within = LinearRange(engine)
     in_time = _InTime(_step_answers(options, within, steps), limit)

@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> Answer:
     keep_apart(options, options.out)
     scene, mortar = asked_scene(options), asked_mortar(options)
     network = build_network(scene)
-    steps = asked_steps(options, scene)
+    steps = asked_steps(options, network)
     rows = _found(options, network, steps, mortar)
     table = pd.DataFrame(rows.rows)
     went_on = f"kept: {rows.taken_up} of {len(table)} steps, found before, from {rows.path}"

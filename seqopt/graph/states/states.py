@@ -300,6 +300,13 @@ class States(Shown):
         bricks = self.space.bricks_at(level)
         return np.asarray(self.stability.stand(bricks, *self._grips(states, stand=True)))
 
+    def recalled(self, level: int, states: Ints) -> Ints:
+        """Return which states are known to stand as is demanded, 1, which to fall, -1, else 0."""
+        if self.each:
+            return np.asarray(np.min([p.recalled(level, states) for p in self.each], axis=0))
+        bricks = self.space.bricks_at(level)
+        return self.stability.recalled(bricks, *self._grips(states, stand=True))
+
     def _worst(
         self, valued: Sequence[Callable[[Ints], tuple[Floats, Bools]]], states: Ints, most: float
     ) -> tuple[Floats, Bools]:

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from scipy.optimize import linprog
 
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
@@ -410,6 +409,8 @@ def _highest(paths: Sequence[Path], reach: float) -> tuple[Floats, float]:
     if count == 1:
         return _highest_of_lines(heights, -planes[:, 1], reach)
     bounds = [(None, None), *([(0.0, reach)] * count)]
+    from scipy.optimize import linprog  # noqa: PLC0415  # slow to import, for budgets only
+
     found = linprog([-1.0, *[0.0] * count], planes, heights, bounds=bounds)
     if found.x is None or found.fun is None or not found.success:
         raise SolverError(f"prices of budgets: {found.message}; rescale the costs")

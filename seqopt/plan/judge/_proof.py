@@ -15,6 +15,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import InfeasibleError
 from seqopt.graph._budgets import budget_bounds, is_beyond
+from seqopt.graph._lazy import FAILS, PASSES, lazy_path
 from seqopt.graph.duality import lexicographic_bounds
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import lexicographic, reached, tied
@@ -226,6 +227,11 @@ class Passable:
         held = self._held(states, self._payload)
         return self.stands.allows_rows(self.tables.bricks_at(level), *held, margins)
 
+    def recalled(self, level: int, states: Ints, margins: Sequence[float]) -> Ints:
+        """Return the same by what is known: -1 where it is proven, else 0 or 1."""
+        held = self._held(states, self._payload)
+        return self.stands.recalled_rows(self.tables.bricks_at(level), *held, margins)
+
     def _answers(
         self, bricks: int, held: Ints, asked: Asked, below: float
     ) -> tuple[Floats, Floats, Bools]:
@@ -383,10 +389,36 @@ class Proof:
 
         ``margins``: of the first goals.
         """
+        caps = self._passable.problem.budgets
+        if self._passable.stands.asked(margins) and not caps:
+            return self._cuts(margins)
         graph = _Levels(self._passable, self._told, Asked((), margins)).graph()
         self.states = max(self.states, graph.states)
-        caps = self._passable.problem.budgets
         return is_beyond(graph, caps) if caps else not graph.ends[reached(graph)].any()
+
+    def _cuts(self, margins: Sequence[float]) -> bool:
+        """Return whether states that are proven to fall, or to lack margins, leave no path.
+
+        Which are asked is of no account: without those that fall, no end may be reached.
+        """
+        passable, levels = self._passable, _Levels(self._passable, {}, Asked())
+        graph = levels.graph()
+        parts = np.repeat(np.arange(len(levels.states)), [*map(len, levels.states)])
+        starts = np.searchsorted(parts, np.arange(len(levels.states)))
+        known = np.zeros(graph.states, dtype=np.int64)
+        known[0] = PASSES
+
+        def ask(level: int, rows: Ints) -> Ints:
+            states = levels.states[level][rows - starts[level]]
+            return np.where(passable.may_stand(level, states, margins), PASSES, FAILS)
+
+        def recall(level: int, rows: Ints) -> Ints:
+            return passable.recalled(level, levels.states[level][rows - starts[level]], margins)
+
+        lazy_path(graph, parts, known, ask, recall)
+        left = reached(graph, (known != FAILS)[graph.target])
+        self.states = max(self.states, int(left.sum()))
+        return not graph.ends[left].any()
 
     def _is_better(self, values: Sequence[float], bounds: Sequence[float]) -> int | None:
         """Return the first goal whose bound leaves room for a better plan; None if none does."""

@@ -51,6 +51,13 @@ class StandingProof:
                 out[out] = known.may_stand(bricks, held[out], payload[out])
         return out
 
+    def recalled_rows(
+        self, bricks: int, held: Ints, payload: Floats, margins: Sequence[float]
+    ) -> Ints:
+        """Return -1 where the same is known without asking, else 0 or 1."""
+        known = [one for demand in self.asked(margins) for one in self._known(demand)]
+        return np.asarray(np.min([one.recalled(bricks, held, payload) for one in known], axis=0))
+
     def _known(self, asked: Standing) -> tuple[StandingSets, ...]:
         """Return what is known of a demand in every scenario."""
         if asked not in self._sets:

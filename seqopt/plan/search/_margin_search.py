@@ -1,50 +1,94 @@
-"""The best margin of stability with which a free schedule exists, found by bisection."""
+"""The best margin of stability with which a schedule exists, found by bisection."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from math import pi
 
+import numpy as np
+
+from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError
 from seqopt.graph._explore import Explorer
-from seqopt.graph.states._visits import explore
+from seqopt.graph._lazy import FAILS, PASSES, lazy_path
+from seqopt.graph.states._visits import FreeStates
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import Goal, Measure
-from seqopt.problem.standing import Standing, StandingSets, slack
+from seqopt.problem.standing import Standing, slack
 from seqopt.stability.assessment import ROUGHEST
 
 WORST = {"bond": 1e9, "friction": ROUGHEST, "tilt": pi / 2}  # as goals count them
 FIRST = {"bond": 1e3, "friction": 0.5, "tilt": pi / 2 - 0.05}  # where the search begins
-WIDTH = 50  # states of a brick count from which a quick look for a plan goes on
+State = tuple[int, ...]
+STEPS = (Goal(Measure.STEPS),)
 
 
 def best_margin(
     problem: States, tell: Callable[[Explorer], object] = lambda _: None
-) -> tuple[float, float, States]:
+) -> tuple[float, float, States, list[State]]:
     """Return the best value of the first goal, a margin, and what is left to choose at it.
 
     ``tell``: called with the states that are reached; may raise to end the search. Results:
     ``value``: with which plans exist in which every state is proven to stand; ``bound``: with which
-    none does; ``rest``: of the goals after it, with the demand that all stand with that value.
+    none does; ``rest``: of the goals after it, with the demand that all stand with that value;
+    ``states``: of a plan that does, level and state, one of few steps.
     Raises `InfeasibleError` if there is no plan, whatever the margin.
     """
-    name, asked = problem.goals[0].response, list[StandingSets]()
+    name, look = problem.goals[0].response, _Look(problem, tell)
+    if problem.demands and not look.exists(look.demanding(WORST[name])):
+        raise InfeasibleError("no plan of the free schedule stands as is demanded")
+    low, high = bisected(name, lambda value: look.exists(look.demanding(value)))
+    return high, low, look.demanding(high, problem.goals[1:] or STEPS), look.found
 
-    def demanding(value: float, goals: tuple[Goal, ...]) -> States:
-        found = replace(with_margin(problem, name, value), goals=goals)
-        found.stability.others = asked
-        asked.append(found.stability)
+
+class _Look:
+    """The states of a problem that are within limits, and what is known of how they stand."""
+
+    def __init__(self, problem: States, tell: Callable[[Explorer], object]) -> None:
+        self._problem, self._name = problem, problem.goals[0].response
+        self._first: States | None = None  # with whom all others share their proofs
+        steps = replace(problem, goals=STEPS, budgets=())
+        self._found = Explorer(FreeStates(steps), tell=tell)
+        self._found.rise()
+        self._tell, self.found = tell, list[State]()
+        self._visited = self._found.graph()
+        self._graph, self._states = self._visited
+        counts = [len(rows) for *_, rows in self._states]
+        self._parts = np.repeat(np.arange(len(counts)), counts)
+        self._starts = np.cumsum([0, *counts])
+
+    def demanding(self, value: float, goals: tuple[Goal, ...] = STEPS) -> States:
+        """Return the problem in which every state must stand with a value as well."""
+        found = replace(with_margin(self._problem, self._name, value), goals=goals)
+        first = self._first = self._first or found
+        for one, other in zip(found.each or (found,), first.each or (first,), strict=True):
+            one.stability.share(other.stability)
         return found
 
-    def exists(value: float) -> bool:
-        reach = demanding(value, (Goal(Measure.STEPS),))
-        return explore(reach, width=WIDTH, tell=tell).whole or explore(reach, tell=tell).whole
+    def exists(self, asked: States) -> bool:
+        """Return whether there is a plan all of whose states stand as is demanded; keep one."""
+        known = np.zeros(len(self._parts), dtype=np.int64)
+        known[0] = PASSES
 
-    if problem.demands and not exists(WORST[name]):
-        raise InfeasibleError("no plan of the free schedule stands as is demanded")
-    low, high = bisected(name, exists)
-    return high, low, demanding(high, problem.goals[1:] or (Goal(Measure.STEPS),))
+        def ask(part: int, rows: Ints) -> Ints:
+            level, states = self._part(part, rows)
+            return np.where(asked.stand(level, states), PASSES, FAILS)
+
+        def recall(part: int, rows: Ints) -> Ints:
+            return asked.recalled(*self._part(part, rows))
+
+        tell = partial(self._tell, self._found)
+        path = lazy_path(self._graph, self._parts, known, ask, recall, tell)
+        if path is None:
+            return False
+        self.found = [(level, *state.tolist()) for level, _, state in self._visited.of(path)]
+        return True
+
+    def _part(self, part: int, rows: Ints) -> tuple[int, Ints]:
+        level, _, states = self._states[part]
+        return level, states[rows - self._starts[part]]
 
 
 def bisected(name: str, exists: Callable[[float], bool]) -> tuple[float, float]:
