@@ -36,7 +36,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``export``."""
     basic = command.add_argument_group("what is written")
     declare(basic, {"folder PLAN_DIR": "folder of a plan"})
-    basic.add_argument("--format", choices=tuple(EXPORTS), required=True, help="what to write")
+    said = f"what to write: {', '.join(EXPORTS)}"
+    basic.add_argument("--format", choices=EXPORTS, required=True, metavar="NAME", help=said)
     declare(basic, {"--out FILE": "file to write"}, required=True)
     declare(basic, SOURCE)
     declare(basic, DISTANCE)

@@ -18,7 +18,7 @@ from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
-from seqopt.scene.imports._carried import carried
+from seqopt.scene.imports._carried import carried, own_density
 from seqopt.scene.imports._content import (
     Content,
     Entry,
@@ -224,8 +224,7 @@ def read_assembly(document: Any, source: str) -> Content:
         if a in place and b in place
     ]
     said = [f"{len(nodes) - len(keys)} nodes have no block"] if len(keys) < len(nodes) else []
-    unit = None if own is None else own.unit
-    return Content(tuple(blocks), tuple(faces), unit=unit, said=tuple(said), own=own)
+    return Content(tuple(blocks), tuple(faces), unit=own and own.unit, said=tuple(said), own=own)
 
 
 def assembly_graph(document: Any, source: str) -> tuple[Entry, dict[str, Any] | None]:
@@ -255,13 +254,12 @@ def _node_block(where: str, key: str, node: Entry, meshes: dict[str, Any] | None
     held = meshes[key] if meshes is not None else entry(where, node, "block")
     vertices, faces = _mesh(where, held)
     course = node.get("course", node.get("order"))
-    density = (node.get("brick") or {}).get("density")
     return FileBlock(
         key,
         vertices,
         faces,
         support=node.get("is_support") is True,
-        density=None if density is None else number(f"{where}: density", density),
+        density=own_density(where, node),
         course=None if course is None else number(f"{where}: course", course),
     )
 
