@@ -94,13 +94,14 @@ def _check_size(content: Content) -> None:
 
 def _unit(content: Content, given: Given, said: list[str]) -> float:
     """Return the file's unit of length in m."""
-    if content.unit is None and given.unit is None:
+    known = content.own.unit if content.own else content.unit
+    if known is None and given.unit is None:
         raise SceneError(f"it does not say its unit of length; give one of {', '.join(UNITS)}")
-    unit = one_of("unit", content.unit if given.unit is None else given.unit, UNITS)
-    if content.unit is None:
+    unit = one_of("unit", known if given.unit is None else given.unit, UNITS)
+    if known is None:
         said.append(f"lengths are in {unit}, as given")
-    elif unit != content.unit:
-        raise SceneError(f"its lengths are known in {content.unit}; give no other unit")
+    elif unit != known:
+        raise SceneError(f"its lengths are known in {known}; give no other unit")
     return UNITS[unit]
 
 

@@ -15,7 +15,16 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene.boxes import vertices_of
-from seqopt.scene.imports._content import Carried, Content, Entry, Given, entry, listing, mapping
+from seqopt.scene.imports._content import (
+    Carried,
+    Content,
+    Entry,
+    Given,
+    entry,
+    listing,
+    mapping,
+    number,
+)
 from seqopt.scene.imports._meshes import Repaired
 from seqopt.scene.library.common import mobile_robots
 from seqopt.scene.scene import Scene
@@ -73,6 +82,12 @@ def carried(graph: Entry, source: str) -> Carried | None:
     turns = sorted((entry(where, node, "order"), names[key]) for key, node in nodes.items())
     document["build_order"] = [name for _, name in turns]
     return Carried(document, names, own.get("unit"))
+
+
+def own_density(where: str, node: Entry) -> float | None:
+    """Return the density of the brick on a node, kg/m³, if it has one."""
+    value = (node.get("brick") or {}).get("density")
+    return None if value is None else number(f"{where}: density", value)
 
 
 def _gathered(where: str, holders: Sequence[Entry], name: str) -> list[Any]:

@@ -224,7 +224,7 @@ def read_assembly(document: Any, source: str) -> Content:
         if a in place and b in place
     ]
     said = [f"{len(nodes) - len(keys)} nodes have no block"] if len(keys) < len(nodes) else []
-    return Content(tuple(blocks), tuple(faces), unit=own and own.unit, said=tuple(said), own=own)
+    return Content(tuple(blocks), tuple(faces), said=tuple(said), own=own)
 
 
 def assembly_graph(document: Any, source: str) -> tuple[Entry, dict[str, Any] | None]:
