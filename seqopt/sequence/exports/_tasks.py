@@ -79,27 +79,11 @@ def plan_tasks(
 ) -> Iterator[Task]:
     """Yield what robots do in a checked plan, step by step.
 
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of Step
-    distance : float, optional
-        From a grip to where a tool comes from, and goes to, m; by default the longest side of each
-        block.
-    postures : mapping of (str, int) to sequence of float, optional
-        Joint values of arms by robot and node, where they are known.
-
-    Yields
-    ------
-    Task
-        What a step changes comes first, then who holds on, in the order of the robots.
-
-    Raises
-    ------
-    SceneError
-        If the distance is no positive number, or a posture has no numbers.
-    StepError
-        If postures name no robot or node of the scene.
+    ``distance``, m, is from a grip to where a tool comes from, and goes to; by default the longest
+    side of each block. ``postures``: joint values of arms by robot and node, where they are known.
+    What a step changes comes first, then who holds on, in the order of the robots. Raises
+    `SceneError` if the distance is not positive, or a posture is of no numbers; `StepError` if
+    postures name no robot or node of the scene.
 
     Examples
     --------
