@@ -8,6 +8,7 @@
 'step,type,bricks,placed,rob1_node,rob1_b'
 """
 
+from seqopt.sequence.exports._grip_frames import hold
 from seqopt.sequence.exports._tables import BlockState, step_states
 from seqopt.sequence.exports._tasks import Action, Task, plan_tasks
 from seqopt.sequence.exports.formats import EXPORTS, LOST, export_plan, read_folder
@@ -19,6 +20,7 @@ __all__ = [
     "BlockState",
     "Task",
     "export_plan",
+    "hold",
     "plan_tasks",
     "read_folder",
     "step_states",
