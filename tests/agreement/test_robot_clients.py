@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import io
+import re
 
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
+from seqopt._cli.main import main
 from seqopt.network.build import build_network
 from seqopt.scene.imports.formats import import_scene
 from seqopt.sequence.exports._tasks import FRAMES, Action, plan_tasks
 from seqopt.sequence.exports.formats import export_plan
 from seqopt.sequence.two_robots import METHODS
-from tests.builders import six_bricks
+from tests.builders import ROOT, six_bricks
 
 compas = pytest.importorskip("compas")
 SCENE = six_bricks()
@@ -142,3 +144,18 @@ def test_compas_opens_an_assembly_writes_it_again_and_it_is_the_scene(tmp_path):
     shorter = import_scene(path)
     assert shorter.build_order == SCENE.build_order[:-1]
     assert shorter.joints == SCENE.joints[:-1]
+
+
+@pytest.mark.slow
+def test_the_page_for_compas_fab_runs_and_prints_what_it_says(tmp_path, monkeypatch, capsys):
+    """Its own inverse kinematics takes our targets."""
+    pytest.importorskip("compas_fab")
+    page = (ROOT / "docs/guides/driving.md").read_text("utf-8")
+    code, said = re.search(r"```py\n(.*?)```\n\n```text\n(.*?)```", page, re.DOTALL).groups()
+    monkeypatch.chdir(tmp_path)
+    words = "optimize arch25 --schedule free --aim minmax --out best"
+    assert main(words.split()) == 0
+    assert main(["export", "best", "--format", "compas_fab", "--out", "best_fab.json"]) == 0
+    capsys.readouterr()
+    exec(compile(code, "page", "exec"), {})
+    assert capsys.readouterr().out == said
