@@ -15,7 +15,7 @@ from seqopt.scene.scene import Scene
 def boxes_csv(scene: Scene) -> str:
     """Return bricks as the table of boxes that ``import`` reads, in m and degrees.
 
-    A brick that is no box is as long, wide and high as it extends.
+    A brick of another shape is as long, wide and high as it extends.
     """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")

@@ -36,7 +36,7 @@ EXPORTS = (*_PLAIN, *_TASKS, *_WITH_SOURCE, *_BLOCKS)
 _BOXES = ("nodes", "joints", "ground ends", "robots", "loads", "steps")
 LOST: dict[str, tuple[str, ...]] = {
     "compas_assembly": (),
-    "boxes": ("shapes that are no boxes", *_BOXES),
+    "boxes": ("shapes other than boxes", *_BOXES),
     "obj": ("densities", "the order", *_BOXES),
 }
 """What a scene is without, once it was exported and imported again; other formats are no scenes."""

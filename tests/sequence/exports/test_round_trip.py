@@ -166,7 +166,7 @@ def rounded(vector):
 
 
 PARTS = {  # what a scene is without, by the words of LOST
-    "shapes that are no boxes": lambda s: [
+    "shapes other than boxes": lambda s: [
         sorted(map(rounded, vertices_of(b)[0])) for b in s.bricks
     ],
     "densities": lambda s: [brick.density for brick in s.bricks],
