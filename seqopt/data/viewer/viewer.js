@@ -108,7 +108,7 @@
     makeRobots() {
       const ground = new THREE.Mesh(new THREE.CylinderGeometry(yard, yard, radius * 0.004, 64), new THREE.MeshLambertMaterial({ color: 0xe9e4dc }));
       const up = new THREE.Vector3(...structure.up);
-      ground.position.copy(view.center).addScaledVector(up, structure.level - up.dot(view.center) - radius * 0.006);
+      ground.position.copy(middle).addScaledVector(up, structure.level - up.dot(middle) - radius * 0.006);
       ground.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), up);
       this.scene.add(ground);
       const bar = new THREE.CylinderGeometry(1, 1, 1, 12), ball = new THREE.SphereGeometry(1, 16, 12), cone = new THREE.CylinderGeometry(0.35, 1, 1, 12);
@@ -181,10 +181,9 @@
       });
     }
     look() {
-      const up = new THREE.Vector3(...structure.up);
-      const side = Math.abs(up.z) > 0.9 ? new THREE.Vector3(0.35, -1, 0.3) : new THREE.Vector3(1, 0.4, 0.5);
-      this.camera.position.copy(view.center).addScaledVector(side.normalize(), (view.radius * (stands.length ? 2.25 : 2.9)) / Math.min(1, this.camera.aspect / (stands.length ? 1.6 : 1)));
-      this.controls.target.copy(view.center);
+      const { center, side, far } = fit(this.camera);
+      this.camera.position.copy(center).addScaledVector(side, far);
+      this.controls.target.copy(center);
       this.controls.update();
     }
     resize() {
@@ -270,13 +269,26 @@
   // where everything is
   const corners = structure.bricks.flatMap((brick) => brick.corners).map((c) => new THREE.Vector3(...c));
   const around = new THREE.Box3().setFromPoints(corners).getBoundingSphere(new THREE.Sphere());
-  const radius = around.radius || 1;
-  // what is seen at first: the structure, and robots that stand beside it as far as they do not make it small
+  const middle = around.center, radius = around.radius || 1;
   const stands = builds.flatMap((build) => build.arms.lines).flat().map((place) => new THREE.Vector3(...place));
-  const whole = new THREE.Box3().setFromPoints([...corners, ...stands]).getBoundingSphere(new THREE.Sphere());
-  const share = Math.min(1, Math.max(0, radius / Math.max(whole.radius - radius, 1e-9)));
-  const view = { center: around.center.clone().lerp(whole.center, share), radius: radius + share * Math.max(0, whole.radius - radius) };
-  const yard = 1.05 * Math.max(radius, ...stands.map((place) => place.distanceTo(view.center)));
+  // from where all is seen at first: the structure, and its robots unless these make it small
+  function fit(camera) {
+    const up = new THREE.Vector3(...structure.up);
+    const side = (Math.abs(up.z) > 0.9 ? new THREE.Vector3(0.35, -1, 0.3) : new THREE.Vector3(1, 0.4, 0.5)).normalize();
+    const right = new THREE.Vector3().crossVectors(up, side).normalize(), above = new THREE.Vector3().crossVectors(side, right);
+    const high = 0.88 * Math.tan(((camera.fov / 2) * Math.PI) / 180), wide = high * camera.aspect;
+    const from = (points) => {
+      const reaches = [right, above].map((axis) => points.map((p) => p.dot(axis))), ends = reaches.map((r) => [Math.min(...r), Math.max(...r)]);
+      const center = new THREE.Vector3(), depth = points.reduce((sum, p) => sum + p.dot(side), 0) / points.length;
+      [right, above].forEach((axis, k) => center.addScaledVector(axis, (ends[k][0] + ends[k][1]) / 2));
+      center.addScaledVector(side, depth);
+      const far = Math.max(...points.map((p) => { const q = p.clone().sub(center); return q.dot(side) + Math.max(Math.abs(q.dot(right)) / wide, Math.abs(q.dot(above)) / high); }));
+      return { center, side, far: far || 3 * radius };
+    };
+    const own = from(corners), all = from([...corners, ...stands]);
+    return all.far <= 1.7 * own.far ? all : { ...own, far: 1.7 * own.far };
+  }
+  const yard = 1.05 * Math.max(radius, ...stands.map((place) => place.distanceTo(middle)));
   const panes = [];
   let mirroring = false;
   function mirror(from) {
