@@ -78,10 +78,10 @@ def write_text(path: Path, text: str) -> None:
     write_bytes(path, text)
 
 
-def csv_text(table: pd.DataFrame) -> str:
-    """Return a table as CSV, without its index, six digits a number; no text begins a formula."""
+def csv_text(table: pd.DataFrame, digits: int = 6) -> str:
+    """Return a table as CSV, without its index, to some digits; no text begins a formula."""
     safe = _harmless_table(table)
-    return str(safe.to_csv(index=False, float_format="%.6g", lineterminator="\n"))
+    return str(safe.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n"))
 
 
 def write_csv(path: Path, table: pd.DataFrame) -> None:

@@ -10,8 +10,11 @@ from hypothesis import strategies as st
 from experiments.harness.scenes import running_bond
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
+from seqopt.scene._loads import Load
 from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.boxes import as_vectors, vertices_of
 from seqopt.scene.parts import Anywhere, Robot, Side, Sphere
+from seqopt.scene.shape import Polyhedron
 from seqopt.sequence.rules import FreeRules
 from seqopt.study.published import ROBOTS
 from tests.builders import about_vertical, from_both_sides, moved
@@ -202,3 +205,47 @@ def free_builds(draw, most_bricks=5, most_robots=4):
         candidates=draw(st.sampled_from(["", "near:0", "near:1", "within:0.15"])),
     )
     return scene, rules
+
+
+@st.composite
+def scenes_with_all(draw):
+    """A small scene with everything that one may have: shapes, loads, movement, blocked nodes."""
+    scene = draw(builds())
+    share = st.floats(-1.0, 1.0)
+    vectors, near = st.tuples(share, share, share), st.tuples(*[st.floats(-0.1, 0.1)] * 3)
+    bricks = []
+    for brick in scene.bricks:
+        if draw(st.booleans()):
+            points, faces = vertices_of(brick)
+            own = Polyhedron(as_vectors(points - brick.position), faces)
+            spots = brick.node_position(brick.nodes[0]), brick.node_position(brick.nodes[1])
+            spots = as_vectors(np.subtract(spots, brick.position))
+            bricks.append(replace(brick, shape=own, node_offsets=spots))
+        else:
+            bricks.append(brick)
+    square = ((-0.01, -0.01), (0.01, -0.01), (0.01, 0.01), (-0.01, 0.01))
+    joints = [
+        replace(joint, face=square, thickness=0.02) if draw(st.booleans()) else joint
+        for joint in scene.joints
+    ]
+    grounds, last = list(scene.grounds), scene.build_order[-1]
+    if draw(st.booleans()):
+        more = {"face": square, "thickness": 0.02, "movement": draw(vectors), "closes_with": last}
+        grounds[0] = replace(grounds[0], **more)
+    free = [n for brick in bricks for n in brick.nodes if n != brick.placing_node]
+    loads = [
+        Load(brick=scene.build_order[0], force=force, position=at, since=last)
+        for force, at in draw(st.lists(st.tuples(vectors, near), max_size=2))
+    ]
+    return replace(
+        scene,
+        bricks=tuple(draw(st.permutations(bricks))),
+        joints=tuple(draw(st.permutations(joints))),
+        grounds=tuple(grounds),
+        blocked_nodes=tuple(draw(st.lists(st.sampled_from(free), max_size=2, unique=True))),
+        loads=tuple(loads),
+        wind=draw(vectors),
+        gravity=draw(st.sampled_from([(0.0, 0.0, -9.81), (0.0, -1.62, 0.0)])),
+        weight_factor=draw(st.floats(0.5, 2.0)),
+        provenance=draw(st.sampled_from(["", "printed\nfrom a page", "größer <b>"])),
+    )

@@ -20,6 +20,7 @@ from seqopt.plan.plan import Plan
 from seqopt.report._pages import PAGE, plan_page
 from seqopt.report.comparison import Comparison
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
+from seqopt.sequence.exports.formats import export_plan
 from seqopt.stability._builds import BuildProver
 
 
@@ -81,8 +82,16 @@ def plan_files(
         **{f"{name}.csv": csv_text(table) for name, table in tables.items()},
         "summary.json": json.dumps(_plain(report), indent=2) + "\n",
         "scene.json": dump_scene(plan.engine.network.scene),
+        **_task_files(plan),
         PAGE: plan_page(plan.engine, plan.title, tables["plan"], plan.result, prover),
     }
+
+
+def _task_files(plan: Plan) -> dict[str, str]:
+    """Return what robots do, for those who program them, by file name."""
+    scene = plan.engine.network.scene
+    forms = {"tasks.json": "tasks", "tasks.csv": "tasks_csv"}
+    return {name: export_plan(scene, plan.steps, form) for name, form in forms.items()}
 
 
 def _plain(value: object) -> Any:

@@ -26,8 +26,17 @@ from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import FileError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
+from seqopt.report._robots import Cell
 from seqopt.report._style import BLUE, SMALL, WIDTH, new_picture, styled
-from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, force_key, grip_mark
+from seqopt.report.draw import (
+    View,
+    draw_bricks,
+    draw_grips,
+    draw_network,
+    draw_robots,
+    force_key,
+    grip_mark,
+)
 from seqopt.responses.table import force_column, step_fields
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import boxes
@@ -43,18 +52,19 @@ FILM_DPI, FILM_WIDTH = 80, 6.0  # inches
 SHADES = "YlGnBu"
 PALE = "#f2efe9"  # of a grip whose force is not known
 DARK = "#222222"
+NEARBY = 0.4  # how far beside the structure robots are in the picture, over its size there
 LANE = 0.74  # height of a bar, of a lane's
 PER_STEP, NARROWEST, WIDEST = 0.13, 6.0, 30.0  # inches
 LETTER = 0.06  # width of one, inches
 
 
 def _panels(
-    scene: Scene, count: int, width: float = WIDTH, room: float = 0.35
+    box: tuple[Floats, Floats], count: int, width: float = WIDTH, room: float = 0.35
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure with panels of a structure's shape, in rows of three with room for titles."""
+    """Return a figure with panels of a box's shape, in rows of three with room for titles."""
     columns = min(count, 3)
     rows = -(-count // columns)
-    (left, low), (right, high) = _seen_box(scene)
+    (left, low), (right, high) = box
     ratio = min(max((high - low) / (right - left), 0.25), 1.6)
     figure = new_picture(width, rows * (width / columns * ratio + room))
     panels = [figure.add_subplot(rows, columns, i + 1) for i in range(count)]
@@ -70,11 +80,20 @@ def _seen_box(scene: Scene) -> tuple[Floats, Floats]:
     return np.asarray(seen.min(axis=0) - room), np.asarray(seen.max(axis=0) + room)
 
 
+def _build_box(scene: Scene) -> tuple[Floats, Floats]:
+    """Return the corners (2,) of what is seen of a build: robots too, as far as they are near."""
+    low, high = _seen_box(scene)
+    stands = Cell(scene).stands @ VIEW.axes()[:2].T
+    most, room = NEARBY * (high - low).max(), 0.05 * (high - low).max()
+    low = np.maximum(np.vstack([low, stands - room]).min(axis=0), low - most)
+    return low, np.minimum(np.vstack([high, stands + room]).max(axis=0), high + most)
+
+
 @styled
 def scene_picture(scene: Scene, bricks: int | None = None, width: float = WIDTH) -> Figure:
     """Return a picture of a scene, or of its first bricks in build order, the others pale."""
     network, most, count = build_network(scene), len(scene.bricks), _bricks(scene, bricks)
-    figure, (axes,) = _panels(scene, 1, width)
+    figure, (axes,) = _panels(_seen_box(scene), 1, width)
     if count < most:
         draw_bricks(axes, network, most, VIEW, alpha=0.15)
     draw_bricks(axes, network, count, VIEW)
@@ -86,7 +105,7 @@ def scene_picture(scene: Scene, bricks: int | None = None, width: float = WIDTH)
 def network_picture(network: Network, bricks: int | None = None, width: float = WIDTH) -> Figure:
     """Return a picture of a network, or of its part of the first bricks in build order."""
     count = _bricks(network.scene, bricks)
-    figure, (axes,) = _panels(network.scene, 1, width, 0.5)
+    figure, (axes,) = _panels(_seen_box(network.scene), 1, width, 0.5)
     draw_network(axes, network, count, VIEW, numbers=count <= NUMBERED and width >= WIDTH)
     axes.set_title(
         f"network of {network.scene.name}, {count} bricks\n"
@@ -120,7 +139,7 @@ def steps_picture(
     colored by axial force, instead of the bricks.
     """
     picked, scene = _picked(steps, chosen), engine.network.scene
-    figure, panels = _panels(scene, len(picked))
+    figure, panels = _panels(_build_box(scene), len(picked))
     largest = None
     if forces:  # of any edge in these steps, N
         each = (_fields(engine, step).edge_force for step in picked)
@@ -170,6 +189,7 @@ def _draw_step(
         how |= {"edge_force": fields.edge_force[0], "largest_force": largest_force}
         draw_network(axes, network, bricks, VIEW, **how)
         return
+    draw_robots(axes, network.scene, step.grips, VIEW)
     if fields is not None:
         draw_bricks(axes, network, bricks, VIEW, alpha=0.15)
         how["twist"] = fields.brick_twist[0]
@@ -185,7 +205,7 @@ def _frame(axes: Axes, scene: Scene, step: Step, count: int) -> None:
         StepKind.REPOSITION: "a robot takes a grip",
     }[step.kind]
     axes.set_title(f"step {step.number} of {count}: {what}", loc="center")
-    low, high = _seen_box(scene)
+    low, high = _build_box(scene)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
 
 
@@ -242,7 +262,7 @@ class Film:
         if path.suffix != ".gif":
             raise FileError(f"film {path}: give a name that ends in .gif")
         scene = self.engine.network.scene
-        (left, low), (right, high) = _seen_box(scene)
+        (left, low), (right, high) = _build_box(scene)
         high_enough = max(FILM_WIDTH * (high - low) / (right - left), 2.0) + 0.5
         figure = new_picture(FILM_WIDTH, high_enough, "none")
         axes = figure.add_axes((0.02, 0.02, 0.96, 0.88))

@@ -18,14 +18,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
+from matplotlib.patches import PathPatch, Polygon
+from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 
 from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind
+from seqopt.report._robots import ROBOT_COLORS, Cell
 from seqopt.report._style import BLUE, SMALL, VERMILION
-from seqopt.report.page import ROBOT_COLORS
 from seqopt.scene.boxes import boxes, vertices_of
 from seqopt.scene.parts import Brick
+from seqopt.scene.scene import Scene
 from seqopt.scene.shape import normal_of
 
 HALO = (withStroke(linewidth=2.5, foreground="white"),)
@@ -45,6 +48,7 @@ FACES: Faces = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6
 CLAY = np.array([0.80, 0.52, 0.38])
 MARKED = np.array([0.46, 0.63, 0.76])
 ROBOT_MARKERS = "XPDs"
+GROUND, ARM = "#efece6", 3.2  # color; width of an arm, points
 LINE = 11.0  # points from one line of text to the next
 NEAR = (0.3, 0.08)  # share of a picture within which labels are neighbors, aside and up
 
@@ -279,6 +283,28 @@ def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: 
         axes.scatter([x], [y], 90, **mark, edgecolors="white", zorder=5)
         name = f"{network.scene.robots[i].name} at {grips[i]}"
         _write(axes, name, (x, y), (10, LINE * line), color=mark["color"], zorder=6)
+
+
+def draw_robots(axes: Axes, scene: Scene, grips: Sequence[int | None], view: View) -> None:
+    """Draw the ground and the arms of all robots, behind the structure or before it.
+
+    Arms lead from a base to the grip, as sketches; see `seqopt.report._robots`.
+    """
+    cell, (right, up, toward) = Cell(scene), view.axes()
+    seen = np.stack([right, up])
+    axes.add_patch(Polygon(cell.yard @ seen.T, fc=GROUND, lw=0, zorder=0.1))
+    for i, (robot, node) in enumerate(zip(scene.robots, grips, strict=True)):
+        points = cell.arm(robot, node)
+        if points is None:
+            continue
+        near = (points[0] - cell.middle) @ toward > 0
+        color, order = grip_mark(i)["color"], 4.0 if near else 0.5
+        line, wide = points @ seen.T, ARM if len(points) > 2 else 0.5 * ARM
+        for width, paint in ((wide + 1.6, "white"), (wide, color)):
+            look: Any = {"fill": False, "capstyle": "round", "joinstyle": "round", "zorder": order}
+            axes.add_patch(PathPatch(Path(line[:-1]), lw=width, ec=paint, **look))
+        ends: Any = {"fill": False, "capstyle": "round", "zorder": order}
+        axes.add_patch(PathPatch(Path(line[-2:]), lw=0.6 * ARM, ec=INK, **ends))
 
 
 def grip_mark(robot: int) -> dict[str, Any]:

@@ -27,18 +27,19 @@ from seqopt.engines.interface import Engine, Want
 from seqopt.errors import ProblemError
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, overloads
+from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
 from seqopt.responses.quantities import number_text
 from seqopt.responses.table import OUTSIDE, Departure, force_column, step_fields
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Order, Scene
 from seqopt.scene.shape import normal_of
+from seqopt.sequence.exports import export_plan
 from seqopt.sequence.steps import Step
 from seqopt.stability._builds import WORDS, BuildVerdicts
 
 LARGEST = 32767
 FIELDS = ("twist", "edge", "push", "turn")  # packed, a row for every step
-ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#b85c00", "#444444", "#1f5fa8")
 RESPONSES = {
     "F_largest": "largest grip force, N",
     "M_sup_Nm": "largest support moment, N m",
@@ -57,7 +58,9 @@ class Build:
     ``verdicts`` say which steps stand, where that was asked, with the mortar of the scene last;
     ``bounds`` are limits by column of the table, or ``F_largest``, that are drawn beside the
     responses; ``order`` names the bricks as they are placed, where that is not the scene's own
-    order; ``falls`` (steps, B, 6): how steps fall, with the first mortar.
+    order; ``falls`` (steps, B, 6): how steps fall, with the first mortar; ``arms``: the joints of
+    robots whose postures are known, points (k, 3), m, from the base to the tip of the tool, an
+    entry a step, by the names of robots (of others a simple arm is drawn).
     """
 
     name: str
@@ -68,6 +71,7 @@ class Build:
     departures: Sequence[Departure] = ()
     order: Order = ()
     falls: Floats | None = None
+    arms: Arms = field(default_factory=dict)
 
     def overloads(self, scene: Scene) -> tuple[Excess, ...]:
         """Return the payloads that steps exceed."""
@@ -125,6 +129,7 @@ def _structure_data(network: Network) -> dict[str, object]:
             for robot, color in zip(scene.robots, cycle(ROBOT_COLORS), strict=False)
         ],
         "up": list(scene.up),
+        "level": Cell(scene).level,
     }
 
 
@@ -173,6 +178,7 @@ def _build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[st
         "rank": [build.order.index(name) for name in own] if build.order else None,
         "stands": _stands(build.verdicts),
         "marks": _marks(engine.network.scene, build),
+        "arms": arm_data(engine.network.scene, build.steps, build.arms),
         "steps": [
             {
                 "number": step.number,
@@ -299,12 +305,19 @@ def _data(engine: Engine, builds: Sequence[Build], scatter: Scatter | None) -> d
         "structure": _structure_data(network),
         "builds": [
             _build_data(engine, build, fields=bool(end <= MOST) and not build.order)
+            | {"tasks": _tasks(engine, build) if build is builds[0] and not build.order else None}
             for build, end in zip(builds, ends, strict=True)
         ],
         "responses": RESPONSES,
         "scatter": None if scatter is None else scatter.data(),
         "note": _left_out(builds, int(ends[-1])),
     }
+
+
+def _tasks(engine: Engine, build: Build) -> str:
+    """Return what robots do in a build, CSV, compressed: to copy and to keep."""
+    text = export_plan(engine.network.scene, build.steps, "tasks_csv")
+    return b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode("ascii")
 
 
 def _left_out(builds: Sequence[Build], numbers: int) -> str:

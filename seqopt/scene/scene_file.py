@@ -310,6 +310,11 @@ def _parse_scene(text: str, source: str = "text") -> Scene:
     return _scene_from_dict(document)
 
 
+def scene_from_document(document: object, source: str) -> Scene:
+    """Return the scene of a document, such as `scene_to_dict` makes, if it obeys the schema."""
+    return _parse_scene(json.dumps(document), source)
+
+
 def _entries(source: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Return an object of a document, each of whose keys stands there once."""
     out = dict(pairs)

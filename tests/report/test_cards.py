@@ -13,8 +13,8 @@ from PIL import Image
 import seqopt
 from seqopt.problem.problem import Orders
 from seqopt.report._notebook import card, facts
+from seqopt.report._robots import ROBOT_COLORS
 from seqopt.report.comparison import largest
-from seqopt.report.page import ROBOT_COLORS
 from seqopt.stability.steps import assess_steps
 
 HEAVIEST = 60_000  # letters of HTML

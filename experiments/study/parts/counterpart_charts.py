@@ -13,9 +13,9 @@ from experiments.study.parts.counterpart_model_charts import OFF, OURS, STUDY, n
 from experiments.study.parts.counterpart_page import NEAR, caption
 from experiments.study.parts.counterpart_rows import LOOP, RESPONSES, Ours, plan_rows
 from seqopt.engines.interface import Want
+from seqopt.report._robots import ROBOT_COLORS
 from seqopt.report._style import INK, SMALL, dress, new_figure, plain, styled
 from seqopt.report.draw import View, draw_bricks, draw_grips
-from seqopt.report.page import ROBOT_COLORS
 
 VIEW = View(azimuth=35, elevation=22)
 CAPTIONS = {

@@ -7,16 +7,25 @@ import argparse
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import scene_facts
 from seqopt._cli.options import declare, form_options
+from seqopt._cli.values import number_word
 from seqopt._files import require_apart, write_text
-from seqopt.sequence.exports.formats import EXPORTS, export_plan, read_folder
+from seqopt.sequence.exports.formats import EXPORTS, LOST, export_plan, read_folder
 
 DESCRIPTION = (
     "Write the plan of a folder, as seqopt optimize --out makes it, in a format of others: which "
-    "block is absent, placed or held in which step."
+    "block is absent, placed or held in which step, what each robot does and where, or the scene "
+    "with its plan."
 )
-EXAMPLES = ("seqopt export best --format csv --out blocks.csv",)
+EXAMPLES = (
+    "seqopt export best --format csv --out blocks.csv",
+    "seqopt export best --format tasks --distance 0.15 --out tasks.json",
+)
 
 
+DISTANCE = {
+    "--distance M": "with tasks, tasks_csv or compas_fab: from a grip to where the tool comes "
+    "from and goes to, m (default: the longest side of each block)"
+}
 SOURCE = {
     "--source FILE": "with a format of COMPAS: the file that was imported, to name its elements or "
     "to write the plan into"
@@ -27,9 +36,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``export``."""
     basic = command.add_argument_group("what is written")
     declare(basic, {"folder PLAN_DIR": "folder of a plan"})
-    basic.add_argument("--format", choices=tuple(EXPORTS), required=True, help="what to write")
+    said = f"what to write: {', '.join(EXPORTS)}"
+    basic.add_argument("--format", choices=EXPORTS, required=True, metavar="NAME", help=said)
     declare(basic, {"--out FILE": "file to write"}, required=True)
     declare(basic, SOURCE)
+    declare(basic, DISTANCE)
     form_options(command)
 
 
@@ -38,9 +49,17 @@ def run(options: argparse.Namespace) -> Answer:
     inputs = [options.folder / name for name in ("scene.json", "plan.csv")]
     require_apart([options.out], [*inputs, *filter(None, [options.source])])
     scene, steps = read_folder(options.folder)
-    write_text(options.out, export_plan(scene, steps, options.format, options.source))
+    given = options.distance
+    distance = None if given is None else number_word(given, f"--distance {given}")
+    text = export_plan(scene, steps, options.format, options.source, distance)
+    write_text(options.out, text)
+    said, lost = f"{len(steps)} steps", LOST.get(options.format)
+    if lost:
+        said = f"{len(scene.bricks)} blocks, without {', '.join(lost)},"
+    elif lost is not None:
+        said = f"the scene and its {len(steps)} steps"
     return Answer(
         facts={"scene": scene_facts(scene), "steps": len(steps), "format": options.format},
-        text=f"{len(steps)} steps written to {options.out}",
+        text=f"{said} written to {options.out}",
         written=(options.out,),
     )

@@ -54,7 +54,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     said.add_argument("--unit", choices=UNITS, help="unit of length, where the file has none")
     said.add_argument("--up", choices=UPS, default="z", help="axis that is up (default: z)")
     declare(said, KEYS)
-    declare(said, {"--robots N": "mobile robots that reach all (default: 3)"}, default="3")
+    declare(
+        said, {"--robots N": "mobile robots that reach all (default: those of the file, else 3)"}
+    )
     declare(command.add_argument_group("joints (advanced)"), JOINTS)
     form_options(command)
 
@@ -76,7 +78,7 @@ def run(options: argparse.Namespace) -> Answer:
 
 def _given(options: argparse.Namespace) -> Given:
     """Return what the words say where the file does not."""
-    keys = options.supports
+    keys, robots = options.supports, options.robots
     return Given(
         unit=options.unit,
         up=options.up,
@@ -85,7 +87,7 @@ def _given(options: argparse.Namespace) -> Given:
         law=_law(options.stiffness),
         gap=_positive("--gap", options.gap),
         detect=options.detect,
-        robots=count_word(options.robots, "--robots", MOST_ROBOTS),
+        robots=robots if robots is None else count_word(robots, "--robots", MOST_ROBOTS),
         name=options.name,
         progress=options.tell,
     )

@@ -12,11 +12,13 @@
   const CLAY = 0xcc8560, NEW = 0xe8b04a, TENSION = 0xc8102e, COMPRESSION = 0x1f5fa8, LARGEST = 32767;
 
   // fields come as whole numbers, compressed
-  async function unpack(field) {
-    if (!field) return;
-    const bytes = Uint8Array.from(atob(field.data), (c) => c.charCodeAt(0));
+  function unzip(text) {
+    const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-    field.values = new Int16Array(await new Response(stream).arrayBuffer());
+    return new Response(stream).arrayBuffer();
+  }
+  async function unpack(field) {
+    if (field) field.values = new Int16Array(await unzip(field.data));
   }
   const value = (field, step, i) => (field ? field.values[step * field.width + i] * field.scale[step] : 0);
 
@@ -47,6 +49,7 @@
       this.makeBricks();
       this.makeEdges();
       this.makeGrips();
+      this.makeRobots();
       this.look();
       new ResizeObserver(() => this.resize()).observe(this.box);
       this.resize();
@@ -101,6 +104,66 @@
         return arrow;
       });
     }
+    // the ground, and for each robot bars, joints and a base, of which as many are shown as its arm needs
+    makeRobots() {
+      const ground = new THREE.Mesh(new THREE.CylinderGeometry(yard, yard, radius * 0.004, 64), new THREE.MeshLambertMaterial({ color: 0xe9e4dc }));
+      const up = new THREE.Vector3(...structure.up);
+      ground.position.copy(middle).addScaledVector(up, structure.level - up.dot(middle) - radius * 0.006);
+      ground.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), up);
+      this.scene.add(ground);
+      const bar = new THREE.CylinderGeometry(1, 1, 1, 12), ball = new THREE.SphereGeometry(1, 16, 12), cone = new THREE.CylinderGeometry(0.35, 1, 1, 12);
+      const most = Math.max(2, ...builds.flatMap((build) => build.arms.lines.map((line) => line.length)));
+      this.robots = structure.robots.map((robot) => {
+        const paint = new THREE.MeshLambertMaterial({ color: robot.color, emissive: robot.color, emissiveIntensity: 0.4 }), dark = new THREE.MeshLambertMaterial({ color: 0x33312e });
+        const group = new THREE.Group(), add = (shape, material) => { const mesh = new THREE.Mesh(shape, material); group.add(mesh); return mesh; };
+        const bars = Array.from({ length: most - 1 }, () => add(bar, paint)), joints = Array.from({ length: most - 1 }, () => add(ball, dark));
+        const foot = add(bar, dark), tool = add(cone, dark), name = document.createElement("span");
+        name.className = "robot";
+        name.style.color = robot.color;
+        name.textContent = robot.name;
+        this.box.append(name);
+        this.scene.add(group);
+        return { group, bars, joints, foot, tool, name, at: new THREE.Vector3() };
+      });
+    }
+    // arms are drawn where their bricks are: wrist and tip move with what they hold
+    showRobots(build, s, options) {
+      const up = new THREE.Vector3(...structure.up), upright = new THREE.Vector3(0, 1, 0), thick = radius * 0.017;
+      const between = (mesh, from, to, wide) => {
+        const along = to.clone().sub(from), long = along.length();
+        mesh.visible = long > 1e-6 * radius;
+        mesh.position.copy(from).add(to).multiplyScalar(0.5);
+        mesh.scale.set(wide, Math.max(long, 1e-9), wide);
+        if (mesh.visible) mesh.quaternion.setFromUnitVectors(upright, along.divideScalar(long));
+      };
+      this.robots.forEach(({ group, bars, joints, foot, tool, name, at }, r) => {
+        const line = options.robots ? build.arms.lines[build.arms.at[s][r]] : undefined;
+        group.visible = line !== undefined;
+        name.hidden = !group.visible;
+        if (!group.visible) return;
+        const places = line.map((place) => new THREE.Vector3(...place)), last = places.length - 1, ball = this.grips[r];
+        if (ball.visible) {
+          const shift = ball.position.clone().sub(new THREE.Vector3(...structure.nodes[build.steps[s].grips[r]].at));
+          places.slice(-2).forEach((place) => place.add(shift));
+        }
+        bars.forEach((mesh, k) => { mesh.visible = k < last - 1; if (mesh.visible) between(mesh, places[k], places[k + 1], thick * (k === 0 ? 1.5 : 1.1 - 0.15 * Math.min(k, 3))); });
+        joints.forEach((mesh, k) => { mesh.visible = k > 0 && k < last; if (mesh.visible) { mesh.position.copy(places[k]); mesh.scale.setScalar(thick * 1.35); } });
+        between(tool, places[last], places[last - 1], thick * 0.8);
+        foot.visible = last > 1;
+        if (foot.visible) between(foot, places[0], places[0].clone().addScaledVector(up, thick), thick * 3.5);
+        at.copy(places[last > 1 ? 1 : 0]);
+      });
+      this.nameRobots();
+    }
+    nameRobots() {
+      const { clientWidth: w, clientHeight: h } = this.box;
+      this.robots.forEach(({ name, at }) => {
+        if (name.hidden) return;
+        const seen = at.clone().project(this.camera);
+        name.style.left = `${Math.round((seen.x + 1) * w / 2)}px`;
+        name.style.top = `${Math.round((1 - seen.y) * h / 2)}px`;
+      });
+    }
     // an arrow ends where its ground end pushes
     showReactions(build, s, shown) {
       const forces = this.arrows.map((_, g) => new THREE.Vector3(...[0, 1, 2].map((k) => value(build.push, s, 3 * g + k))));
@@ -118,10 +181,9 @@
       });
     }
     look() {
-      const up = new THREE.Vector3(...structure.up);
-      const side = Math.abs(up.z) > 0.9 ? new THREE.Vector3(0.35, -1, 0.3) : new THREE.Vector3(1, 0.4, 0.5);
-      this.camera.position.copy(middle).addScaledVector(side.normalize(), (radius * 2.9) / Math.min(1, this.camera.aspect));
-      this.controls.target.copy(middle);
+      const { center, side, far } = fit(this.camera);
+      this.camera.position.copy(center).addScaledVector(side, far);
+      this.controls.target.copy(center);
       this.controls.update();
     }
     resize() {
@@ -174,6 +236,7 @@
         const { at: place, brick } = structure.nodes[node];
         ball.position.set(...this.moved(build, s, brick, place, options, p));
       });
+      this.showRobots(build, s, options);
       this.draw();
     }
     showForces(build, s, step, options) {
@@ -200,13 +263,32 @@
       this.edges.instanceMatrix.needsUpdate = true;
       this.edges.instanceColor.needsUpdate = true;
     }
-    draw() { this.renderer.render(this.scene, this.camera); }
+    draw() { this.renderer.render(this.scene, this.camera); if (this.robots) this.nameRobots(); }
   }
 
   // where everything is
   const corners = structure.bricks.flatMap((brick) => brick.corners).map((c) => new THREE.Vector3(...c));
   const around = new THREE.Box3().setFromPoints(corners).getBoundingSphere(new THREE.Sphere());
   const middle = around.center, radius = around.radius || 1;
+  const stands = builds.flatMap((build) => build.arms.lines).flat().map((place) => new THREE.Vector3(...place));
+  // from where all is seen at first: the structure, and its robots unless these make it small
+  function fit(camera) {
+    const up = new THREE.Vector3(...structure.up);
+    const side = (Math.abs(up.z) > 0.9 ? new THREE.Vector3(0.35, -1, 0.3) : new THREE.Vector3(1, 0.4, 0.5)).normalize();
+    const right = new THREE.Vector3().crossVectors(up, side).normalize(), above = new THREE.Vector3().crossVectors(side, right);
+    const high = 0.88 * Math.tan(((camera.fov / 2) * Math.PI) / 180), wide = high * camera.aspect;
+    const from = (points) => {
+      const reaches = [right, above].map((axis) => points.map((p) => p.dot(axis))), ends = reaches.map((r) => [Math.min(...r), Math.max(...r)]);
+      const center = new THREE.Vector3(), depth = points.reduce((sum, p) => sum + p.dot(side), 0) / points.length;
+      [right, above].forEach((axis, k) => center.addScaledVector(axis, (ends[k][0] + ends[k][1]) / 2));
+      center.addScaledVector(side, depth);
+      const far = Math.max(...points.map((p) => { const q = p.clone().sub(center); return q.dot(side) + Math.max(Math.abs(q.dot(right)) / wide, Math.abs(q.dot(above)) / high); }));
+      return { center, side, far: far || 3 * radius };
+    };
+    const own = from(corners), all = from([...corners, ...stands]);
+    return all.far <= 1.7 * own.far ? all : { ...own, far: 1.7 * own.far };
+  }
+  const yard = 1.05 * Math.max(radius, ...stands.map((place) => place.distanceTo(middle)));
   const panes = [];
   let mirroring = false;
   function mirror(from) {
@@ -284,7 +366,7 @@
   const slider = byId("step");
   let timer = null;
   const shown = () => [builds[byId("first").value], byId("second").value === "" ? null : builds[byId("second").value]].filter(Boolean);
-  const options = () => ({ magnify: Number(byId("magnify").value) || 0, forces: byId("forces").checked, fall: byId("fall").checked ? 0.15 * radius : 0 });
+  const options = () => ({ magnify: Number(byId("magnify").value) || 0, forces: byId("forces").checked, robots: byId("robots").checked, fall: byId("fall").checked ? 0.15 * radius : 0 });
   function refresh() {
     const pair = shown(), at = Number(slider.value);
     slider.max = Math.max(...pair.map((build) => build.steps.length)) - 1;
@@ -294,6 +376,7 @@
     byId("where").textContent = `step ${at + 1} of ${Number(slider.max) + 1}`;
     byId("now").replaceChildren(...pair.map((build) => table(build, at)));
     charts.cursors.forEach((move) => move(at));
+    for (const id of ["copy", "download"]) byId(id).hidden = !pair[0].tasks;
     if (points) points.mark();
   }
   function go(s) { slider.value = Math.max(0, Math.min(Number(slider.max), s)); refresh(); }
@@ -342,8 +425,9 @@
   byId("second").prepend(new Option("nothing", "", true, true));
   byId("second").value = "";
   await Promise.all(builds.flatMap((build) => ["twist", "edge", "push", "turn", "fall"].map((name) => unpack(build[name]))));
+  await Promise.all(builds.map(async (build) => { if (build.tasks) build.tasks = new TextDecoder().decode(await unzip(build.tasks)); }));
   for (const id of ["first", "second"]) byId(id).addEventListener("change", () => { drawCharts(); refresh(); });
-  for (const id of ["magnify", "forces", "fall"]) byId(id).addEventListener("input", refresh);
+  for (const id of ["magnify", "forces", "robots", "fall"]) byId(id).addEventListener("input", refresh);
   slider.addEventListener("input", refresh);
   byId("back").addEventListener("click", () => go(Number(slider.value) - 1));
   byId("on").addEventListener("click", () => go(Number(slider.value) + 1));
@@ -353,6 +437,23 @@
     link.download = `${structure.name} step ${Number(slider.value) + 1}.png`;
     link.href = panes[0].canvas.toDataURL("image/png");
     link.click();
+  });
+  byId("download").addEventListener("click", () => {
+    const build = shown()[0], link = document.createElement("a");
+    link.download = `${structure.name} ${build.name} tasks.csv`;
+    link.href = URL.createObjectURL(new Blob([build.tasks], { type: "text/csv" }));
+    link.click();
+    URL.revokeObjectURL(link.href);
+  });
+  byId("copy").addEventListener("click", async () => {
+    const area = document.createElement("textarea");
+    area.value = shown()[0].tasks;
+    document.body.append(area);
+    area.select();
+    const done = document.execCommand("copy");
+    area.remove();
+    byId("copy").textContent = done ? "copied" : "not allowed here";
+    setTimeout(() => { byId("copy").textContent = "copy tasks"; }, 1500);
   });
   document.addEventListener("keydown", (event) => {
     if (["SELECT", "INPUT", "BUTTON"].includes(event.target.tagName) && event.target !== slider) return;
@@ -364,6 +465,7 @@
   if (asked.has("beside")) byId("second").value = builds.findIndex((build) => build.name === asked.get("beside"));
   if (asked.has("magnify")) byId("magnify").value = asked.get("magnify");
   byId("forces").checked = asked.has("forces");
+  byId("robots").checked = asked.get("robots") !== "off";
   byId("falling").hidden = !builds.some((build) => build.fall);
   byId("fall").checked = asked.has("fall");
   drawCharts();

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from seqopt.errors import SceneError
 from seqopt.scene._checks import LARGEST_NUMBER, one_of, positive, rows, short, whole_between
 from seqopt.scene.boxes import as_vector, block_brick, spring_fields
+from seqopt.scene.imports._carried import own_scene
 from seqopt.scene.imports._content import (
     GROUND,
     MOST_CORNERS,
@@ -42,6 +43,7 @@ def upward_order(
     return order
 
 
+ROBOTS = 3  # where nobody says how many
 _STUB = 0.1  # of a ground end, over the smallest dimension of its block
 
 
@@ -56,6 +58,8 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
         content = content.placed(_unit(content, given, said), _up(given, said))
         supports = _supports(content, given, said)
         blocks = [repair_shape(b, may_be_open=i in supports) for i, b in enumerate(content.blocks)]
+        if (own := own_scene(content, given, blocks, said)) is not None:
+            return own
         total = sum((block.mended for block in blocks), Counter[str]())
         said += [f"{text}: {count}" for text, count in total.items()]
         bricks = _bricks(content, given, blocks, supports, said)
@@ -64,7 +68,8 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
         law = _law(content, given, touching, said)
         springs = _springs(touching, bricks, law)
         order = _order(touching, content, bricks, said)
-        robots = mobile_robots([*bricks.values()], whole_between("robots", given.robots, 1))
+        count = whole_between("robots", ROBOTS if given.robots is None else given.robots, 1)
+        robots = mobile_robots([*bricks.values()], count)
     except SceneError as error:
         raise SceneError(f"{source}: {error}") from error
     said.append(f"{len(robots)} robots reach all and bear all; z is up")
@@ -89,13 +94,14 @@ def _check_size(content: Content) -> None:
 
 def _unit(content: Content, given: Given, said: list[str]) -> float:
     """Return the file's unit of length in m."""
-    if content.unit is None and given.unit is None:
+    known = content.own.unit if content.own else content.unit
+    if known is None and given.unit is None:
         raise SceneError(f"it does not say its unit of length; give one of {', '.join(UNITS)}")
-    unit = one_of("unit", content.unit if given.unit is None else given.unit, UNITS)
-    if content.unit is None:
+    unit = one_of("unit", known if given.unit is None else given.unit, UNITS)
+    if known is None:
         said.append(f"lengths are in {unit}, as given")
-    elif unit != content.unit:
-        raise SceneError(f"its lengths are known in {content.unit}; give no other unit")
+    elif unit != known:
+        raise SceneError(f"its lengths are known in {known}; give no other unit")
     return UNITS[unit]
 
 

@@ -18,6 +18,7 @@ from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
+from seqopt.scene.imports._carried import carried, own_density
 from seqopt.scene.imports._content import (
     Content,
     Entry,
@@ -210,6 +211,7 @@ def read_assembly(document: Any, source: str) -> Content:
     nodes = mapping(f"{source}: node", entry(source, graph, "node", "vertex"))
     common = _held(source, graph.get("node_attributes") or graph.get("dva") or {})
     keys = [key for key in nodes if meshes is None or key in meshes]
+    own = carried(graph, source)
     blocks = []
     for key in keys:
         node = common | mapping(source, nodes[key])
@@ -222,7 +224,7 @@ def read_assembly(document: Any, source: str) -> Content:
         if a in place and b in place
     ]
     said = [f"{len(nodes) - len(keys)} nodes have no block"] if len(keys) < len(nodes) else []
-    return Content(tuple(blocks), tuple(faces), said=tuple(said))
+    return Content(tuple(blocks), tuple(faces), said=tuple(said), own=own)
 
 
 def assembly_graph(document: Any, source: str) -> tuple[Entry, dict[str, Any] | None]:
@@ -251,12 +253,13 @@ def _meshes(document: list[Any], source: str) -> Content:
 def _node_block(where: str, key: str, node: Entry, meshes: dict[str, Any] | None) -> FileBlock:
     held = meshes[key] if meshes is not None else entry(where, node, "block")
     vertices, faces = _mesh(where, held)
-    course = node.get("course")
+    course = node.get("course", node.get("order"))
     return FileBlock(
         key,
         vertices,
         faces,
         support=node.get("is_support") is True,
+        density=own_density(where, node),
         course=None if course is None else number(f"{where}: course", course),
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -16,6 +16,7 @@ from seqopt.scene._checks import as_float, reading_json, short
 from seqopt.scene.library.common import JointLaw
 from seqopt.work.progress import Tell
 
+Entry = dict[str, Any]
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}  # m
 UPS = ("z", "y")
 _Y_TO_Z = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # (x, y, z) to (x, -z, y)
@@ -63,6 +64,15 @@ class FileJoint:
 
 
 @dataclass(frozen=True)
+class Carried:
+    """A scene that an assembly carries, as a document, and its bricks by the keys of blocks."""
+
+    document: Entry
+    bricks: Mapping[str, int]
+    unit: str | None = None  # of the file's lengths, if it was written of the scene alone
+
+
+@dataclass(frozen=True)
 class Content:
     """What a file says about an assembly."""
 
@@ -72,6 +82,7 @@ class Content:
     unit: str | None = None  # unit of length, one of `UNITS`, if the file says it
     law: JointLaw | None = None  # if the file has stiffnesses
     said: tuple[str, ...] = ()  # what was read, left out or assumed
+    own: Carried | None = None  # the scene that seqopt wrote into it
 
     def placed(self, unit: float, up: str) -> Content:
         """Return the content in m, with z up. ``unit``: of its lengths, m; ``up``: one of `UPS`."""
@@ -99,8 +110,8 @@ class Given:
     blocks that are fixed, in place of those of the file; ``law``: stiffness of joints by area, in
     place of that of the file; ``gap``: most that may lie between faces that touch, m; ``detect``:
     whether to look for faces although the file has some; ``robots``: how many mobile robots the
-    scene gets; ``name``: of the scene; ``progress``: told how far it is to find faces, which takes
-    long of many blocks.
+    scene gets, three if the file has none; ``name``: of the scene; ``progress``: told how far it is
+    to find faces, which takes long of many blocks.
     """
 
     unit: str | None = None
@@ -110,12 +121,9 @@ class Given:
     law: JointLaw | None = None
     gap: float | None = None
     detect: bool = False
-    robots: int = 3
+    robots: int | None = None
     name: str | None = None
     progress: Tell | None = None
-
-
-Entry = dict[str, Any]
 
 
 def parse_json(text: str, source: str) -> Any:

@@ -73,7 +73,7 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
     content = read_content(where, form)
     scene = build_scene(content, given or Given(), printable("file", where.stem or "file"))
     warn_of(scene, scene.name)
-    if given is None or (given.supports is None and given.up == "z"):
+    if content.own is None and (given is None or (given.supports is None and given.up == "z")):
         _warn_of_lying(scene)
     return scene
 

@@ -1,4 +1,4 @@
-"""Plans in formats of other programs: tables, JSON, COMPAS, sequencer_benchmark.
+"""Plans in formats of other programs: tables, JSON, tasks of robots, COMPAS, sequencer_benchmark.
 
 >>> import seqopt
 >>> from seqopt.sequence.exports import export_plan
@@ -8,7 +8,20 @@
 'step,type,bricks,placed,rob1_node,rob1_b'
 """
 
+from seqopt.sequence.exports._grip_frames import hold
 from seqopt.sequence.exports._tables import BlockState, step_states
-from seqopt.sequence.exports.formats import EXPORTS, export_plan, read_folder
+from seqopt.sequence.exports._tasks import Action, Task, plan_tasks
+from seqopt.sequence.exports.formats import EXPORTS, LOST, export_plan, read_folder
 
-__all__ = ["EXPORTS", "BlockState", "export_plan", "read_folder", "step_states"]
+__all__ = [
+    "EXPORTS",
+    "LOST",
+    "Action",
+    "BlockState",
+    "Task",
+    "export_plan",
+    "hold",
+    "plan_tasks",
+    "read_folder",
+    "step_states",
+]

@@ -6,8 +6,9 @@ Both are JSON as `compas.json_load` reads it, written without COMPAS.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -19,11 +20,14 @@ from seqopt.arrays import Floats
 from seqopt.errors import StepError
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.imports._building import block_numbers
+from seqopt.scene.imports._carried import carry
 from seqopt.scene.imports._compas_models import assembly_graph, by_guid, kind, payload
 from seqopt.scene.imports._content import entry, parse_json
 from seqopt.scene.imports.formats import read_content, sniffed
 from seqopt.scene.scene import Scene
-from seqopt.sequence.exports._tables import step_states
+from seqopt.sequence.exports._compas_values import Document, compas_frame, mesh_data, typed
+from seqopt.sequence.exports._grip_frames import Frame, Held, brick_frame, hold
+from seqopt.sequence.exports._tables import StepStates, step_states
 from seqopt.sequence.steps import Step
 
 
@@ -57,37 +61,54 @@ def read_source(scene: Scene, path: Path) -> Source:
     return Source(found, graph)
 
 
-_Document = dict[str, Any]
-
-
 def timber_plan(scene: Scene, steps: Sequence[Step], source: Source | None = None) -> str:
     """Return a plan as a ``BuildingPlan`` of compas_timber, JSON, in names of the source if any."""
     names = source.names if source else {b.name: str(b.name) for b in scene.bricks}
-    rows = []
+    robots, frames = {robot.name: robot for robot in scene.robots}, cache(partial(hold, scene))
+    rows, before = [], _Holds()
     for row in step_states(scene, steps):
-        frame = {"point": [0.0] * 3, "xaxis": [1.0, 0.0, 0.0], "yaxis": [0.0, 1.0, 0.0]}
+        grips = {
+            robot: (f"{robot} holds {names[brick]} at node {node}", frames(robots[robot], node))
+            for robot, (node, brick) in row.holds.items()
+        }
+        frame = Frame((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
         if row.new:
-            brick = scene.placed[row.step.bricks - len(row.new)]
-            axes = zip(frame, (brick.position, brick.length_axis, brick.width_axis), strict=True)
-            frame = {name: list(axis) for name, axis in axes}
+            frame = brick_frame(scene.placed[row.step.bricks - len(row.new)])
         data = {
-            "location": frame,
+            "location": compas_frame(frame),
             "geometry": "box",
             "priority": row.step.number - 1,
             "element_ids": [names[name] for name in row.new],
-            "instructions": [],
+            "instructions": [_text(robot, *said) for robot, said in grips.items()],
             "is_built": False,
             "is_planned": True,
             "elements_held": sorted({names[brick] for _, brick in row.holds.values()}),
             "actor": "ROBOT",
         }
-        rows.append(_typed("compas_timber.planning/Step", data))
-    return json.dumps(_typed("compas_timber.planning/BuildingPlan", {"steps": rows})) + "\n"
+        said = ", ".join(_told(row, names, before))
+        rows.append(typed("compas_timber.planning/Step", data, name=said))
+        before = row.holds
+    return json.dumps(typed("compas_timber.planning/BuildingPlan", {"steps": rows})) + "\n"
 
 
-def _typed(name: str, data: object) -> _Document:
-    """Return data as COMPAS stores a value of a type."""
-    return {"dtype": name, "data": data}
+_Holds = dict[str, tuple[int, int]]
+
+
+def _told(row: StepStates, names: Mapping[int, str], before: _Holds) -> Iterator[str]:
+    """Yield what robots do in a step, in words, whose grips it changes."""
+    for robot, (node, brick) in row.holds.items():
+        if before.get(robot) != (node, brick):
+            does = "places" if brick in row.new else "takes"
+            yield f"{robot} {does} {names[brick]}"
+    for robot, (_, brick) in before.items():
+        if robot not in row.holds:
+            yield f"{robot} lets go of {names[brick]}"
+
+
+def _text(robot: str, said: str, held: Held) -> Document:
+    """Return what a robot holds as an instruction: text where its tool is."""
+    data = {"id": robot, "location": compas_frame(held.grip), "text": said, "size": held.depth}
+    return typed("compas_timber.planning/Text3d", data)
 
 
 def compas_assembly(scene: Scene, steps: Sequence[Step], source: Source | None = None) -> str:
@@ -120,15 +141,17 @@ def compas_assembly(scene: Scene, steps: Sequence[Step], source: Source | None =
             nodes[name]["held"].append([number, robot, node])
         holds = {robot: list(held) for robot, held in row.holds.items()}
         plan.append({"step": number, "type": kind_of, "placed": list(row.new), "holds": holds})
+    keys = {name: names[name] if kept is not None else str(name) for name in nodes}
+    carry(graph, keys, scene, "m" if kept is None else None)
     return json.dumps(whole) + "\n"
 
 
-def _assembly(scene: Scene) -> _Document:
+def _assembly(scene: Scene) -> Document:
     """Return the blocks of a scene and the faces between them as an assembly.
 
     Faces on the ground make a support of their own, a surface: a block that is not closed.
     """
-    nodes: dict[str, _Document] = {
+    nodes: dict[str, Document] = {
         str(brick.name): {"block": _block(*vertices_of(brick))} for brick in scene.bricks
     }
     faces = [(joint.bricks, joint.corners) for joint in scene.joints]
@@ -146,7 +169,7 @@ def _assembly(scene: Scene) -> _Document:
         if corners is not None:
             edge = edges[str(a)].setdefault(str(b), {"interfaces": []})
             points = {"points": [list(corner) for corner in corners]}
-            edge["interfaces"].append(_typed("compas_assembly.datastructures/Interface", points))
+            edge["interfaces"].append(typed("compas_assembly.datastructures/Interface", points))
     graph = {
         "attributes": {"name": scene.name},
         "default_node_attributes": {"block": None, "is_support": False},
@@ -157,23 +180,10 @@ def _assembly(scene: Scene) -> _Document:
     }
     data = {
         "attributes": {"name": scene.name},
-        "graph": _typed("compas.datastructures/Graph", graph),
+        "graph": typed("compas.datastructures/Graph", graph),
     }
-    return _typed("compas_assembly.datastructures/Assembly", data)
+    return typed("compas_assembly.datastructures/Assembly", data)
 
 
-def _block(points: Floats, faces: Sequence[Iterable[int]]) -> _Document:
-    rows = points.tolist()
-    mesh = {
-        "attributes": {},
-        "default_vertex_attributes": {"x": 0.0, "y": 0.0, "z": 0.0},
-        "default_edge_attributes": {},
-        "default_face_attributes": {},
-        "vertex": {str(i): dict(zip("xyz", row, strict=True)) for i, row in enumerate(rows)},
-        "face": {str(i): list(face) for i, face in enumerate(faces)},
-        "facedata": {},
-        "edgedata": {},
-        "max_vertex": len(rows) - 1,
-        "max_face": len(faces) - 1,
-    }
-    return _typed("compas_assembly.datastructures/Block", mesh)
+def _block(points: Floats, faces: Sequence[Iterable[int]]) -> Document:
+    return typed("compas_assembly.datastructures/Block", mesh_data(points, faces))

@@ -1,0 +1,181 @@
+"""Robots as they are drawn: a simple arm from a base to its grip, where only a reach is known.
+
+An arm is a line of points, m: its foot, its joints, its wrist, and the tip of its tool. A robot
+that may be anywhere has no base: of it there is a tool while it holds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.errors import ProblemError
+from seqopt.scene.boxes import vertices_of
+from seqopt.scene.parts import Robot, Side, Sphere
+from seqopt.scene.scene import Scene
+from seqopt.sequence.exports import hold
+from seqopt.sequence.steps import Step
+
+ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#b85c00", "#444444", "#1f5fa8")
+_BESIDE = 0.3  # of a base from the structure, over the size of that
+_APART = 0.35  # of bases on one side from each other, likewise
+_HIGH = 0.12  # of a shoulder above its foot, over the reach
+_SPARE = 1.02  # by which two links are longer than what they must span
+_LONGEST = 0.4  # of a link, over the size of the structure
+_TOOL = 0.5  # of a tool outside of a brick, over the longest side of the brick
+_FOLDED = ((0.75, -0.45), (0.35, 0.1), (0.2, 0.1))  # elbow, wrist, tip: up and ahead, over a link
+
+Arms = Mapping[str, Sequence[Floats | None]]
+"""Points of arms, (k, 3), m, by the names of robots: an entry for every step."""
+
+
+class Cell:
+    """Where the robots of a scene stand, and how they hold nodes."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.up = np.array(scene.up)
+        self.corners = np.vstack([vertices_of(brick)[0] for brick in scene.bricks])
+        self._found: dict[tuple[str, int | None], Floats | None] = {}
+
+    @cached_property
+    def level(self) -> float:
+        """Height of the ground, m: that of the lowest corner of a brick."""
+        return float((self.corners @ self.up).min())
+
+    @cached_property
+    def size(self) -> float:
+        """The longest diagonal of the structure, m."""
+        return float(np.linalg.norm(np.ptp(self.corners, axis=0)))
+
+    @cached_property
+    def middle(self) -> Floats:
+        """The middle of the structure, on the ground, (3,), m."""
+        return self._on_ground(0.5 * (self.corners.min(axis=0) + self.corners.max(axis=0)))
+
+    @cached_property
+    def stands(self) -> Floats:
+        """Where robots stand: their feet and shoulders, (k, 3), m."""
+        points = [p for at, _ in self.shoulders.values() for p in (self._on_ground(at), at)]
+        return np.array(points).reshape(-1, 3)
+
+    @cached_property
+    def yard(self) -> Floats:
+        """Corners of a level rectangle (4, 3) around the structure and the feet of robots, m."""
+        first = self._away(np.eye(3)[int(np.abs(self.up).argmin())])
+        sides = np.stack([first, np.cross(self.up, first)])
+        flat = (np.vstack([self.corners, self.stands]) - self.middle) @ sides.T
+        room = 0.1 * self.size
+        (left, near), (right, far) = flat.min(axis=0) - room, flat.max(axis=0) + room
+        around = np.array([(left, near), (right, near), (right, far), (left, far)])
+        return np.asarray(self.middle + around @ sides)
+
+    @cached_property
+    def shoulders(self) -> dict[str, tuple[Floats, float]]:
+        """The shoulder (3,) and the reach, m, of every robot that has a base."""
+        out, beside = dict[str, tuple[Floats, float]](), list[tuple[Robot, Floats]]()
+        for robot in self.scene.robots:
+            reach = robot.reach
+            if isinstance(reach, Sphere):
+                out[robot.name] = (np.array(reach.center), reach.radius)
+            elif isinstance(reach, Side):
+                beside.append((robot, self._away(np.array(reach.toward))))
+        for robot, away in beside:
+            same = [each.name for each, other in beside if away @ other > 0.5]
+            place = same.index(robot.name) - 0.5 * (len(same) - 1)
+            foot = self._beside(away) + _APART * self.size * place * np.cross(self.up, away)
+            far = float(np.linalg.norm(self.corners - foot, axis=1).max())
+            out[robot.name] = (foot + _HIGH * far * self.up, far)
+        return out
+
+    def arm(self, robot: Robot, node: int | None) -> Floats | None:
+        """Return the points of a robot's arm that holds a node, or of one that is idle.
+
+        None if there is nothing to draw.
+        """
+        key = (robot.name, node)
+        if key not in self._found:
+            self._found[key] = self._idle(robot) if node is None else self._holding(robot, node)
+        return self._found[key]
+
+    def _on_ground(self, point: Floats) -> Floats:
+        return np.asarray(point - (point @ self.up - self.level) * self.up)
+
+    def _away(self, toward: Floats) -> Floats:
+        """Return the level direction to a side, (3,); any level one where a side is above."""
+        flat = toward - (toward @ self.up) * self.up
+        if np.linalg.norm(flat) < 1e-6:
+            flat = np.cross(self.up, np.eye(3)[int(np.abs(self.up).argmin())])
+        return np.asarray(flat / np.linalg.norm(flat))
+
+    def _beside(self, away: Floats) -> Floats:
+        """Return the place on the ground before the middle of the structure on a side, (3,), m."""
+        far = float(((self.corners - self.middle) @ away).max())
+        return np.asarray(self.middle + (far + _BESIDE * self.size) * away)
+
+    def _holding(self, robot: Robot, node: int) -> Floats:
+        """Return the points of an arm whose tool comes as that of a task does, elbow up."""
+        held, brick = hold(self.scene, robot, node), self.scene.brick_of_node[node]
+        tip = np.array(held.grip.point)
+        wrist = tip - (held.depth + _TOOL * max(brick.dimensions)) * held.grip.axes[2]
+        if robot.name not in self.shoulders:
+            return np.array([wrist, tip])
+        shoulder, reach = self.shoulders[robot.name]
+        span = wrist - shoulder
+        link = _SPARE * max(self._link(reach), 0.5 * float(np.linalg.norm(span)))
+        rise = np.sqrt(max(link**2 - 0.25 * float(span @ span), 0.0))
+        elbow = shoulder + 0.5 * span + rise * self._across(span)
+        return np.array([self._on_ground(shoulder), shoulder, elbow, wrist, tip])
+
+    def _link(self, reach: float) -> float:
+        """Return the length of both links, m: those of long arms are drawn short."""
+        return min(0.5 * reach, _LONGEST * self.size)
+
+    def _across(self, span: Floats) -> Floats:
+        """Return the unit vector square to a line that points up most, (3,)."""
+        size = float(np.linalg.norm(span))
+        along = span / size if size > 0 else self.up
+        flat = self.up - (self.up @ along) * along
+        if np.linalg.norm(flat) < 1e-6:
+            return self._away(along)
+        return np.asarray(flat / np.linalg.norm(flat))
+
+    def _idle(self, robot: Robot) -> Floats | None:
+        """Return the points of an arm that is folded over its base."""
+        if robot.name not in self.shoulders:
+            return None
+        shoulder, reach = self.shoulders[robot.name]
+        ahead = self._away(self.middle - shoulder)
+        bent = [shoulder + self._link(reach) * (up * self.up + on * ahead) for up, on in _FOLDED]
+        return np.array([self._on_ground(shoulder), shoulder, *bent])
+
+
+def arm_data(scene: Scene, steps: Sequence[Step], given: Arms) -> dict[str, object]:
+    """Return the arms of robots in every step, ready for JSON.
+
+    ``lines`` are points, each line once; ``at`` has a row for every step with the place of each
+    robot's among them, or -1.
+    """
+    known = {robot.name for robot in scene.robots}
+    for name, own in given.items():
+        if name not in known or len(own) != len(steps):
+            raise ProblemError(
+                f"arms of {name}: {len(own)} for {len(steps)} steps; give one a step, "
+                f"by the name of a robot: {', '.join(sorted(known))}"
+            )
+    cell, places = Cell(scene), dict[str, int]()
+    lines, at = list[object](), list[list[int]]()
+    for s, step in enumerate(steps):
+        row = []
+        for robot, node in zip(scene.robots, step.grips, strict=True):
+            points = given[robot.name][s] if robot.name in given else cell.arm(robot, node)
+            line = None if points is None else np.asarray(points).round(4).tolist()
+            if line is not None and (key := str(line)) not in places:
+                places[key] = len(lines)
+                lines.append(line)
+            row.append(-1 if line is None else places[str(line)])
+        at.append(row)
+    return {"lines": lines, "at": at}

@@ -1,0 +1,155 @@
+"""A scene inside an assembly: written into its graph, and read again while the blocks are its own.
+
+Every part stands where COMPAS has it: a brick and its ground ends on its node, joints on the edge
+between two nodes, robots and all else on the graph. Who deletes a block there deletes its joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.errors import SceneError
+from seqopt.scene.boxes import vertices_of
+from seqopt.scene.imports._content import (
+    Carried,
+    Content,
+    Entry,
+    Given,
+    entry,
+    listing,
+    mapping,
+    number,
+)
+from seqopt.scene.imports._meshes import Repaired
+from seqopt.scene.library.common import mobile_robots
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import scene_from_document, scene_to_dict
+from seqopt.scene.shape import Polyhedron
+
+_HELD = ("bricks", "joints", "grounds")  # what stands on nodes and edges
+_KEY = "seqopt"  # of the rest, among the attributes of the graph
+_SAME = 1e-9  # by how much rounding may move a corner, over the size of the block and its distance
+
+
+def carry(graph: Entry, keys: Mapping[int, str], scene: Scene, unit: str | None) -> None:
+    """Write a scene into a graph whose nodes have the given keys by the names of bricks.
+
+    ``order`` of nodes is expected there. ``unit``: of the graph's lengths, where it is known.
+    """
+    document = scene_to_dict(scene)
+    held = {kind: [*enumerate(document.pop(kind))] for kind in _HELD}
+    del document["build_order"]
+    nodes, edges = graph["node"], graph.setdefault("edge", {})
+    for left in (*nodes.values(), *(e for ends in edges.values() for e in ends.values())):
+        for name in ("brick", "grounds", "joints"):  # of a scene that it carried before
+            (left or {}).pop(name, None)
+    for place, brick in held["bricks"]:
+        nodes[keys[brick["name"]]] |= {"brick": {"place": place, **brick}, "grounds": []}
+    for place, ground in held["grounds"]:
+        nodes[keys[ground["brick"]]]["grounds"].append({"place": place, **ground})
+    for place, joint in held["joints"]:
+        a, b = (keys[name] for name in joint["bricks"])
+        ends = edges.setdefault(b if a in edges.get(b, {}) else a, {})
+        edge = ends[a if a in ends else b] = ends.get(a if a in ends else b) or {}
+        edge.setdefault("joints", []).append({"place": place, **joint})
+    graph.setdefault("attributes", {})[_KEY] = {"unit": unit, "scene": document}
+
+
+def carried(graph: Entry, source: str) -> Carried | None:
+    """Return the scene that a graph carries; None if it carries none."""
+    own = (graph.get("attributes") or {}).get(_KEY)
+    if own is None:
+        return None
+    where = f"{source}: {_KEY}"
+    document = {**mapping(where, entry(where, own, "scene"))}
+    nodes: dict[str, Entry] = {
+        key: node for key, node in graph["node"].items() if (node or {}).get("brick") is not None
+    }
+    edges = [e or {} for ends in (graph.get("edge") or {}).values() for e in ends.values()]
+    parts = {
+        "bricks": [node["brick"] for node in nodes.values()],
+        "grounds": _gathered(where, [*nodes.values()], "grounds"),
+        "joints": _gathered(where, edges, "joints"),
+    }
+    for kind, found in parts.items():
+        document[kind] = _sorted(f"{where}: {kind}", found)
+    names = {key: entry(f"{where}: brick", node["brick"], "name") for key, node in nodes.items()}
+    turns = sorted((entry(where, node, "order"), names[key]) for key, node in nodes.items())
+    document["build_order"] = [name for _, name in turns]
+    return Carried(document, names, own.get("unit"))
+
+
+def own_density(where: str, node: Entry) -> float | None:
+    """Return the density of the brick on a node, kg/m³, if it has one."""
+    value = (node.get("brick") or {}).get("density")
+    return None if value is None else number(f"{where}: density", value)
+
+
+def _gathered(where: str, holders: Sequence[Entry], name: str) -> list[Any]:
+    """Return what stands in lists of the same name on nodes or edges."""
+    return [part for held in holders for part in listing(where, held.get(name) or [])]
+
+
+def _sorted(where: str, found: Sequence[Any]) -> list[Entry]:
+    """Return parts in the order that they had in their scene."""
+    parts = sorted(found, key=lambda part: float(entry(where, part, "place")))
+    return [{key: value for key, value in part.items() if key != "place"} for part in parts]
+
+
+def own_scene(
+    content: Content, given: Given, blocks: Sequence[Repaired], said: list[str]
+) -> Scene | None:
+    """Return the scene that a file carries, if its blocks are still those of its bricks.
+
+    ``content``: in m, with z up; ``said``: gets why it is not used.
+    """
+    own = content.own
+    if own is None or given.detect or any((given.supports, given.law, given.gap)):
+        return None
+    try:
+        scene = scene_from_document(own.document, "it carries")
+        changed = _changed(scene, content, blocks, own.bricks)
+    except SceneError as error:
+        said.append(f"it carries a scene that is not used, {error}")
+        return None
+    if changed:
+        said.append(
+            f"it carries a scene that is not used: block {changed} is not as that has it; joints, "
+            "robots and nodes are made anew"
+        )
+        return None
+    more: dict[str, Any] = {} if given.name is None else {"name": given.name}
+    if given.robots is not None:
+        more["robots"] = mobile_robots(scene.bricks, given.robots)
+    return replace(scene, **more)
+
+
+def _changed(
+    scene: Scene, content: Content, blocks: Sequence[Repaired], names: Mapping[str, int]
+) -> str | None:
+    """Return the key of the first block that is not where the scene has its brick."""
+    bricks = {brick.name: brick for brick in scene.bricks}
+    for held, block in zip(content.blocks, blocks, strict=True):
+        name = names.get(held.key)
+        if name is None and held.support:
+            continue
+        solid = block.solid
+        if name is None or not isinstance(solid, Polyhedron):
+            return held.key
+        if not _same_points(solid.points, vertices_of(bricks[name])[0]):
+            return held.key
+    return None
+
+
+def _same_points(some: Floats, others: Floats) -> bool:
+    """Return whether two sets of points (n, 3) are the same but for their order and rounding."""
+    from scipy.spatial import KDTree  # noqa: PLC0415  # for files only
+
+    near = _SAME * float(np.abs(others).max() + np.ptp(others, axis=0).max())
+    pairs = ((some, others), (others, some))
+    return all(bool(np.max(KDTree(a).query(b)[0]) <= near) for a, b in pairs)

@@ -1,0 +1,165 @@
+"""Where and how a tool holds a brick: a frame at the node that looks in through a free face.
+
+The scene says where robots hold, not how a gripper is turned. This follows from the brick: a tool
+comes square to a face from which the node is seen, that touches no other brick, and that looks to
+the robot, or up where the robot may be anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from seqopt.arrays import Floats, Vector
+from seqopt.scene.boxes import as_vector, vertices_of
+from seqopt.scene.parts import Brick, Ground, Joint, Robot, Side, Sphere
+from seqopt.scene.scene import Scene
+from seqopt.scene.shape import fans, normal_of
+
+_SQUARE = 0.9  # cosine from which on a joint lies on a face
+_NEVER, _LATER = 4.0, 2.0  # what a face costs that a joint lies on, now or once more bricks stand
+_UP = 0.1  # what looking up is worth beside looking to the robot
+_EDGE = 1e-6  # how far beside a face its edge is, over the size of the brick
+_PARALLEL = 0.95  # cosine from which on an axis of the brick is along the tool
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A right-handed frame as COMPAS has it, m: its third axis is the product of the two."""
+
+    point: Vector
+    xaxis: Vector
+    yaxis: Vector
+
+    @cached_property
+    def axes(self) -> Floats:
+        """Its axes as rows, (3, 3)."""
+        first, second = np.array(self.xaxis), np.array(self.yaxis)
+        return np.stack([first, second, np.cross(first, second)])
+
+    def moved(self, along: Floats, distance: float) -> Frame:
+        """Return the frame shifted along a unit vector (3,) of the scene, m."""
+        return Frame(as_vector(self.point + distance * along), self.xaxis, self.yaxis)
+
+    def inside(self, other: Frame) -> Frame:
+        """Return the frame in the coordinates of another one."""
+        point = other.axes @ (np.array(self.point) - np.array(other.point))
+        first, second = (other.axes @ axis for axis in self.axes[:2])
+        return Frame(as_vector(point), as_vector(first), as_vector(second))
+
+
+@dataclass(frozen=True)
+class Held:
+    """How a robot holds a node."""
+
+    block: Frame  # of the brick: its centroid, its length, its width
+    grip: Frame  # of the tool: its tip at the node, its third axis into the brick
+    depth: float  # of the node behind the face, m
+    away: Vector  # unit vector along which the brick comes free of what stands when it is placed
+
+
+def brick_frame(brick: Brick) -> Frame:
+    """Return the frame of a brick, from its centroid along length and width."""
+    return Frame(brick.position, brick.length_axis, brick.width_axis)
+
+
+def hold(scene: Scene, robot: Robot, node: int) -> Held:
+    """Return how a robot holds one of the scene's nodes."""
+    brick = scene.brick_of_node[node]
+    at = np.array(brick.node_position(node))
+    normals, depths = _faces_seen(brick, at)
+    now, later = _covers(scene, brick)
+    score = normals @ (_wanted(scene, robot, at) + _UP * np.array(scene.up))
+    score -= _NEVER * _covered(normals, now) + _LATER * _covered(normals, later)
+    best = int(score.argmax())
+    grip = _tool(brick, as_vector(at), normals[best])
+    away = _way_out(now, np.vstack([normals[best], scene.up, normals]))
+    return Held(brick_frame(brick), grip, float(depths[best]), as_vector(away))
+
+
+def _faces_seen(brick: Brick, at: Floats) -> tuple[Floats, Floats]:
+    """Return the outward normals of faces that a point sees squarely, and how deep it is, m.
+
+    Of all faces in front of it, where it sees none so.
+    """
+    points, faces = vertices_of(brick)
+    size = float(np.ptp(points, axis=0).max())
+    seen, ahead = [], []
+    for face in faces:
+        corners = points[list(face)]
+        normal = normal_of(corners)
+        normal = normal / np.linalg.norm(normal)
+        depth = float((corners[0] - at) @ normal)
+        ahead.append((normal, depth))
+        if depth > 0 and _within(points, face, at, normal, _EDGE * size):
+            seen.append((normal, depth))
+    found = seen or [pair for pair in ahead if pair[1] > 0] or ahead
+    return np.array([normal for normal, _ in found]), np.array([depth for _, depth in found])
+
+
+def _within(points: Floats, face: Sequence[int], at: Floats, normal: Floats, slack: float) -> bool:
+    """Return whether a point lies before a face, whose fan of triangles may have signs."""
+    count = 0
+    for corners in points[fans([face])]:
+        edges = np.roll(corners, -1, axis=0) - corners
+        sign = float(np.sign(normal_of(corners) @ normal))
+        lengths = np.maximum(np.linalg.norm(edges, axis=1), slack)
+        inward = sign * (np.cross(edges, at - corners) @ normal) / lengths
+        count += int(sign) * bool((inward >= -slack).all())
+    return count > 0
+
+
+def _covers(scene: Scene, brick: Brick) -> tuple[Floats, Floats]:
+    """Return the outward normals (k, 3) of a brick's joints with what stands when it is placed.
+
+    Then those of its joints with bricks that come later.
+    """
+    since, sides = scene.since, {True: list[Floats](), False: list[Floats]()}
+    springs: list[Joint | Ground] = [s for s in scene.joints if brick.name in s.bricks]
+    springs += [end for end in scene.grounds if end.brick == brick.name]
+    for spring in springs:
+        along = np.array(spring.along)
+        out = (np.array(spring.position) - np.array(brick.position)) @ along >= 0
+        stands = all(since[end] <= since[brick.name] for end in spring.ends)
+        sides[stands].append(along if out else -along)
+    now, later = (np.array(sides[key]).reshape(-1, 3) for key in (True, False))
+    return now, later
+
+
+def _wanted(scene: Scene, robot: Robot, at: Floats) -> Floats:
+    """Return the unit vector from a point to a robot; up where it may be anywhere."""
+    reach = robot.reach
+    toward = np.array(scene.up)
+    if isinstance(reach, Side):
+        toward = np.array(reach.toward)
+    if isinstance(reach, Sphere) and reach.center != tuple(at):
+        toward = np.array(reach.center) - at
+    return np.asarray(toward / np.linalg.norm(toward))
+
+
+def _covered(normals: Floats, joints: Floats) -> Floats:
+    """Return 1 for faces with normals (n, 3) that a joint lies on, else 0, (n,)."""
+    return np.asarray((normals @ joints.T > _SQUARE).any(axis=1).astype(float))
+
+
+def _tool(brick: Brick, at: Vector, normal: Floats) -> Frame:
+    """Return the frame of a tool that comes square to a face, its first axis along the brick."""
+    along = next(axis for axis in brick.frame if abs(axis @ normal) < _PARALLEL)
+    first = along - (along @ normal) * normal
+    first /= np.linalg.norm(first)
+    return Frame(at, as_vector(first), as_vector(np.cross(-normal, first)))
+
+
+def _way_out(joints: Floats, others: Floats) -> Floats:
+    """Return the unit vector that leads away most from joints whose outward normals are given.
+
+    ``others``: directions to try beside the mean of all, (k, 3), the first of equals.
+    """
+    total = -joints.sum(axis=0)
+    size = float(np.linalg.norm(total))
+    tried = np.vstack([total / size, others]) if size > 1e-9 else others
+    worst = (-tried @ joints.T).min(axis=1, initial=1.0)
+    return np.asarray(tried[int((worst >= worst.max() - 1e-9).argmax())])

@@ -1,0 +1,161 @@
+"""Tasks and plans opened by those who read them: COMPAS, compas_fab, compas_timber, pandas."""
+
+from __future__ import annotations
+
+import io
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+
+from seqopt._cli.main import main
+from seqopt.network.build import build_network
+from seqopt.scene.imports.formats import import_scene
+from seqopt.sequence.exports._tasks import FRAMES, Action, plan_tasks
+from seqopt.sequence.exports.formats import export_plan
+from seqopt.sequence.two_robots import METHODS
+from tests.builders import ROOT, six_bricks
+
+compas = pytest.importorskip("compas")
+SCENE = six_bricks()
+STEPS = METHODS["cantilever"](build_network(SCENE), ())
+TASKS = [*plan_tasks(SCENE, STEPS)]
+POSTURES = {("rob1", task.node): (0.1, 0.2, 0.3) for task in TASKS if task.robot == "rob1"}
+
+
+def opened(form, **more):
+    return compas.json_loads(export_plan(SCENE, STEPS, form, **more))
+
+
+def same(theirs, mine):
+    if mine is None:
+        return theirs is None
+    axes = [theirs.xaxis, theirs.yaxis, theirs.zaxis]
+    return np.allclose(theirs.point, mine.point, atol=1e-8) and np.allclose(
+        axes, mine.axes, atol=1e-8
+    )
+
+
+def test_compas_has_frames_and_meshes():
+    from compas.geometry import Frame, Transformation  # noqa: PLC0415
+
+    found = opened("tasks")
+    assert len(found["tasks"]) == len(TASKS)
+    for theirs, mine in zip(found["tasks"], TASKS, strict=True):
+        assert all(same(theirs[name], getattr(mine, name)) for name in FRAMES)
+        assert (theirs["action"], theirs["robot"]) == (mine.action.value, mine.robot)
+        if mine.block_frame is not None:  # their own way from the block to the world
+            world = Transformation.from_frame(theirs["block_frame"])
+            there = Frame.from_transformation(
+                world * Transformation.from_frame(theirs["grip_in_block"])
+            )
+            assert same(there, mine.grip)
+    for block, brick in zip(found["blocks"], SCENE.placed, strict=True):
+        assert block["shape"].volume() * brick.density == pytest.approx(block["mass"])
+        assert list(block["shape"].centroid()) == pytest.approx(list(block["frame"].point))
+    assert not same(found["tasks"][1]["grip"], TASKS[1].block_frame)  # the control
+
+
+def test_pandas_has_a_row_for_every_task():
+    table = pd.read_csv(io.StringIO(export_plan(SCENE, STEPS, "tasks_csv", postures=POSTURES)))
+    assert [*table["action"]] == [task.action.value for task in TASKS]
+    assert table["joint_3"].notna().sum() == sum(
+        t.robot == "rob1" and t.grip is not None for t in TASKS
+    )
+    for name in FRAMES:
+        known = [getattr(task, name) for task in TASKS]
+        rows = table[
+            [f"{name}_{end}" for end in ("x", "y", "z", "qx", "qy", "qz", "qw")]
+        ].to_numpy()
+        for row, frame in zip(rows, known, strict=True):
+            assert np.isnan(row).all() == (frame is None)
+            if frame is not None:
+                np.testing.assert_allclose(row[:3], frame.point, atol=1e-8)
+                turned = Rotation.from_quat(row[3:]).as_matrix().T
+                np.testing.assert_allclose(turned, frame.axes, atol=1e-7)
+
+
+def test_compas_timber_names_who_acts_and_who_holds_where():
+    planning = pytest.importorskip("compas_timber.planning")
+    plan = opened("compas_timber")
+    assert isinstance(plan, planning.BuildingPlan)
+    assert len(plan) == len(STEPS)
+    for step, mine in zip(plan, STEPS, strict=True):
+        changed = [
+            task for task in TASKS if task.step == mine.number and task.action is not Action.HOLD
+        ]
+        assert all(task.robot in step.name for task in changed)
+        holds = {
+            (robot.name, node)
+            for robot, node in zip(SCENE.robots, mine.grips, strict=True)
+            if node is not None
+        }
+        assert {(text.id, int(text.text.split()[-1])) for text in step.instructions} == holds
+        for text in step.instructions:
+            mine_too = next(
+                t
+                for t in TASKS
+                if t.robot == text.id and str(t.node) == text.text.split()[-1] and t.grip
+            )
+            assert same(text.location, mine_too.grip)
+        assert step.actor == "ROBOT"
+        step.transform(compas.geometry.Translation.from_vector([1.0, 0.0, 0.0]))
+    again = compas.json_loads(compas.json_dumps(plan))
+    assert [step.name for step in again] == [step.name for step in plan]
+
+
+def test_compas_fab_has_a_cell_states_and_targets():
+    robots = pytest.importorskip("compas_fab.robots")
+    found = opened("compas_fab", postures=POSTURES)
+    cell, states = found["cell"], found["states"]
+    assert isinstance(cell, robots.RobotCell)
+    assert {*cell.rigid_body_models} == {*states} == {f"block_{n}" for n in SCENE.build_order}
+    for task, mine in zip(found["tasks"], TASKS, strict=True):
+        for name in ("approach", "grip", "retreat"):
+            target = task[name]
+            assert (target is None) == (getattr(mine, name) is None)
+            if target is not None:
+                assert isinstance(target, robots.FrameTarget)
+                assert target.target_mode is robots.TargetMode.TOOL
+                assert same(target.target_frame, getattr(mine, name))
+        has = mine.robot == "rob1" and mine.grip is not None
+        assert (task["posture"] is not None) == has
+        if has:
+            assert task["posture"].target_configuration.joint_values == [0.1, 0.2, 0.3]
+        if mine.grip is not None:  # a block that hangs from the tool is where it is built
+            held = compas.geometry.Transformation.from_frame(task["grip"].target_frame)
+            hung = held * compas.geometry.Transformation.from_frame(task["attachment"])
+            assert same(compas.geometry.Frame.from_transformation(hung), mine.block_frame)
+    for brick in SCENE.bricks:
+        body = cell.rigid_body_models[f"block_{brick.name}"].collision_meshes[0]
+        assert np.allclose(body.centroid(), 0.0, atol=1e-9)
+
+
+def test_compas_opens_an_assembly_writes_it_again_and_it_is_the_scene(tmp_path):
+    """Its own datastructures carry joints, ground ends, robots and order."""
+    theirs = opened("compas_assembly")
+    path = tmp_path / "again.json"
+    compas.json_dump(theirs, path)
+    assert import_scene(path) == SCENE
+    theirs.graph.delete_node(6)
+    compas.json_dump(theirs, path)
+    shorter = import_scene(path)
+    assert shorter.build_order == SCENE.build_order[:-1]
+    assert shorter.joints == SCENE.joints[:-1]
+
+
+@pytest.mark.slow
+def test_the_page_for_compas_fab_runs_and_prints_what_it_says(tmp_path, monkeypatch, capsys):
+    """Its own inverse kinematics takes our targets."""
+    pytest.importorskip("compas_fab")
+    page = (ROOT / "docs/guides/driving.md").read_text("utf-8")
+    code, said = re.search(r"```py\n(.*?)```\n\n```text\n(.*?)```", page, re.DOTALL).groups()
+    monkeypatch.chdir(tmp_path)
+    words = "optimize arch25 --schedule free --aim minmax --out best"
+    assert main(words.split()) == 0
+    assert main(["export", "best", "--format", "compas_fab", "--out", "best_fab.json"]) == 0
+    capsys.readouterr()
+    exec(compile(code, "page", "exec"), {})
+    assert capsys.readouterr().out == said

@@ -1,0 +1,136 @@
+"""Robots that are drawn: arms end where they hold, and stand where their reach says."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+from experiments.harness.scenes import running_bond
+from seqopt.engines.registry import make_engine
+from seqopt.errors import ProblemError
+from seqopt.network.build import build_network
+from seqopt.report._pictures import steps_picture
+from seqopt.report._robots import Cell, arm_data
+from seqopt.report.page import Build, report_page
+from seqopt.responses.table import analyze
+from seqopt.scene.parts import Robot, Side, Sphere
+from seqopt.sequence.exports import export_plan
+from seqopt.sequence.two_robots import sequential
+from tests.browser import BROWSER, browsed
+from tests.strategies import builds
+
+FRONT, BACK = (Side(toward=(0.0, y, 0.0), point=(0.0, -9.0 * y, 0.0)) for y in (-1.0, 1.0))
+ROBOTS = (
+    Robot(name="left", payload=5000.0, reach=Sphere(center=(-0.3, -0.5, 0.4), radius=2.0)),
+    Robot(name="front", payload=5000.0, reach=FRONT),
+    Robot(name="mobile", payload=5000.0),
+)
+SCENE = replace(running_bond(4, 3), robots=ROBOTS)
+STEPS = sequential(build_network(SCENE))
+
+
+@settings(max_examples=30)
+@given(scene=builds())
+def test_an_arm_leads_from_the_ground_to_the_node(scene):
+    cell, up = Cell(scene), np.array(scene.up)
+    for robot in scene.robots:
+        for node in scene.bricks[0].nodes:
+            points = cell.arm(robot, node)
+            np.testing.assert_allclose(points[-1], scene.node_position(node))
+            if robot.name in cell.shoulders:
+                foot, shoulder, elbow, wrist, _ = points
+                assert foot @ up == pytest.approx(cell.level)
+                np.testing.assert_allclose(shoulder, cell.shoulders[robot.name][0])
+                links = [np.linalg.norm(elbow - shoulder), np.linalg.norm(wrist - elbow)]
+                assert links[0] == pytest.approx(links[1], rel=1e-6)
+                assert elbow @ up >= min(shoulder @ up, wrist @ up) - 1e-9  # it hangs never through
+        idle = cell.arm(robot, None)
+        assert (idle is None) == (robot.name not in cell.shoulders)
+    assert (cell.corners @ up).min() == pytest.approx(cell.level)
+
+
+def test_bases_are_where_reaches_say():
+    sides = [
+        Robot(name=f"r{i}", payload=1.0, reach=reach)
+        for i, reach in enumerate((FRONT, FRONT, BACK))
+    ]
+    cell = Cell(replace(SCENE, robots=(*sides, *ROBOTS)))
+    low, high = cell.corners.min(axis=0), cell.corners.max(axis=0)
+    feet = {name: at for name, (at, _) in cell.shoulders.items()}
+    assert feet["r0"][1] < low[1]
+    assert feet["r2"][1] > high[1]
+    assert np.linalg.norm(feet["r0"] - feet["r1"]) > 0.1 * cell.size
+    np.testing.assert_allclose(feet["left"], ROBOTS[0].reach.center)
+    assert "mobile" not in feet
+
+
+def test_postures_that_are_known_are_drawn_as_they_are():
+    own = np.arange(12.0).reshape(4, 3)
+    lines = [None, *[own] * (len(STEPS) - 1)]
+    data = arm_data(SCENE, STEPS, {"front": lines})
+    drawn = [data["at"][s][1] for s in range(len(STEPS))]
+    assert drawn[0] == -1
+    assert [data["lines"][i] for i in drawn[1:]] == [own.tolist()] * (len(STEPS) - 1)
+    assert data["at"][0][0] >= 0  # of another robot a sketch
+    for wrong in ({"nobody": lines}, {"front": lines[1:]}):
+        with pytest.raises(
+            ProblemError, match="give one a step, by the name of a robot: front, left"
+        ):
+            arm_data(SCENE, STEPS, wrong)
+
+
+@pytest.fixture(scope="module")
+def text():
+    engine = make_engine("compliance", build_network(SCENE))
+    return report_page(engine, [Build("sequential", STEPS, analyze(engine, STEPS))], "A wall.")
+
+
+def test_a_page_has_arms_and_tasks(text):
+    data = json.loads(re.search(r'<script id="data"[^>]*>(.*?)</script>', text, re.S)[1])
+    (build,) = data["builds"]
+    for step, row in zip(STEPS, build["arms"]["at"], strict=True):
+        for node, place in zip(step.grips, row, strict=True):
+            if node is not None:
+                tip = build["arms"]["lines"][place][-1]
+                assert tip == pytest.approx(SCENE.node_position(node), abs=1e-4)
+    kept = gzip.decompress(base64.b64decode(build["tasks"])).decode()
+    assert kept == export_plan(SCENE, STEPS, "tasks_csv")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
+def test_a_browser_names_the_robots_that_it_draws(text, tmp_path):
+    (path := tmp_path / "report.html").write_text(text, "utf-8")
+    seen = {}
+    for state in ("step=5", "step=5&robots=off"):
+        page, said = browsed(tmp_path, f"file://{path}#{state}")
+        if 'data-ready="true"' not in page:
+            pytest.skip("Chromium does not run here")
+        assert not [line for line in said.splitlines() if "CONSOLE" in line and "rror" in line]
+        names = re.findall(r'<span class="robot"([^>]*)>(\w+)</span>', page)
+        seen[state] = [name for attributes, name in names if "hidden" not in attributes]
+        assert re.search('<button id="download"[^>]*hidden', page) is None
+    held = [r.name for r, node in zip(ROBOTS, STEPS[4].grips, strict=True) if node is not None]
+    assert seen == {
+        "step=5": ["left", "front", *(["mobile"] if "mobile" in held else [])],
+        "step=5&robots=off": [],
+    }
+
+
+def test_figures_draw_the_ground_and_every_arm():
+    engine = make_engine("compliance", build_network(SCENE))
+    (axes,) = steps_picture(engine, STEPS, 5).axes
+    arms = sum(
+        Cell(SCENE).arm(r, n) is not None for r, n in zip(ROBOTS, STEPS[4].grips, strict=True)
+    )
+    assert arms >= 2
+    assert len(axes.patches) == 1 + 3 * arms  # a line, its rim and its tool
+    (forces,) = steps_picture(engine, STEPS, 5, forces=True).axes
+    assert len(forces.patches) == 0

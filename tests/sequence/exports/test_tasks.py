@@ -1,0 +1,214 @@
+"""Tasks of robots: what each does in every step, and frames that follow from the bricks."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from experiments.harness.scenes import running_bond
+from seqopt.errors import SeqoptError
+from seqopt.network.build import build_network
+from seqopt.scene.boxes import block_brick, vertices_of
+from seqopt.scene.imports.contacts import face_ground, flat_face
+from seqopt.scene.library.common import MASONRY
+from seqopt.scene.parts import Robot, Side, Sphere
+from seqopt.scene.scene import Scene
+from seqopt.sequence.exports._grip_frames import hold
+from seqopt.sequence.exports._tasks import Action, plan_tasks, tasks_csv, tasks_json
+from seqopt.sequence.exports.formats import export_plan
+from seqopt.sequence.steps import Step, StepKind, check_sequence
+from seqopt.sequence.two_robots import METHODS
+from tests.blocks import C_SHAPE, prism
+from tests.builders import six_bricks
+from tests.strategies import builds
+
+SCENE = six_bricks()
+STEPS = METHODS["cantilever"](build_network(SCENE), ())
+TASKS = [*plan_tasks(SCENE, STEPS)]
+WALL = running_bond(2, 1)
+PLACE, RELEASE, REPOSITION = StepKind.PLACE, StepKind.RELEASE, StepKind.REPOSITION
+REGRIPPED = check_sequence(
+    WALL,
+    [
+        Step(1, PLACE, 1, (WALL.bricks[0].nodes[0], None, None)),
+        Step(2, PLACE, 2, (WALL.bricks[0].nodes[0], WALL.bricks[1].nodes[1], None)),
+        Step(3, RELEASE, 2, (None, WALL.bricks[1].nodes[1], None)),
+        Step(4, REPOSITION, 2, (WALL.bricks[0].nodes[1], WALL.bricks[1].nodes[1], None)),
+        Step(5, RELEASE, 2, (None, None, None)),
+    ],
+)
+
+
+def replayed(scene, tasks):
+    """What robots hold and what stands after every step, from the tasks alone."""
+    held, standing, out = {}, [], {}
+    for task in tasks:
+        key = (task.block, task.node)
+        match task.action:
+            case Action.PICK:
+                assert task.robot not in held
+                held[task.robot] = key
+            case Action.PLACE:
+                assert held[task.robot] == key
+                standing.append(task.block)
+            case Action.REPOSITION:
+                assert task.robot not in held
+                assert task.block in standing
+                held[task.robot] = key
+            case Action.HOLD:
+                assert held[task.robot] == key
+            case Action.RELEASE:
+                assert held.pop(task.robot) == key
+        grips = tuple(held.get(robot.name, (None, None))[1] for robot in scene.robots)
+        out[task.step] = (len(standing), grips)
+    return out
+
+
+def test_a_robot_that_does_the_tasks_does_the_plan():
+    for scene, steps in ((SCENE, STEPS), (WALL, REGRIPPED)):
+        tasks = [*plan_tasks(scene, steps)]
+        done = replayed(scene, tasks)
+        assert [done[s.number] for s in steps] == [(s.bricks, s.grips) for s in steps]
+        assert [task.step for task in tasks] == sorted(task.step for task in tasks)
+    assert {task.action for task in tasks} == {*Action}
+    places = Counter(task.block for task in TASKS if task.action is Action.PLACE)
+    assert places == Counter(SCENE.build_order)
+    with pytest.raises(AssertionError):  # the control
+        replayed(SCENE, [task for task in TASKS if task.action is not Action.RELEASE])
+
+
+@settings(max_examples=25)
+@given(scene=builds(), data=st.data())
+def test_frames_follow_from_the_brick(scene, data):
+    """The tip is the node, the tool looks into the brick through one of its faces, square to it."""
+    robot = data.draw(st.sampled_from(scene.robots))
+    brick = data.draw(st.sampled_from(scene.bricks))
+    node = data.draw(st.sampled_from(brick.nodes))
+    held = hold(scene, robot, node)
+    axes = held.grip.axes
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-9)
+    assert np.linalg.det(axes) > 0
+    at = brick.node_position(node)
+    assert held.grip.point == at
+    assert np.abs(brick.frame @ axes[2]).max() == pytest.approx(1.0)  # square to a face of a box
+    entry = brick.frame @ (np.array(at) - held.depth * axes[2] - brick.position)
+    half = 0.5 * np.array(brick.dimensions)
+    assert (np.abs(entry) <= half + 1e-9).all()
+    assert np.abs(np.abs(entry) - half).min() < 1e-9  # on the face
+    inside = held.grip.inside(held.block)
+    back = held.block.point + np.array(inside.point) @ held.block.axes
+    np.testing.assert_allclose(back, at, atol=1e-12)
+    np.testing.assert_allclose(inside.axes @ held.block.axes, axes, atol=1e-12)
+
+
+def outward(scene, robot, node):
+    return -hold(scene, robot, node).grip.axes[2]
+
+
+def test_a_tool_comes_from_its_robot_through_a_face_that_is_free():
+    wall = running_bond(3, 3)
+    middle = wall.bricks[4]
+    front, back = (Side(toward=(0.0, y, 0.0), point=(0.0, -y, 0.0)) for y in (-1.0, 1.0))
+    arm = Sphere(center=(0.3, 2.0, 0.0), radius=3.0)
+    for reach, toward in ((front, -1.0), (back, 1.0), (arm, 1.0)):
+        robot = Robot(name="r", payload=1.0, reach=reach)
+        np.testing.assert_allclose(outward(wall, robot, middle.nodes[0]), (0, toward, 0), atol=1e-9)
+    mobile = Robot(name="r", payload=1.0)
+    assert outward(wall, mobile, middle.nodes[0])[2] == pytest.approx(0.0)  # one lies on it later
+    assert outward(wall, mobile, wall.bricks[-1].nodes[0])[2] == pytest.approx(1.0)  # none ever
+
+
+def test_a_block_that_is_no_box_is_held_through_a_face_before_the_node():
+    shape = prism(C_SHAPE, 0.5)
+    floor = flat_face(np.array([(0, 0, 0), (3, 0, 0), (3, 1, 0), (0, 1, 0)], dtype=float))
+    brick = block_brick(0, shape, 2000.0, grips=((0.5, 1.5, 0.25), (2.0, 0.5, 0.25)))
+    robot = Robot(name="r", payload=1.0, reach=Sphere(center=(2.0, 9.0, 0.25), radius=20.0))
+    ground = face_ground(0, floor, MASONRY)
+    scene = Scene(
+        name="c", bricks=[brick], joints=(), grounds=[ground], build_order=(0,), robots=[robot]
+    )
+    held = hold(scene, robot, brick.nodes[1])
+    np.testing.assert_allclose(-held.grip.axes[2], (0, 1, 0), atol=1e-9)  # into the notch
+    assert held.depth == pytest.approx(0.5)
+
+
+def test_a_brick_is_placed_away_from_all_that_it_touches():
+    """Up on a course, and out of the gap between two for one that closes an arch."""
+    wall, robot = running_bond(3, 2), Robot(name="r", payload=1.0)
+    np.testing.assert_allclose(hold(wall, robot, wall.bricks[0].nodes[0]).away, (0, 0, 1))
+    for scene in (wall, SCENE):
+        for brick in scene.placed:
+            away = np.array(hold(scene, robot, brick.nodes[0]).away)
+            assert np.linalg.norm(away) == pytest.approx(1.0)
+            free = [into @ away for into in stands_on(scene, brick)]
+            assert min(free) > 0
+    assert len(free) == 2  # the last brick closes the arch
+    others = [axis for axis in (*brick.frame, *-brick.frame) if axis @ away < 1 - 1e-9]
+    assert all(min(into @ axis for into in stands_on(SCENE, brick)) < min(free) for axis in others)
+
+
+def stands_on(scene, brick):
+    """Normals into a brick of the joints with what stands when it is placed."""
+    for spring in (*scene.joints, *scene.grounds):
+        earlier = all(scene.since[end] <= scene.since[brick.name] for end in spring.ends)
+        if brick.name in spring.ends and earlier:
+            normal = np.array(spring.along)
+            yield normal * np.sign(normal @ np.subtract(brick.position, spring.position))
+
+
+def test_distance_is_that_given_and_by_default_the_longest_side():
+    for distance in (None, 0.07):
+        for task in plan_tasks(SCENE, STEPS, distance):
+            longest = max(SCENE.brick_of_node[task.node].dimensions)
+            for frame in filter(None, (task.approach, task.retreat)):
+                gone = np.linalg.norm(np.subtract(frame.point, task.grip.point))
+                assert gone == pytest.approx(longest if distance is None else distance)
+                assert frame.xaxis == task.grip.xaxis
+            has = (task.approach is not None, task.retreat is not None)
+            comes = task.action in (Action.PLACE, Action.REPOSITION)
+            assert has == (comes, task.action is Action.RELEASE)
+
+
+def test_postures_are_written_where_they_are_given():
+    node = STEPS[0].held[0]
+    name = SCENE.robots[STEPS[0].grips.index(node)].name
+    tasks = [*plan_tasks(SCENE, STEPS, postures={(name, node): (0.1, -2.0)})]
+    told = [task for task in tasks if task.posture is not None]
+    assert {(task.robot, task.node) for task in told} == {(name, node)}
+    assert json.loads(tasks_json(SCENE, tasks))["tasks"][1]["posture"] == [0.1, -2.0]
+    rows = [*csv.DictReader(io.StringIO(tasks_csv(tasks)))]
+    assert (rows[1]["joint_1"], rows[1]["joint_2"]) == ("0.1", "-2")
+    assert rows[0]["joint_1"] == ""
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"distance": 0.0}, "distance is 0.0"),
+        ({"postures": {("nobody", 1): (0.0,)}}, "posture of ('nobody', 1): give the name of a"),
+        ({"postures": {("rob1", 999): (0.0,)}}, "give the name of a robot, and a node"),
+        ({"postures": {("rob1", 1): (np.nan,)}}, "posture of rob1 at node 1 is nan"),
+        ({"postures": {("rob1", 1): (0.0,), ("rob1", 2): ()}}, "postures have 0 to 1 values"),
+    ],
+)
+def test_what_is_wrong_is_one_line(more, said):
+    with pytest.raises(SeqoptError) as error:
+        [*plan_tasks(SCENE, STEPS, **more)]
+    assert said in str(error.value)
+    with pytest.raises(SeqoptError, match="format csv takes no distance or postures"):
+        export_plan(SCENE, STEPS, "csv", distance=0.1)
+
+
+def test_shapes_are_those_of_the_scene():
+    blocks = json.loads(export_plan(SCENE, STEPS, "tasks"))["blocks"]
+    assert [block["block"] for block in blocks] == list(SCENE.build_order)
+    for block, brick in zip(blocks, SCENE.placed, strict=True):
+        vertex = block["shape"]["data"]["vertex"]
+        assert [[v[a] for a in "xyz"] for v in vertex.values()] == vertices_of(brick)[0].tolist()
