@@ -120,9 +120,7 @@ def test_what_does_not_fit_is_refused_before(capsys, tmp_path):
 
 @posix
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("workers", "limits"), [("1", (60, 340, 370, 4096)), ("2", (300, 4096))]
-)
+@pytest.mark.parametrize(("workers", "limits"), [("1", (60, 340, 370, 4096)), ("2", (300, 4096))])
 def test_a_run_under_a_memory_limit_ends_in_a_line(tmp_path, workers, limits):
     import resource  # noqa: PLC0415  # POSIX has it alone
 
