@@ -10,10 +10,11 @@ from typing import Any
 import nbformat
 from jupyter_cache.executors.utils import ExecutionResult, single_nb_execution
 from jupyter_client import AsyncKernelManager
+from jupyter_core.utils import run_sync
 from myst_nb.core.execute import direct
 from sphinx.application import Sphinx
 
-KERNEL = AsyncKernelManager()  # ended with this process by who executes
+KERNEL = AsyncKernelManager()
 FORGET = """%reset -f
 __import__("os").chdir({folder!r})
 __import__("matplotlib").rcdefaults()
@@ -31,7 +32,13 @@ def executed(page: nbformat.NotebookNode, cwd: str, **how: Any) -> ExecutionResu
     return result
 
 
+def _end(*_: object) -> None:
+    if KERNEL.has_kernel:
+        run_sync(KERNEL.shutdown_kernel)(now=True)
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Let pages be executed so."""
+    """Let pages be executed so; the kernel ends with the build."""
     direct.single_nb_execution = executed
+    app.connect("build-finished", _end)
     return {"parallel_read_safe": False}
