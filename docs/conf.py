@@ -7,7 +7,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from experiments.harness.stated import stated
+from extensions.stated import stated
 
 project = "seqopt"
 author = "The seqopt developers"
@@ -22,6 +22,7 @@ extensions = [
     "extensions.equations",
     "extensions.docstrings",
     "extensions.downloads",
+    "extensions.one_kernel",
     "extensions.pictures",
 ]
 html_theme = "furo"

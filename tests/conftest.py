@@ -24,7 +24,7 @@ settings.register_profile(
     "seqopt",
     derandomize=True,
     deadline=None,
-    max_examples=40,
+    max_examples=int(os.environ.get("EXAMPLES", "25")),  # more for a release
     suppress_health_check=[HealthCheck.too_slow],  # on a busy machine everything is
 )
 settings.load_profile("seqopt")

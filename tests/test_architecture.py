@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from io import StringIO
 from pathlib import Path
 from tokenize import COMMENT, DEDENT, ENDMARKER, INDENT, NEWLINE, NL, generate_tokens
@@ -16,6 +17,7 @@ from seqopt._cli.arguments import COMMANDS
 from seqopt._showing import DISPLAYS
 
 ROOT = Path(__file__).resolve().parent.parent
+pytestmark = pytest.mark.xdist_group("architecture")  # one worker reads every file, once
 
 ROOMS = (
     {"arrays", "errors", "_interrupts"},
@@ -67,16 +69,22 @@ def dotted(path: Path) -> str:
     return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 
-def imports(path: Path) -> set[str]:
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
+def imports(path: Path) -> frozenset[str]:
     """Return every module a file imports, dotted."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: relative import"
             found.add(node.module or "")
-    return found
+    return frozenset(found)
 
 
 def graph(folder: str) -> nx.DiGraph:
@@ -116,7 +124,7 @@ def test_imports_between_rooms_go_upward_only():
 def looked_up(path: Path) -> list[str]:
     """Return what a file imports by name as it runs; ``?`` where the name is made as it runs."""
     found = []
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(path)):
         called = node.func if isinstance(node, ast.Call) else None
         if "import_module" in (getattr(called, "id", ""), getattr(called, "attr", "")):
             name = node.args[0]
@@ -269,9 +277,8 @@ def code_lines(text: str) -> set[int]:
 @pytest.mark.parametrize("folder", ["seqopt", "formulations", "experiments"])
 def test_modules_and_functions_stay_small(folder):
     for path in sources(folder):
-        text = path.read_text(encoding="utf-8")
-        assert len(code_lines(text)) <= LINES, path
-        for node in ast.walk(ast.parse(text)):
+        assert len(code_lines(path.read_text(encoding="utf-8"))) <= LINES, path
+        for node in ast.walk(parsed(path)):
             if isinstance(node, ast.FunctionDef):
                 length = (node.end_lineno or 0) - node.lineno
                 assert length < LINES_OF_A_FUNCTION, f"{path}: {node.name}"
@@ -280,7 +287,7 @@ def test_modules_and_functions_stay_small(folder):
 def imported_tests(path: Path) -> set[str]:
     """Return the test files that a file imports, or imports from."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(parsed(path)):
         if isinstance(node, ast.ImportFrom):
             found |= {f"{node.module}.{alias.name}" for alias in node.names}
     parts = (name.split(".") for name in found | imports(path))
@@ -348,7 +355,7 @@ def test_claims_stand_apart_from_their_parts():
     modules, makers = graph("experiments"), {claim.module for claim in claims().values()}
     assert crossed(modules, makers) == []
     for path in sources("experiments"):
-        text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+        text = ast.get_docstring(parsed(path)) or ""
         assert text.startswith("Claim: ") == (dotted(path) in makers), path
 
 
@@ -380,7 +387,7 @@ def test_claims_that_read_the_clock_declare_it():
 
 def test_experiments_take_few_parameters():
     for path in sources("experiments"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(parsed(path)):
             if isinstance(node, ast.FunctionDef):
                 own = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
                 assert len(own) <= PARAMETERS, f"{path}: {node.name}"

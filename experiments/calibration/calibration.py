@@ -139,7 +139,7 @@ def others(bed: Law) -> dict[str, pd.DataFrame]:
     bounds = spread.rotational(bed.tests)
     for frame in (single, other, bounds):
         print(frame.to_string(index=False, float_format="%.4g"))
-    return {"_readings": scan, "_entries": single, "_geometry": other, "_routes": bounds}
+    return {"_readings": scan, "_entries": single, "_routes": bounds}
 
 
 def picture() -> Figure:

@@ -27,10 +27,9 @@ new fit on the fitted tables is larger than the shipped one by more than the yar
 0.05. What the new fit gives on Table B.1 is shown and not judged.
 
 Inputs: the tables that ship with the package. Command: ``python -m
-experiments.calibration.identify_arch25 [--quick] [--full] [--write] [--cross] [--variants]``. Only
+experiments.calibration.identify_arch25 [--quick] [--full] [--write] [--variants]``. Only
 ``--write`` puts the new scene in the place of ``seqopt/data/scenes/arch25.json`` and its numbers in
-``identify_arch25.csv``. ``--cross`` fits one table and scores the states that only the other has;
-``--variants`` repeats the first stage with other sets of numbers.
+``identify_arch25.csv``. ``--variants`` repeats the first stage with other sets of numbers.
 """
 
 from collections.abc import Sequence
@@ -44,14 +43,13 @@ from scipy.optimize import least_squares
 from experiments.calibration.parts import arch_numbers as arch
 from experiments.calibration.parts.arch_numbers import BRICKS, OFFSETS, SHAPE, Free, scene_of
 from experiments.harness.claim import Claim, Finding, Option, Options
-from experiments.harness.results import HOME, RESULTS
-from experiments.harness.yardstick import VALUES, errors, percentiles
-from seqopt import Scene, analyze, build_network, save_scene
+from experiments.harness.results import HOME, save_table
+from experiments.harness.yardstick import VALUES
+from seqopt import Scene, build_network, save_scene
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.responses.quantities import TO_1E_3MM, responses_of, support_forces, support_moments
-from seqopt.sequence.two_robots import METHODS
-from seqopt.study.published import as_printed, printed_steps
+from seqopt.study.published import printed_steps
 
 SCENE = HOME.parent / "seqopt" / "data" / "scenes" / "arch25.json"
 MORE = 2  # times that a fit worse than the shipped one is continued
@@ -155,19 +153,6 @@ def identify(wanted: Target, angles: Sequence[float], most: int) -> tuple[Floats
     return numbers, groups
 
 
-def cross(most: int) -> pd.DataFrame:
-    """Fit one table, score the rows that only the other has."""
-    rows = []
-    for known, other in (("sequential", "cantilever"), ("cantilever", "sequential")):
-        numbers, groups = identify(target([printed_steps(known)]), arch.PLAN_ANGLES, most)
-        engine = ComplianceEngine(build_network(scene_of(numbers, groups)))
-        found = analyze(engine, METHODS[other](engine.network))
-        table = errors(as_printed(engine.network.scene, found), printed_steps(other))
-        unseen = printed_steps(other)["same_in_both"].to_numpy() == 0
-        rows.append((known, other, *percentiles(table[unseen])))
-    return pd.DataFrame(rows, columns=["fitted", "scored", *arch.PERCENTILES])
-
-
 def compare_variants(wanted: Target, most: int) -> pd.DataFrame:
     """Fit the first stage with every set of numbers, from the same start."""
     rows = []
@@ -177,17 +162,6 @@ def compare_variants(wanted: Target, most: int) -> pd.DataFrame:
         rows.append({"variant": name, "numbers": len(numbers), "cost": remaining, **limits})
         print(pd.DataFrame(rows[-1:]).to_string(index=False, header=len(rows) == 1), flush=True)
     return pd.DataFrame(rows).drop(columns="T_pct_within_2_edges_pct")
-
-
-def explore(options: Options) -> None:
-    """Fit one table alone, or other sets of numbers, and store how well."""
-    if options.cross:
-        table = cross(40)
-        print(table.to_string(index=False, float_format="%.2f"))
-        table.to_csv(RESULTS / "identify_arch25_cross.csv", index=False, float_format="%.3f")
-    if options.variants:
-        table = compare_variants(target([printed_steps(name) for name in arch.FITTED]), 40)
-        table.to_csv(RESULTS / "identify_arch25_variants.csv", index=False, float_format="%.4g")
 
 
 def repeat(options: Options) -> tuple[Floats, Sequence[Free]]:
@@ -207,8 +181,9 @@ def repeat(options: Options) -> tuple[Floats, Sequence[Free]]:
 
 
 def experiment(options: Options) -> Finding | None:
-    if options.cross or options.variants:
-        explore(options)
+    if options.variants:
+        table = compare_variants(target([printed_steps(name) for name in arch.FITTED]), 40)
+        save_table(table, "identify_arch25_variants", 4)
         return None
     numbers, groups = repeat(options)
     scene, fitted = scene_of(numbers, groups), arch.report(numbers, groups)
@@ -228,7 +203,6 @@ CLAIM = Claim(
     options=(
         Option("--full", "two starts, 40 evaluations"),
         Option("--write", "put the result in the product"),
-        Option("--cross", "cross-validation between the tables"),
         Option("--variants", "other sets of numbers"),
     ),
 )

@@ -23,29 +23,22 @@ and with a lazy proof (`worst-ratio`, minimax), on chains of 25 to 1,000 bricks 
 `arch25` and on `vault338`. Every run has a process of its own; seconds of the core are counted, by
 the clock where two processes work. Errors are those against the refined mixed system at up to forty
 steps of the plan, and at random sets of three grips as they are screened. Exponents are fitted over
-100 bricks and more; of memory what the smallest run takes is taken off, libraries above all. An
-older version, checked out in a folder, is run in turns; its runs end after two minutes, or with
-6 GB.
+100 bricks and more; of memory what the smallest run takes is taken off, libraries above all.
 
 Inputs: the shipped scenes; seed 0. Command: ``python -m experiments.engines.engine_speed [--quick]
-[--only PART] [--older FOLDER]``.
+[--only PART]``.
 """
 
-import os
-import resource
-import subprocess
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from experiments.engines.parts import growth_runs
 from experiments.harness.charts import note, subplots
-from experiments.harness.claim import Claim, Finding, Option, Options, Times, on_this_run
-from experiments.harness.results import HOME, ONE_CORE, apart, drawn, exponents_by
+from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
+from experiments.harness.results import apart, drawn, exponents_by
 from experiments.harness.scenes import arch25, grip_sets
 from experiments.harness.timing import best
 from seqopt import ArchShape, Network, arch_scene, build_network, load_scene
@@ -174,9 +167,7 @@ SCENES = {
     "proof": SHORT,
     "lazy proof": LONG,
 }
-QUICK = {"analyze": ["chain13", "chain25"], "no proof": ["chain13"], "lazy proof": ["chain13"]}
-NEW = ("no proof, two processes", "lazy proof")  # what the older version does not do
-PATIENCE, ROOM = 120.0, 6 * 2**30  # s and bytes of an older version's run
+QUICK = {"analyze": ["chain13"], "lazy proof": ["chain13"]}
 FROM = 100  # bricks from which on exponents are fitted
 MOST_MEMORY = 2.1  # exponents that are claimed
 MOST_TIME = {"analyze": 2.5, "no proof": 3.0, "lazy proof": 3.0}
@@ -190,31 +181,9 @@ STYLES = {
 }  # in words
 
 
-def run_apart(task: str, name: str, home: Path, patience: float | None = None) -> growth_runs.Row:
-    """Return the row of a run by the version in a folder; without numbers if it takes too long."""
-    words = [growth_runs.__file__, task, name, *(["--no-errors"] if patience else [])]
-    environment = os.environ | ONE_CORE | {"PYTHONPATH": str(home)}
-    most = partial(resource.setrlimit, resource.RLIMIT_AS, (ROOM, ROOM)) if patience else None
-    try:
-        row: growth_runs.Row = apart(*words, limit=patience, env=environment, preexec_fn=most)
-    except subprocess.SubprocessError:
-        return {"task": task, "scene": name}
-    return row
-
-
-def runs(scenes: dict[str, list[str]], older: str) -> Iterator[growth_runs.Row]:
-    """Yield the rows of all runs, this version's and an older one's in turns."""
-    for task, names in scenes.items():
-        for name in names:
-            yield {"version": "this", **run_apart(task, name, HOME.parent)}
-            if older and task not in NEW and not name.startswith("vault"):
-                yield {"version": "older", **run_apart(task, name, Path(older), PATIENCE)}
-
-
 def exponents(table: pd.DataFrame, column: str, least: float = 0.0) -> dict[str, float]:
     """Return the slopes over the brick counts of chains, by task; what is least is taken off."""
-    mine = table[(table["version"] == "this") & table["scene"].str.startswith("chain")]
-    mine = mine[mine["bricks"] >= FROM]
+    mine = table[table["scene"].str.startswith("chain") & (table["bricks"] >= FROM)]
     return exponents_by("task", mine, mine[column] - least)
 
 
@@ -229,16 +198,10 @@ def growth_chart(table: pd.DataFrame) -> Figure:
     columns = {"time of a processor [s]": taken(table), "peak memory [MB]": table["memory_MB"]}
     for axes, (label, values) in zip(panels, columns.items(), strict=True):
         for task, style in looks(STYLES).items():
-            for version in ("this", "older"):
-                mine = (table["task"] == task) & (table["version"] == version)
-                own = mine & table["scene"].str.startswith("chain") & values.notna()
-                if own.any():
-                    line, name = style.line(), STYLES[task]
-                    if version == "older":
-                        line, name = line | {"mfc": "white", "lw": 0.8}, f"{name}, an older version"
-                    axes.plot(table["bricks"][own], values[own], label=name, **line)
-                vault = mine & table["scene"].str.startswith("vault")
-                axes.plot(table["bricks"][vault], values[vault], "*", color=style.color, ms=9)
+            mine, vaults = table["task"] == task, table["scene"].str.startswith("vault")
+            own, vault = mine & ~vaults, mine & vaults
+            axes.plot(table["bricks"][own], values[own], label=STYLES[task], **style.line())
+            axes.plot(table["bricks"][vault], values[vault], "*", color=style.color, ms=9)
         axes.set(xscale="log", yscale="log", xlabel="bricks in the chain", ylabel=label)
         plain(axes.xaxis, axes.yaxis)
         dress(axes)
@@ -248,7 +211,9 @@ def growth_chart(table: pd.DataFrame) -> Figure:
 
 
 def grown(options: Options) -> Finding:
-    table = pd.DataFrame(runs(QUICK if options.quick else SCENES, options.older))
+    module, scenes = "experiments.engines.parts.growth_runs", QUICK if options.quick else SCENES
+    runs = ((task, name) for task, names in scenes.items() for name in names)
+    table = pd.DataFrame(apart(module, *run) for run in runs)
     print(table.to_string(index=False, float_format="%.3g"))
     print("exponents of time", exponents(table, "seconds"))
     print("of memory", exponents(table, "memory_MB", table["memory_MB"].min()))
@@ -256,13 +221,12 @@ def grown(options: Options) -> Finding:
 
 
 def growth_holds(table: pd.DataFrame) -> bool:
-    mine = table[table["version"] == "this"]
-    memory = exponents(table, "memory_MB", float(mine["memory_MB"].min()))
+    memory = exponents(table, "memory_MB", float(table["memory_MB"].min()))
     time = exponents(table, "seconds")
     small = all(memory.get(task, 0.0) <= MOST_MEMORY for task in MOST_TIME)
     fast = all(time.get(task, 0.0) <= most for task, most in MOST_TIME.items())
-    exact = mine["error"].max() <= MOST_ERROR and mine["screen_error"].max() <= MOST_SCREEN_ERROR
-    return bool(mine["seconds"].notna().all() and small and fast and exact)
+    exact = table["error"].max() <= MOST_ERROR and table["screen_error"].max() <= MOST_SCREEN_ERROR
+    return bool(table["seconds"].notna().all() and small and fast and exact)
 
 
 CLAIM = Claim(
@@ -270,7 +234,6 @@ CLAIM = Claim(
     digits=4,
     quick="small sizes, nothing written",
     times=Times.JUDGED,
-    options=(Option("--older", "the folder of an older version to run in turns", ""),),
     pictures={
         "engine_growth.png": drawn(chart, "engine_growth"),
         "growth.png": drawn(growth_chart, "engine_growth_runs"),

@@ -23,6 +23,8 @@ from seqopt.scene.scene_file import builtin_scenes, dump_scene
 from seqopt.sequence.exports.formats import export_plan
 from seqopt.stability._builds import BuildProver
 
+ALWAYS = ("plan.csv", "summary.json", "scene.json", PAGE)  # names in the folder of any plan
+
 
 def figure_notes() -> tuple[str, ...]:
     """Return why figures are left out, if they are: what draws them is an extra."""
@@ -130,10 +132,14 @@ def write_outputs(
     return (options.out,)
 
 
-def require_out(options: argparse.Namespace) -> None:
-    """Raise `FileError`, before anything is computed, if the folder asked for cannot be made."""
+def require_out(options: argparse.Namespace, *names: str) -> None:
+    """Raise `FileError`, before anything is computed, if the folder asked for cannot be made.
+
+    Nor may what will have one of some names in it be what the command reads.
+    """
     if options.out is not None:
         require_folder(options.out)
+        keep_apart(options, *(options.out / name for name in names))
 
 
 def keep_apart(options: argparse.Namespace, *outputs: Path | None) -> None:

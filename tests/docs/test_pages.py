@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import ast
-import importlib.util
 import re
 import subprocess
 import sys
 
 import pytest
 
-from experiments.harness.stated import stated
 from tests.builders import ROOT
+from tests.docs.extensions import extension, stated
 from tests.docs.site_links import broken
 from tests.docs.transcripts import DOCS, PAGES, blocks, furnish, run
 
@@ -30,18 +29,10 @@ print("figures shown:", counts, "left:", len(plt.get_fignums()))
 """
 
 
-def extension(name):
-    """Load an extension of the site, which is not a package that is installed."""
-    spec = importlib.util.spec_from_file_location(name, DOCS / "extensions" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 downloads, equations = extension("downloads"), extension("equations")
 
 
-RUN = ("comparing_formulations", "own_arch", "reference_arch")  # others: when the site is built
+RUN = ("own_arch", "comparing_formulations")  # others: when the site is built
 
 
 def told():

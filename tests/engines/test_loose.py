@@ -99,7 +99,7 @@ def test_loose_motions_are_counted(arch25, bricks, loose):
     assert _hold_loose(ungripped_system(net, bricks)).loose == loose
 
 
-@pytest.mark.parametrize("bricks", [14, 20, 25])
+@pytest.mark.parametrize("bricks", [14, 25])
 @pytest.mark.parametrize("kind", ["torsion", "hinge", "island"])
 def test_sets_together_agree_with_sets_on_their_own(arch25, kind, bricks):
     """Every set that is a mechanism is called one, every other one answered alike."""
@@ -110,7 +110,7 @@ def test_sets_together_agree_with_sets_on_their_own(arch25, kind, bricks):
     }[kind]
     net = build_network(scene)
     engine, sound = ComplianceEngine(net), []
-    sets = [*grip_sets(net, bricks, 40), (21, 24, 26), (24, 26, 27), (25, 26, 27)]
+    sets = [*grip_sets(net, bricks, 25), (21, 24, 26), (24, 26, 27), (25, 26, 27)]
     for grips in sets:
         row = grip_columns(net, bricks, [grips])
         try:

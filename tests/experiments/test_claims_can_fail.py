@@ -102,9 +102,7 @@ CHECKS = {
         *("dry", "stands", {"method": "sequential", "step": 35}),
     ),
     "engine_speed growth": Check(
-        engine_speed.growth_holds,
-        ("engine_growth_runs",),
-        *("error", 2e-9, {"version": "this", "scene": "chain338"}),
+        engine_speed.growth_holds, ("engine_growth_runs",), *("error", 2e-9, {"scene": "chain338"})
     ),
     "engine_speed speed": Check(
         lambda table: engine_speed.holds(table.set_index(table.columns[0])["value"]),

@@ -24,8 +24,8 @@ TOUCHING = 1.5  # pixels that texts may share
 
 def params():
     """Return the name of every chart, slow where it takes long to draw."""
-    slow = {name for name in DRAWN if name in LONG or name.startswith("counterpart_")}
-    return [pytest.param(n, marks=[pytest.mark.slow] if n in slow else []) for n in DRAWN]
+    some = [name for name in DRAWN if not name.startswith("counterpart_")]  # drawn below
+    return [pytest.param(n, marks=[pytest.mark.slow] if n in LONG else []) for n in some]
 
 
 @pytest.mark.parametrize("name", params())
@@ -48,7 +48,9 @@ def test_a_picture_is_readable_at_the_width_of_the_site(name, engine25):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in DRAWN if name not in LONG])
 def test_no_text_covers_another_or_leaves_the_figure(name):
-    assert covered(DRAWN[name]()) == []
+    figure = DRAWN[name]()
+    assert flaws(figure) == []
+    assert covered(figure) == []
 
 
 def covered(figure: Figure) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import cycle, pairwise, product
 
 import numpy as np
 import pytest
@@ -297,8 +297,11 @@ def test_prices_are_slopes_of_the_bound(name, problem):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
-@pytest.mark.parametrize("method", SCHEDULES)
+@pytest.mark.parametrize(
+    ("criterion", "method"),
+    [*zip(CRITERIA.values(), cycle(SCHEDULES)), *((EQUATIONS, name) for name in [*SCHEDULES][1:])],
+    ids=lambda given: getattr(given, "name", given),
+)
 def test_exact_ones_agree_on_the_reference_arch(engine25, criterion, method):
     problem = candidate_layers(engine25, SCHEDULES[method](engine25.network), criterion)
     values = [solve(problem, ALL[name]).certificate.objective for name in EXACT_SUMS]

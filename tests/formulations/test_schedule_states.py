@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise, product
 
 import numpy as np
@@ -48,6 +49,17 @@ def built(name):
     return engine, loop(engine.network)
 
 
+@cache
+def plans_of(name):
+    """The engine and schedule of a name, and all that the latter allows, found once."""
+    engine, schedule = built(name)
+    return engine, schedule, list(every_plan(engine, schedule))
+
+
+# what shares what is found once goes to one worker
+once = pytest.mark.xdist_group("plans of small schedules")
+
+
 def every_plan(engine, schedule):
     """All sequences that the schedule allows, with the responses of their steps."""
     for nodes in product(*(move.candidates for move in schedule.moves)):
@@ -90,10 +102,10 @@ def goals(aim, scene, steps, table):
     return tuple(known[word] for word in aim.split(","))
 
 
+@once
 @pytest.mark.parametrize("name", ["three-robot", "modified", "four"])
 def test_every_aim_equals_brute_force(name):
-    engine, schedule = built(name)
-    plans = list(every_plan(engine, schedule))
+    engine, schedule, plans = plans_of(name)
     scene = engine.network.scene
     assert len(plans) > 10
     for aim in ("minmax", "sum", "minmax,travel", "travel,sum(M_sup)", "T_max,steps", "steps,sum"):
@@ -109,10 +121,10 @@ def test_every_aim_equals_brute_force(name):
         assert plan.summary()["schedule"] == schedule.method
 
 
+@once
 @pytest.mark.parametrize("name", ["three-robot", "four"])
 def test_limits_equal_brute_force(name):
-    engine, schedule = built(name)
-    plans = list(every_plan(engine, schedule))
+    engine, schedule, plans = plans_of(name)
     scene = engine.network.scene
     worst = sorted({goals("T_max,sum", scene, *each) for each in plans})
     bound = worst[len(worst) // 3][0]
@@ -125,11 +137,11 @@ def test_limits_equal_brute_force(name):
         seqopt.solve(none, "schedule_search")
 
 
+@once
 @pytest.mark.parametrize("name", ["three-robot", "four"])
 def test_budgets_equal_brute_force(name):
     """A worst value within one budget is exact; of sums a bound holds, and the gap is said."""
-    engine, schedule = built(name)
-    plans = list(every_plan(engine, schedule))
+    engine, schedule, plans = plans_of(name)
     scene = engine.network.scene
     known = np.array([goals("minmax,sum,travel,sum(M_sup)", scene, *each) for each in plans])
     for cap in np.quantile(known[:, 2], [0.05, 0.4]):
@@ -178,11 +190,12 @@ def test_the_judge_of_budgets_has_prices_of_its_own_to_check():
         judge_schedule(tight, plan.selection, plan.steps)
 
 
+@once
 @pytest.mark.parametrize("mortar", ["dry", "bond=2e3", "bond=2e4"])
 @pytest.mark.parametrize("name", ["three-robot", "four"])
 def test_what_stands_equals_brute_force(name, mortar):
     """Standing is asked of every state by the cone program; where no plan stands, none is found."""
-    engine, schedule = built(name)
+    engine, schedule, plans = plans_of(name)
     network, known = engine.network, {}
 
     def stands(step):
@@ -194,7 +207,7 @@ def test_what_stands_equals_brute_force(name, mortar):
 
     able = [
         goals("minmax,sum", network.scene, steps, table)
-        for steps, table in every_plan(engine, schedule)
+        for steps, table in plans
         if all(map(stands, steps))
     ]
     problem = build_states(engine, schedule, ONES, "minmax,sum", stands=mortar)
@@ -219,13 +232,14 @@ def test_one_call_and_loops_of_costs_agree_where_both_are_asked():
     assert costs(rows, scene)[0].max() == pytest.approx(plan.selection.objective[0], rel=1e-7)
 
 
+@once
 def test_the_judge_sees_a_worse_plan_and_one_of_another_schedule():
     """The control: the second best is refused, and so are steps that the schedule has not."""
-    engine, schedule = built("three-robot")
+    engine, schedule, every = plans_of("three-robot")
     problem = build_states(engine, schedule, ONES, "sum")
     found = seqopt.solve(problem, "schedule_search")
     scene = engine.network.scene
-    plans = [(goals("sum", scene, *each)[0], each[0]) for each in every_plan(engine, schedule)]
+    plans = [(goals("sum", scene, *each)[0], each[0]) for each in every]
     value, steps = sorted(plans, key=lambda each: each[0])[1]
     worse = replace(found.selection, objective=(value,), bound=(value,))
     with pytest.raises(SolverError, match="promised as the least; a plan has less"):

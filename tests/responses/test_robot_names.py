@@ -86,7 +86,7 @@ def test_a_name_changes_no_choice(name, criterion):
     assert len(chosen[0].alternatives().columns) == len(chosen[1].alternatives().columns)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ["sup_6", "max", "largest", "a,b", "]"])
 def test_a_name_hides_no_overload(name):
     scene = called("one", name, "three")
     notes = compare(ComplianceEngine(build_network(scene)), EQUATIONS).notes

@@ -42,10 +42,14 @@ def against_study(tests: tuple[Vault, ...], parts: list[Parts], law: str, k: Flo
 
 
 def closest(logs: Floats) -> tuple[int, float, float]:
-    """Return the column of logarithms with the least half-range, its middle, that half-range."""
+    """Return the column of logarithms with the least half-range, its middle, that half-range.
+
+    Of some that are equal but for rounding it is the first.
+    """
     top, bottom = logs.max(axis=0), logs.min(axis=0)
-    best = int((top - bottom).argmin())
-    return best, float(top[best] + bottom[best]) / 2, float(top[best] - bottom[best]) / 2
+    half = (top - bottom) / 2
+    best = int(np.argmax(half <= half.min() * (1 + 1e-9)))
+    return best, float(top[best] + bottom[best]) / 2, float(half[best])
 
 
 def _row(tests: tuple[Vault, ...], parts: list[Parts], law: str) -> dict[str, object]:

@@ -1,10 +1,7 @@
 """One run of a growing structure in a process of its own: seconds of one core, and peak memory.
 
-Run as a file, it measures whatever version of seqopt the process finds first, so that an older one
-can stand beside: ``PYTHONPATH=OLDER python experiments/engines/parts/growth_runs.py TASK SCENE``.
+Command: ``python -m experiments.engines.parts.growth_runs TASK SCENE`` prints a row as JSON.
 """
-
-from __future__ import annotations
 
 import json
 import resource
@@ -17,10 +14,11 @@ import numpy as np
 import seqopt
 from experiments.harness.runs import scene_named
 from seqopt.engines.interface import Engine, Want
+from seqopt.engines.rigid._mixed import solve_mixed
+from seqopt.responses.resources import Resources
 from seqopt.sequence.steps import Step
 from seqopt.study.published import EQUATIONS, WORST_RATIO
 
-Row = dict[str, object]
 Done = tuple[Engine, Sequence[Step], int]
 LOOKED_AT = 40  # steps of a run, and brick counts, whose errors are looked at
 SETS = 5  # random grip sets at each of these
@@ -40,8 +38,6 @@ def searched(network: seqopt.Network, **more: object) -> Done:
 
 def shared(network: seqopt.Network) -> Done:
     """Do the same with two processes."""
-    from seqopt.responses.resources import Resources  # noqa: PLC0415  # older versions have none
-
     return searched(network, resources=Resources(workers=2))
 
 
@@ -74,8 +70,6 @@ def errors(engine: Engine, steps: Sequence[Step]) -> dict[str, float]:
     Against the refined mixed system, one grip set at a time: ``error`` in steps of the plan, and
     ``screen_error`` of what candidates are chosen by, at random grip sets of three.
     """
-    from seqopt.engines.rigid._mixed import solve_mixed  # noqa: PLC0415  # older versions differ
-
     network, random = engine.network, np.random.default_rng(7)
 
     def largest(bricks: int, sets: np.ndarray, want: Want) -> float:
@@ -98,12 +92,12 @@ def errors(engine: Engine, steps: Sequence[Step]) -> dict[str, float]:
     return {"error": max(of_plan), "screen_error": max(of_screens)}
 
 
-def run(task: str, name: str) -> Row:
+def run(task: str, name: str) -> dict[str, object]:
     own = name.startswith("chain") or name == "arch25"
     scene = scene_named(name) if own else seqopt.load_scene(name)
     start, clock = time.process_time(), time.perf_counter()
     engine, steps, models = TASKS[task](seqopt.build_network(scene))
-    row: Row = {
+    row = {
         "task": task,
         "scene": name,
         "bricks": len(scene.bricks),
@@ -112,7 +106,7 @@ def run(task: str, name: str) -> Row:
         "clock_s": time.perf_counter() - clock,
         "memory_MB": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
     }
-    return row if "--no-errors" in sys.argv else row | errors(engine, steps)
+    return row | errors(engine, steps)
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ from seqopt._cli.options import (
     robots_option,
     scene_options,
 )
-from seqopt._cli.outputs import plan_files, write_outputs, written_to
+from seqopt._cli.outputs import ALWAYS, plan_files, require_out, write_outputs, written_to
 from seqopt._cli.posing import Asked, asked_problem
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import parse_options, parse_size, parse_time_limit
@@ -210,6 +210,7 @@ class _Found:
 def run(options: argparse.Namespace) -> Answer:
     """Choose every open grip of a build, or every step, and write the plan."""
     limit = parse_time_limit(options.time_limit)
+    require_out(options, *ALWAYS)
     start = time.perf_counter()
     asked = asked_problem(options)
     formulation = as_formulation(options.formulation or usual(asked.problem))

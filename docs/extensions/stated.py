@@ -89,7 +89,7 @@ def stated() -> dict[str, str]:
         | _outside(stored("outside_assemblies"))
         | _composing(stored("composing"))
         | {"vault_loads_table": _vault_loads(stored("vault_loads"))}
-        | {"free_formulations_table": _free_formulations(stored("free_formulations"))}
+        | {f"{name}_table": _on_graphs(stored(name)) for name in GRAPHS}
         | {"classical_table": _classical(stored("classical"))}
     )
 
@@ -125,12 +125,16 @@ def _composing(table: pd.DataFrame) -> dict[str, str]:
     }
 
 
-def _free_formulations(table: pd.DataFrame) -> str:
-    """Return a row per formulation of the free schedule: times, or gaps where a minute ended."""
+GRAPHS = ("free_formulations", "loop_formulations")
+
+
+def _on_graphs(table: pd.DataFrame) -> str:
+    """Return a row per formulation and aim: times, gaps where a minute ended, or what ended it."""
     counts = sorted(table["bricks"].unique())
     gap = (100 * table["gap"]).map(two).radd(", gap ").add(" %").where(table["gap"] >= 1e-6, "")
     gap = gap.where(np.isfinite(table["gap"]), ", no bound")
-    table = table.assign(cell=table["seconds"].map(two) + " s" + gap)
+    took = table["seconds"].map(two) + " s" + gap
+    table = table.assign(cell=took.where(table["value"].notna(), table["status"]))
     rows = []
     for name, own in table.groupby("formulation", sort=False):
         for aim, part in own.groupby("aim", sort=False):
