@@ -31,31 +31,35 @@ def diverse(node: Ints, joints: Floats, struck: Bools, most: int) -> Ints:
     return np.array(out, dtype=np.int64)
 
 
-def choose(whose: tuple[Ints, Ints], shape: tuple[int, int], struck: Bools, collide: Bools) -> Ints:
-    """Return one posture of every robot at every node, (R, N), -1 where there is none.
+def choose(
+    whose: tuple[Ints, Ints], usable: Floats, collide: Bools, together: Floats, before: Ints
+) -> Ints:
+    """Return one posture of every robot at every place, (R, N), -1 where there is none.
 
-    Robot by robot and node by node the posture is taken that hits the fewest bricks and, of those
-    chosen for other robots, the fewest others, until none changes.
+    Robot by robot and place by place the posture is taken that can be used the longest and is in
+    the way of the fewest that were taken for others, until none changes.
 
-    ``whose`` (P,), (P,): robot and node; ``struck`` (P, B), ``collide`` (P, P): as of a table.
+    ``whose`` (P,), (P,): robot and place; ``usable`` (P,): for which share of its time each can be
+    used; ``collide`` (P, P); ``together`` (N, N): how much it counts that two places cannot be held
+    together; ``before`` (R, N): what to begin with, -1 where nothing is known.
     """
-    robot, node = whose
-    out = np.full(shape, -1)
-    groups = [np.flatnonzero((robot == r) & (node == n)) for r, n in np.ndindex(*shape)]
-    bad = struck.mean(axis=1) if len(struck) else np.zeros(0)
-    for place, rows in enumerate(groups):
-        if len(rows):
-            out.flat[place] = rows[int(np.argmin(bad[rows]))]
+    robot, place = whose
+    out = before.copy()
+    groups = [np.flatnonzero((robot == r) & (place == n)) for r, n in np.ndindex(*out.shape)]
+    for at, rows in enumerate(groups):
+        if len(rows) and out.flat[at] < 0:
+            out.flat[at] = rows[int(np.argmax(usable[rows]))]
     chosen = np.zeros(len(robot), dtype=bool)
     chosen[out[out >= 0]] = True
     for _ in range(_SWEEPS):
-        before = out.copy()
-        for place, rows in enumerate(groups):
+        known = out.copy()
+        for at, rows in enumerate(groups):
             if len(rows) > 1:
-                cost = bad[rows] + collide[rows][:, chosen].sum(axis=1) / shape[1]
-                chosen[out.flat[place]] = False
-                out.flat[place] = rows[int(np.argmin(cost))]
-                chosen[out.flat[place]] = True
-        if (out == before).all():
+                mine = together[place[rows[0]], place[chosen]]
+                cost = collide[rows][:, chosen] @ mine / together.sum(axis=1).max()
+                chosen[out.flat[at]] = False
+                out.flat[at] = rows[int(np.argmin(cost + 1 - usable[rows]))]
+                chosen[out.flat[at]] = True
+        if (out == known).all():
             break
     return out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from seqopt.arms._inverse import solve, targets
 from seqopt.arms.model import ArmModel, Placed
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SceneError
+from seqopt.scene.arm import MOST
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
 
@@ -43,7 +44,11 @@ class Site:
     def of(cls, scene: Scene) -> Site:
         """Return that of a scene; robots without an arm are in no one's way."""
         bricks = tuple(sorted(scene.bricks, key=lambda brick: brick.name))
-        robots = tuple(robot for robot in scene.robots if robot.arm is not None)
+        robots = tuple(
+            replace(robot, payload=1.0, arm=replace(robot.arm, postures=MOST))
+            for robot in scene.robots
+            if robot.arm is not None
+        )
         return cls(bricks, robots, tuple(sorted(scene.blocked_nodes)), scene.up)
 
     @property

@@ -19,7 +19,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import ExtraError, SceneError
 from seqopt.scene.arm import Arm
 
-_UP = 4  # folders above a URDF in which packages that it names are looked for
+UP = 4  # folders above a URDF in which packages that it names are looked for
 _SAMPLES = 200  # postures from which it is known which links always touch
 _ALWAYS = 0.95  # share of them
 
@@ -241,7 +241,7 @@ def _joints(model: ArmModel) -> list[Any]:
 
 def _read(pin: Any, path: Path, arm: Arm) -> tuple[Any, Any]:
     """Return the model of a URDF, joints locked that do not move the flange, and its bodies."""
-    folders = [str(folder) for folder in [*path.resolve().parents][:_UP]]
+    folders = [str(folder) for folder in [*path.resolve().parents][:UP]]
     try:
         model = pin.buildModelFromUrdf(str(path))
         geometry = pin.buildGeomFromUrdf(model, str(path), pin.GeometryType.COLLISION, package_dirs=folders)

@@ -11,14 +11,13 @@ from functools import cached_property
 
 import numpy as np
 
-from seqopt.arms._choice import choose
 from seqopt.arms._collisions import collide_pairs
 from seqopt.arms._reached import Around, Reached, Site, reached_by
 from seqopt.arms.model import ArmModel, compliance
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.scene.arm import MOST
 from seqopt.work.progress import Tell
 
-MOST = 8  # postures of a robot at a node that are kept
 _MOST_ROWS = 6000  # postures that are kept in all, where that leaves one for every node
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,8 +47,6 @@ class PostureTable(FrozenValue):
         Which pairs of postures, of different robots, are in each other's way.
     compliance : (P, 6, 6) float
         How a grip gives way in it by the joints of the arm, m/N and rad/(N m); NaN if not known.
-    chosen : (R, N) int
-        The one posture of every robot at every node with which plans are made; -1 if there is none.
     found : (R, N) int
         How many postures were found, of which at most `MOST` are kept.
     """
@@ -66,7 +63,6 @@ class PostureTable(FrozenValue):
     hits: Bools
     collide: Bools
     compliance: Floats
-    chosen: Ints
     found: Ints
 
     def rows(self, robot: str, node: int) -> Ints:
@@ -103,8 +99,6 @@ def compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
     robot_of = np.repeat(np.arange(len(reached)), [len(each.node) for each in reached])
     node = np.concatenate([each.node for each in reached])
     found = np.array([each.found for each in reached])
-    struck = np.concatenate([each.hits for each in reached])
-    collide = _collisions(reached, robot_of)
     return PostureTable(
         robots=tuple(robot.name for robot in site.robots),
         nodes=site.nodes,
@@ -115,10 +109,9 @@ def compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
         axes=np.concatenate([each.axes for each in reached]),
         place=np.concatenate([each.place for each in reached]),
         tools=np.concatenate([each.placed.tools for each in reached]),
-        hits=struck,
-        collide=collide,
+        hits=np.concatenate([each.hits for each in reached]),
+        collide=_collisions(reached, robot_of),
         compliance=np.concatenate([_compliances(each) for each in reached]),
-        chosen=choose((robot_of, node), (len(reached), len(site.nodes)), struck, collide),
         found=found,
     )
 

@@ -19,11 +19,14 @@ from seqopt.scene._checks import (
     positive,
     printable,
     rows,
+    settle,
     short,
     unit_axes,
     vector,
+    whole_between,
 )
 
+MOST = 8  # postures of a robot at a node that are kept of those that are found
 SIDES = ("length", "width", "thickness")
 """The pairs of faces of a brick, by the axis that they are across."""
 _FACES = (*SIDES, *(sign + side for side in SIDES for sign in "+-"))
@@ -72,6 +75,9 @@ class Arm(Terse):
         across an axis, or with a sign for one of them.
     flange : str
         The frame of the model that carries the tool; by default ``tool0``, or the last one.
+    postures : int
+        With how many postures at each node plans are made: with one, every plan keeps it; of
+        several, a step needs some that go together, and whether they can be kept is found after.
     joint_stiffness : tuple of float
         Of every joint, N m/rad; empty where it is not known.
 
@@ -95,6 +101,7 @@ class Arm(Terse):
     fingers: float = 0.02
     faces: tuple[str, ...] = ("width", "thickness")
     flange: str = ""
+    postures: int = MOST
     joint_stiffness: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
@@ -102,6 +109,7 @@ class Arm(Terse):
         unit_axes(self, "arm", "x_axis", "y_axis")
         lengths = {"tool_length": length, "tool_radius": length, "fingers": not_negative}
         check(self, "arm", **lengths, joint_stiffness=_stiffnesses)
+        settle(self, postures=whole_between("arm: postures", self.postures, 1, MOST))
         if not self.fingers < self.tool_length:
             raise SceneError(
                 f"arm: fingers stand out {self.fingers:g} m from a brick, and the whole tool is "

@@ -286,7 +286,8 @@ def _alike(book: RuleBook, most: Mapping[int, float]) -> list[tuple[int, ...]]:
     for r in book.team:
         may = not book.rules.placers or scene.robots[r].name in book.rules.placers
         nodes = [book.newest_nodes[r, b] for b in range(1, last + 1)]
-        key = (book.reached[r, last], tuple(nodes), may, most[r])
+        arm = scene.robots[r].arm and r  # no other robot is where it is
+        key = (book.reached[r, last], tuple(nodes), may, most[r], arm)
         groups.setdefault(key, []).append(r)
     return [tuple(group) for group in groups.values() if len(group) > 1]
 
