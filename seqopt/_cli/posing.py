@@ -19,6 +19,7 @@ from seqopt._cli.values import (
     parse_robots,
     parse_rules,
 )
+from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
@@ -80,6 +81,7 @@ def asked_problem(options: argparse.Namespace) -> Asked:
     scene = asked_scene(options)
     if options.robots.isdecimal():
         scene = with_robots(scene, int(options.robots))
+    find_postures(scene, getattr(options, "cache", None), options.tell)
     words: dict[str, Any] = {"limits": parse_limits(options.limit, scene)}
     budgets = getattr(options, "budget", [])
     (parse_caps if of_states else parse_budgets)(budgets)  # said before anything is built

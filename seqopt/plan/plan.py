@@ -18,7 +18,7 @@ from seqopt.graph.layers.layers import Layers
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.graph.states.states import States
-from seqopt.plan._status import ENDS, FoundOrder, Status
+from seqopt.plan._status import ENDS, FoundOrder, KeptPostures, Status
 from seqopt.plan._tables import (
     Objectives,
     alternatives,
@@ -77,6 +77,8 @@ class Plan(ShownBuild):
         How many models a lazy search solved; None if all were solved.
     order : FoundOrder or None
         The build order, where it was sought.
+    arms : KeptPostures or None
+        The postures of arms; None where no robot has one, or a graph was solved.
 
     Examples
     --------
@@ -98,6 +100,7 @@ class Plan(ShownBuild):
     search: WindowSearch | None = None
     looked_at: int | None = None
     order: FoundOrder | None = None
+    arms: KeptPostures | None = None
 
     def __repr__(self) -> str:
         what = f"{self.scene_name!r}, {self.method!r}, " if self.steps else ""
@@ -359,7 +362,7 @@ class Plan(ShownBuild):
         unit would save; ``limits``, ``rules``, ``scenarios``, what ``stands``; how it ``ended`` and
         what ``stopped`` it; ``steps``, ``steps_before_release`` without those that let all go at
         the end, ``regrips``, ``idle_robots``, which never grip; limits of the linear range that are
-        left, which model was ``enough``, and payloads that are exceeded; ``models_evaluated``,
+        left, which model was ``enough``, of ``arms`` what is known, and payloads that are exceeded; ``models_evaluated``,
         ``states_in_proof``, ``seconds``;
         of criteria of ranks the sums under both ``objectives`` and of heuristics ``gap_parts``; of
         an order that was sought ``order``, ``orders`` (among which), ``order_status``,
@@ -396,6 +399,7 @@ def _summarized(plan: Plan) -> dict[str, object]:
         "idle_robots": list(idle_robots(scene, plan.steps)),
         "outside_linear_range": [str(departure) for departure in plan.departures],
         "enough": plan.enough.facts(),
+        **({} if plan.arms is None else plan.arms.described()),
         "payload_exceeded": [str(excess) for excess in plan.overloads],
         "models_evaluated": plan.models,
         "states_in_proof": 0 if proof is None else proof.states,

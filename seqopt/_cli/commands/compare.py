@@ -87,13 +87,14 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     robots_option(basic, "all methods, each of which takes as many as it needs")
     declare(basic, WRITTEN)
     criterion_options(command)
-    engine_options(command)
+    declare(engine_options(command), POSTURES)
     form_options(command, strict=True, builds=True)
 
 
 def run(options: argparse.Namespace) -> Answer:
     """Compare all ways to build a scene."""
     scene = asked_scene(options)
+    find_postures(scene, options.cache, options.tell)
     engine = asked_engine(options, build_network(scene))
     criterion = asked_criterion(options)
     require_out(options)

@@ -41,6 +41,7 @@ from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.out_of_sample import Trial, judge_unseen, worst_values
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve, usual
+from seqopt.problem._arms import faults_in_words
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import OWN
 from seqopt.sequence.rules import FREE
@@ -251,12 +252,14 @@ def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]
         order = plan.order.selection.order
         facts["order"] = order
         lines.append(wrapped(", ".join(map(str, order)), first="order: "))
+    arms = () if plan.arms is None else (f"arms: {plan.arms}",)
     answer = Answer(
         facts={**facts, "plan": table},
         text="\n".join([*lines, *(f"payload exceeded: {excess}" for excess in over)]),
         written=written,
         notes=(
             *_posed_notes(found.asked.problem),
+            *arms,
             *(() if stopped else (*plan.enough.lines, f"proof: {_proof(plan)}")),
             *idle_notes(scene, plan.steps),
             *refused(found.prover),
@@ -264,7 +267,8 @@ def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]
         failures=(INTERRUPTED,) if stopped else (),
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )
-    return strictly(answer, options, over, plan.departures, found.verdicts)
+    unreached = () if plan.arms is None else faults_in_words(plan.arms.postures)
+    return strictly(answer, options, over, plan.departures, found.verdicts, unreached)
 
 
 def _said(found: _Found) -> str:
