@@ -170,7 +170,12 @@ def strictly(
         lines = (f"arms: {each}" for each in unreached)
         answer = replace(answer, notes=(*answer.notes, *lines))
         answer = replace(answer, facts={**answer.facts, "arms_cannot": list(unreached)})
-    wrong = {"payload exceeded": over, "arms cannot": unreached, OUTSIDE: [*map(str, outside)], "does not stand": falls}
+    wrong = {
+        "payload exceeded": over,
+        "arms cannot": unreached,
+        OUTSIDE: [*map(str, outside)],
+        "does not stand": falls,
+    }
     said = [f"seqopt: {name}: {'; '.join(each)}" for name, each in wrong.items() if each]
     if not options.strict or not said or answer.status is not Status.DONE:
         return answer

@@ -166,5 +166,3 @@ def convex(points: Floats) -> Any:
     for point in points:
         cloud.append(point)
     return coal.ConvexBase.convexHull(cloud, False, "Qt")  # noqa: FBT003  # coal's own
-
-

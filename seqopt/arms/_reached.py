@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from seqopt.arms._choice import diverse
-from seqopt.arms._collisions import (
-    Obstacles,
-    convex,
-    fixed_bodies,
-    hits,
-    obstacles,
-    overlap,
-    touching,
-)
+from seqopt.arms._collisions import convex, fixed_bodies, hits, obstacles, overlap, touching
 from seqopt.arms._inverse import solve, targets
 from seqopt.arms.model import ArmModel, Placed
 from seqopt.arrays import Bools, Floats, Ints
@@ -25,6 +19,8 @@ from seqopt.scene.arm import MOST
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
 
+_KEPT = 64  # robots of which postures are kept, the last ones that were asked for
+_BY_POSTURE = ("node", "joints", "axes", "place", "hits")
 _SEED = 4600  # with the number of the node, of what is drawn for it
 
 
@@ -51,6 +47,15 @@ class Site:
         )
         return cls(bricks, robots, tuple(sorted(scene.blocked_nodes)), scene.up)
 
+    def alone(self, robot: int) -> Site:
+        """Return the same with one of the robots, whatever its name."""
+        return replace(self, robots=(replace(self.robots[robot], name="alone"),))
+
+    def together(self, one: int, two: int) -> bool:
+        """Return whether two robots must keep apart."""
+        arms = (self.robots[one].arm, self.robots[two].arm)
+        return all(arm is not None and arm.keeps_apart for arm in arms)
+
     @property
     def nodes(self) -> tuple[int, ...]:
         """All nodes, brick by brick."""
@@ -73,65 +78,41 @@ class Reached:
     placed: Placed
     found: Ints
 
-
-class Around:
-    """What stands still around arms: bricks, bases and the ground below the lowest of both."""
-
-    def __init__(self, site: Site, models: list[ArmModel]) -> None:
-        corners = [_corners(brick) for brick in site.bricks]
-        shapes = [(convex(each - each.mean(axis=0)), _at(each.mean(axis=0))) for each in corners]
-        self.models, self.bricks = models, obstacles(shapes, corners)
-        self.bases = [fixed_bodies(model) for model in models]
-        self.up = np.array(site.up)
-        feet = [float(model.base.translation @ self.up) for model in models]
-        self.ground = min([*feet, *(float((points @ self.up).min()) for points in corners)])
-        for robot, base in zip(site.robots, self.bases, strict=True):
-            self._require_free(site, robot, base)
-
-    def _require_free(self, site: Site, robot: Robot, base: Obstacles) -> None:
-        """Raise a `SceneError` if a base stands in a brick, or in the base of another robot."""
-        inside = overlap(base, self.bricks).any(axis=0)
-        if inside.any():
-            name = site.bricks[int(inside.argmax())].name
-            raise SceneError(f"robot {robot.name}: the base of its arm hits brick {name}; move it")
-        for other, its in zip(site.robots, self.bases, strict=True):
-            if other is not robot and overlap(base, its).any():
-                raise SceneError(
-                    f"robot {robot.name}: the base of its arm hits that of {other.name}; move one"
-                )
-
-    def others(self, own: int) -> Obstacles:
-        """Return the bases of all robots but one."""
-        rest = [base for i, base in enumerate(self.bases) if i != own]
-        none = np.zeros((0, 3))
-        bodies = tuple(body for base in rest for body in base.bodies)
-        low = np.concatenate([none, *(base.low for base in rest)])
-        return Obstacles(bodies, low, np.concatenate([none, *(base.high for base in rest)]))
-
-    def clear(self, own: int, placed: Placed) -> Bools:
-        """Return which postures of an arm touch neither the ground, nor bases, nor itself, (P,)."""
-        model = self.models[own]
-        out = ~touching(model, placed, model.apart).any(axis=1)
-        out &= ~hits(model, placed, self.others(own)).any(axis=(1, 2))
-        out &= (_lowest(model, placed, self.up) > self.ground)[:, model.above :].all(axis=1)
-        return np.asarray(out)
+    def rows(self, rows: Ints) -> Reached:
+        """Return some of the postures."""
+        parts = {name: getattr(self, name)[rows] for name in _BY_POSTURE}
+        return replace(self, placed=self.placed.rows(rows), **parts)
 
 
-def reached_by(site: Site, own: int, around: Around, most: int) -> Reached:
-    """Return the postures of a robot, by its number, at all nodes: at most so many at each."""
-    model = around.models[own]
-    places, joints, flanges = _solved(site, own, model)
+@lru_cache(maxsize=_KEPT)
+def reached_alone(site: Site, most: int) -> Reached:
+    """Return the postures of the one robot of a site at all nodes: at most so many at each.
+
+    They touch neither the ground, which is level with the lower one of its base and of the lowest
+    brick, nor the arm itself, nor, the tool aside, the brick that is gripped.
+    """
+    (robot,) = site.robots
+    assert robot.arm is not None
+    model, corners = ArmModel(robot.arm), [_corners(brick) for brick in site.bricks]
+    bricks = obstacles(
+        [(convex(c - c.mean(axis=0)), _at(c.mean(axis=0))) for c in corners], corners
+    )
+    _require_free(site, robot, overlap(fixed_bodies(model), bricks).any(axis=0))
+    places, joints, flanges = _solved(site, model)
     placed = model.placed(joints, np.array([flange.tool for flange in flanges]))
-    rows = np.flatnonzero(around.clear(own, placed))
-    struck = hits(model, placed.rows(rows), around.bricks)
+    up = np.array(site.up)
+    ground = min(float(model.base.translation @ up), *(float((c @ up).min()) for c in corners))
+    clear = ~np.asarray(touching(model, placed, model.apart).any(axis=1))
+    clear &= (_lowest(model, placed, up) > ground)[:, model.above :].all(axis=1)
+    rows = np.flatnonzero(clear)
+    struck = hits(model, placed.rows(rows), bricks)
     held = places[rows] // 2  # the tool goes around the brick that it grips, the arm does not
     at = np.arange(len(rows))
-    free = ~struck[at, :-1, held].any(axis=1)
+    some = np.flatnonzero(~struck[at, :-1, held].any(axis=1))
     struck[at, -1, held] = False
-    bricks = struck.any(axis=1)
-    counts = np.bincount(places[rows[free]], minlength=len(site.nodes))
-    some = np.flatnonzero(free)
-    some = some[diverse(places[rows[some]], joints[rows[some]], bricks[some], most)]
+    hit = np.asarray(struck.any(axis=1))
+    counts = np.bincount(places[rows[some]], minlength=len(site.nodes))
+    some = some[diverse(places[rows[some]], joints[rows[some]], hit[some], most)]
     kept = rows[some]
     return Reached(
         model=model,
@@ -139,15 +120,40 @@ def reached_by(site: Site, own: int, around: Around, most: int) -> Reached:
         joints=joints[kept],
         axes=np.array([flanges[i].axes for i in kept]).reshape(-1, 3, 3),
         place=np.array([flanges[i].place for i in kept]).reshape(-1, 3),
-        hits=bricks[some],
+        hits=hit[some],
         placed=placed.rows(kept),
         found=counts,
     )
 
 
-def _solved(site: Site, own: int, model: ArmModel) -> tuple[Ints, Floats, list[Any]]:
+def _require_free(site: Site, robot: Robot, inside: Bools) -> None:
+    """Raise a `SceneError` if a base stands in a brick. ``inside`` (B,): in which it does."""
+    if inside.any():
+        name = site.bricks[int(inside.argmax())].name
+        raise SceneError(f"robot {robot.name}: the base of its arm hits brick {name}; move it")
+
+
+def beside_others(site: Site, alone: Sequence[Reached]) -> list[Reached]:
+    """Return the postures of robots that touch no base of another one.
+
+    Raises `SceneError` if two bases touch.
+    """
+    bases = [fixed_bodies(each.model) for each in alone]
+    out = []
+    for i, own in enumerate(alone):
+        clear = np.ones(len(own.node), dtype=bool)
+        for j in (j for j in range(len(alone)) if j != i and site.together(i, j)):
+            if overlap(bases[i], bases[j]).any():
+                one, two = (site.robots[k].name for k in (i, j))
+                raise SceneError(f"robot {one}: the base of its arm hits that of {two}; move one")
+            clear &= ~np.asarray(hits(own.model, own.placed, bases[j]).any(axis=(1, 2)))
+        out.append(own.rows(np.flatnonzero(clear)))
+    return out
+
+
+def _solved(site: Site, model: ArmModel) -> tuple[Ints, Floats, list[Any]]:
     """Return the nodes, as places, the joints and the targets of all postures of a robot."""
-    reach = site.robots[own].reach
+    reach = site.robots[0].reach
     nodes, joints, flanges = [], [], []
     for place, node in enumerate(site.nodes):
         brick = site.bricks[place // 2]

@@ -9,6 +9,7 @@ import zipfile
 from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -76,8 +77,7 @@ def _read(path: Path) -> PostureTable | None:
     """Return the table of a file; None if it is none, or damaged."""
     try:
         with np.load(io.BytesIO(read_bytes(path)), allow_pickle=False) as archive:
-            content = {each.name: archive[each.name] for each in fields(PostureTable)}
+            content: dict[str, Any] = {n.name: archive[n.name] for n in fields(PostureTable)}
     except (KeyError, ValueError, OSError, EOFError, zipfile.BadZipFile):
         return None
-    names = {name: tuple(content.pop(name).tolist()) for name in _NAMES}
-    return PostureTable(**names, **content)
+    return PostureTable(**content | {name: tuple(content[name].tolist()) for name in _NAMES})

@@ -48,8 +48,7 @@ def model_path(arm: Arm) -> Path:
     spec = find_spec(package)
     if spec is None or not spec.submodule_search_locations:
         raise SceneError(f"arm: package {package} is not installed; pip install {package}")
-    found = [p for p in (Path(root, rest) for root in spec.submodule_search_locations)]
-    for path in found:
+    for path in (Path(root, rest) for root in spec.submodule_search_locations):
         if path.is_file():
             return path
     raise SceneError(f"arm: package {package} has no file {rest}")
@@ -192,7 +191,10 @@ class ArmModel:
         bodies = [*self.fixed, *self.moving]
         owner = [body.joint for body in bodies] + [self.model.frames[self.flange].parentJoint]
         parent = self.model.parents
-        near = lambda i, j: owner[i] == owner[j] or parent[owner[j]] == owner[i]  # noqa: E731
+
+        def near(i: int, j: int) -> bool:
+            return bool(owner[i] == owner[j] or parent[owner[j]] == owner[i])
+
         pairs = [(i, j) for j in range(len(owner)) for i in range(j) if not near(i, j)]
         drawn = self.draw(np.random.default_rng(0), _SAMPLES)
         placed = self.placed(drawn, np.full(_SAMPLES, self.arm.tool_length))
@@ -244,7 +246,9 @@ def _read(pin: Any, path: Path, arm: Arm) -> tuple[Any, Any]:
     folders = [str(folder) for folder in [*path.resolve().parents][:UP]]
     try:
         model = pin.buildModelFromUrdf(str(path))
-        geometry = pin.buildGeomFromUrdf(model, str(path), pin.GeometryType.COLLISION, package_dirs=folders)
+        geometry = pin.buildGeomFromUrdf(
+            model, str(path), pin.GeometryType.COLLISION, package_dirs=folders
+        )
     except (ValueError, RuntimeError) as error:
         why = str(error).strip().splitlines()[0]
         raise SceneError(f"arm: {path} cannot be read ({why}); give a URDF with meshes") from error

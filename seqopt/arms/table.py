@@ -12,13 +12,15 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.arms._collisions import collide_pairs
-from seqopt.arms._reached import Around, Reached, Site, reached_by
-from seqopt.arms.model import ArmModel, compliance
+from seqopt.arms._reached import Reached, Site, beside_others, reached_alone
+from seqopt.arms.model import compliance
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.errors import SceneError
 from seqopt.scene.arm import MOST
 from seqopt.work.progress import Tell
 
 _MOST_ROWS = 6000  # postures that are kept in all, where that leaves one for every node
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PostureTable(FrozenValue):
@@ -88,13 +90,16 @@ def compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
     SceneError
         If a model cannot be read, or a base stands in a brick or in another base.
     """
-    models = [ArmModel(robot.arm) for robot in site.robots if robot.arm is not None]
-    around = Around(site, models)
-    kept = max(1, min(MOST, _MOST_ROWS // max(1, len(models) * len(site.nodes))))
-    reached = []
+    kept = max(1, min(MOST, _MOST_ROWS // max(1, len(site.robots) * len(site.nodes))))
+    alone = []
     for number, robot in enumerate(site.robots):
         tell(f"postures of {robot.name}")
-        reached.append(reached_by(site, number, around, kept))
+        try:
+            alone.append(reached_alone(site.alone(number), kept))
+        except SceneError as error:
+            why = str(error).removeprefix("robot alone: ").removeprefix("arm: ")
+            raise SceneError(f"robot {robot.name}: {why}") from error
+    reached = beside_others(site, alone)
     tell("postures that are in each other's way")
     robot_of = np.repeat(np.arange(len(reached)), [len(each.node) for each in reached])
     node = np.concatenate([each.node for each in reached])
@@ -110,7 +115,7 @@ def compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
         place=np.concatenate([each.place for each in reached]),
         tools=np.concatenate([each.placed.tools for each in reached]),
         hits=np.concatenate([each.hits for each in reached]),
-        collide=_collisions(reached, robot_of),
+        collide=_collisions(site, reached, robot_of),
         compliance=np.concatenate([_compliances(each) for each in reached]),
         found=found,
     )
@@ -127,11 +132,11 @@ def _padded(joints: list[Floats]) -> Floats:
     return np.concatenate(out)
 
 
-def _collisions(reached: list[Reached], robot: Ints) -> Bools:
+def _collisions(site: Site, reached: list[Reached], robot: Ints) -> Bools:
     """Return which pairs of postures of different robots collide, (P, P)."""
     out = np.zeros((len(robot), len(robot)), dtype=bool)
     for i, one in enumerate(reached):
-        for j, two in enumerate(reached[:i]):
+        for j, two in ((j, reached[j]) for j in range(i) if site.together(i, j)):
             rows, columns = np.flatnonzero(robot == i), np.flatnonzero(robot == j)
             grid = np.meshgrid(np.arange(len(rows)), np.arange(len(columns)), indexing="ij")
             pairs = grid[0].ravel(), grid[1].ravel()

@@ -78,7 +78,9 @@ def _narrowed(problem: Problem, plan: Plan, postures: int) -> Problem:
             *(
                 robot
                 if robot.arm is None
-                else replace(robot, arm=replace(robot.arm, postures=min(postures, robot.arm.postures)))
+                else replace(
+                    robot, arm=replace(robot.arm, postures=min(postures, robot.arm.postures))
+                )
                 for robot in scene.robots
             )
         )
@@ -102,4 +104,3 @@ def moved(
 def _criterion(plan: Plan) -> Criterion:
     """Return the criterion of a plan, with all numbers that it takes from the scene."""
     return plan._of_scene.criterion
-

@@ -101,7 +101,12 @@ class KeptPostures(Terse):
     def described(self) -> dict[str, object]:
         """Return what the summary of a plan says of arms, ready for JSON."""
         cannot = faults_in_words(self.postures)
-        found = {"postures_at_a_node": self.most, "of": self.asked, "bound": self.floor, "best_of_table": self.best}
+        found = {
+            "postures_at_a_node": self.most,
+            "of": self.asked,
+            "bound": self.floor,
+            "best_of_table": self.best,
+        }
         return {"arms": {"said": str(self), "cannot": list(cannot), **found}}
 
     def __str__(self) -> str:

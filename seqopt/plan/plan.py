@@ -362,8 +362,8 @@ class Plan(ShownBuild):
         unit would save; ``limits``, ``rules``, ``scenarios``, what ``stands``; how it ``ended`` and
         what ``stopped`` it; ``steps``, ``steps_before_release`` without those that let all go at
         the end, ``regrips``, ``idle_robots``, which never grip; limits of the linear range that are
-        left, which model was ``enough``, of ``arms`` what is known, and payloads that are exceeded; ``models_evaluated``,
-        ``states_in_proof``, ``seconds``;
+        left, which model was ``enough``, what is known of ``arms``, and payloads that are exceeded;
+        ``models_evaluated``, ``states_in_proof``, ``seconds``;
         of criteria of ranks the sums under both ``objectives`` and of heuristics ``gap_parts``; of
         an order that was sought ``order``, ``orders`` (among which), ``order_status``,
         ``order_bound`` (on the first aim, of any order), ``order_bound_proven``,

@@ -14,6 +14,7 @@ from seqopt.arrays import Terse, Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import (
     check,
+    kind_of,
     length,
     not_negative,
     positive,
@@ -78,6 +79,8 @@ class Arm(Terse):
     postures : int
         With how many postures at each node plans are made: with one, every plan keeps it; of
         several, a step needs some that go together, and whether they can be kept is found after.
+    keeps_apart : bool
+        Whether it must not touch other arms that keep apart; False for what reach alone allows.
     joint_stiffness : tuple of float
         Of every joint, N m/rad; empty where it is not known.
 
@@ -102,6 +105,7 @@ class Arm(Terse):
     faces: tuple[str, ...] = ("width", "thickness")
     flange: str = ""
     postures: int = MOST
+    keeps_apart: bool = True
     joint_stiffness: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
@@ -109,6 +113,7 @@ class Arm(Terse):
         unit_axes(self, "arm", "x_axis", "y_axis")
         lengths = {"tool_length": length, "tool_radius": length, "fingers": not_negative}
         check(self, "arm", **lengths, joint_stiffness=_stiffnesses)
+        settle(self, keeps_apart=kind_of("arm: keeps_apart", self.keeps_apart, bool))
         settle(self, postures=whole_between("arm: postures", self.postures, 1, MOST))
         if not self.fingers < self.tool_length:
             raise SceneError(
@@ -121,5 +126,3 @@ class Arm(Terse):
         """Whether the model is one of an installed package."""
         package, colon, path = self.urdf.partition(":")
         return bool(colon and path) and len(package) > 1 and package.isidentifier()
-
-

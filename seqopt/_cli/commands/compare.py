@@ -23,6 +23,7 @@ from seqopt._cli.asked import (
     strictly,
 )
 from seqopt._cli.options import (
+    POSTURES,
     criterion_options,
     declare,
     engine_options,
@@ -33,6 +34,7 @@ from seqopt._cli.options import (
 from seqopt._cli.outputs import comparison_files, figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_criterion, parse_robots
+from seqopt.arms.reach import find_postures
 from seqopt.engines.registry import provenance
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import FormulationKind, formulations

@@ -83,7 +83,7 @@ def _bits(row: Bools) -> int:
 
 
 def check_postures(scene: Scene, steps: Sequence[Step]) -> None:
-    """Raise a `StepError` if arms cannot be in a step with the postures that plans are made with."""
+    """Raise a `StepError` if arms have no postures that go together in a step."""
     rules = PostureRules(scene, range(len(scene.robots)))
     nodes = [node for brick in scene.placed for node in brick.nodes]
     place = {None: 0} | {node: i for i, node in enumerate(nodes, start=1)}
