@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from seqopt.arms.model import ArmModel, Placed
+from seqopt.arms._model import ArmModel, Placed
 from seqopt.arrays import Bools, Floats, Ints
 
+_SAMPLES = 200  # postures from which it is known which links always touch
+_ALWAYS = 0.95  # share of them
 _PAIRS = 2_000_000  # of boxes that are compared at once
 _Turned = tuple[Any, Any]  # a shape of coal, and where it is
 
@@ -166,3 +168,22 @@ def convex(points: Floats) -> Any:
     for point in points:
         cloud.append(point)
     return coal.ConvexBase.convexHull(cloud, False, "Qt")  # noqa: FBT003  # coal's own
+
+
+def apart_pairs(model: ArmModel) -> tuple[tuple[int, int], ...]:
+    """Return the pairs of an arm's own bodies that must not touch, as of `touching`.
+
+    Left out are neighbors, and what touches in nearly all postures.
+    """
+    owner = [body.joint for body in (*model.fixed, *model.moving)]
+    owner.append(model.model.frames[model.flange].parentJoint)
+    parent = model.model.parents
+
+    def near(i: int, j: int) -> bool:
+        return bool(owner[i] == owner[j] or parent[owner[j]] == owner[i])
+
+    pairs = [(i, j) for j in range(len(owner)) for i in range(j) if not near(i, j)]
+    drawn = model.draw(np.random.default_rng(0), _SAMPLES)
+    placed = model.placed(drawn, np.full(_SAMPLES, model.arm.tool_length))
+    share = touching(model, placed, pairs).mean(axis=0)
+    return tuple(pair for pair, often in zip(pairs, share, strict=True) if often < _ALWAYS)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from seqopt.arms.model import ArmModel
+from seqopt.arms._model import ArmModel
 from seqopt.arrays import Floats
 from seqopt.scene.parts import Brick
 

@@ -10,9 +10,17 @@ from typing import Any
 import numpy as np
 
 from seqopt.arms._choice import diverse
-from seqopt.arms._collisions import convex, fixed_bodies, hits, obstacles, overlap, touching
+from seqopt.arms._collisions import (
+    apart_pairs,
+    convex,
+    fixed_bodies,
+    hits,
+    obstacles,
+    overlap,
+    touching,
+)
 from seqopt.arms._inverse import solve, targets
-from seqopt.arms.model import ArmModel, Placed
+from seqopt.arms._model import ArmModel, Placed
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SceneError
 from seqopt.scene.arm import MOST
@@ -102,7 +110,7 @@ def reached_alone(site: Site, most: int) -> Reached:
     placed = model.placed(joints, np.array([flange.tool for flange in flanges]))
     up = np.array(site.up)
     ground = min(float(model.base.translation @ up), *(float((c @ up).min()) for c in corners))
-    clear = ~np.asarray(touching(model, placed, model.apart).any(axis=1))
+    clear = ~np.asarray(touching(model, placed, apart_pairs(model)).any(axis=1))
     clear &= (_lowest(model, placed, up) > ground)[:, model.above :].all(axis=1)
     rows = np.flatnonzero(clear)
     struck = hits(model, placed.rows(rows), bricks)

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from seqopt._files import make_folder, read_bytes, write_bytes
+from seqopt.arms._model import UP, model_path
 from seqopt.arms._reached import Site
-from seqopt.arms.model import UP, model_path
-from seqopt.arms.table import PostureTable, compute_table
+from seqopt.arms.table import PostureTable, _compute_table
 from seqopt.work.progress import Tell
 
 _VERSION = 1  # of what is computed: tables of another one are not taken
@@ -30,7 +30,7 @@ def stored_table(folder: Path, site: Site, tell: Tell) -> PostureTable:
     path = folder / f"postures-{_key(site)}.npz"
     if path.exists() and (found := _read(path)) is not None:
         return found
-    table = compute_table(site, tell)
+    table = _compute_table(site, tell)
     write_bytes(path, _content(table))
     return table
 

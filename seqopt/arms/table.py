@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import pandas as pd
 
 from seqopt.arms._collisions import collide_pairs
 from seqopt.arms._reached import Reached, Site, beside_others, reached_alone
-from seqopt.arms.model import compliance
+from seqopt.arms._stiffness import _compliance
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import SceneError
 from seqopt.scene.arm import MOST
@@ -71,6 +72,24 @@ class PostureTable(FrozenValue):
         """Return the postures of a robot at a node."""
         return self._rows.get((robot, node), np.zeros(0, dtype=np.int64))
 
+    def table(self) -> pd.DataFrame:
+        """Return every posture: joints, flange, and the bricks that the arm hits in it.
+
+        Result: a row for every posture: ``robot``, ``node``; ``joint_1`` and so on, rad or m;
+        ``flange_x`` and so on, where the flange is, m; ``toward_x`` and so on, where the tool
+        points; ``hits``, names of bricks with semicolons between.
+        """
+        columns: dict[str, object] = {
+            "robot": [self.robots[r] for r in self.robot],
+            "node": [self.nodes[n] for n in self.node],
+        }
+        columns |= {f"joint_{k}": joint for k, joint in enumerate(self.joints.T, start=1)}
+        columns |= {f"flange_{name}": self.place[:, i] for i, name in enumerate("xyz")}
+        columns |= {f"toward_{name}": self.axes[:, i, 2] for i, name in enumerate("xyz")}
+        names = np.array(self.bricks)
+        columns["hits"] = [";".join(map(str, names[hit].tolist())) for hit in self.hits]
+        return pd.DataFrame(columns)
+
     @cached_property
     def _rows(self) -> dict[tuple[str, int], Ints]:
         keys = [(self.robots[r], self.nodes[n]) for r, n in zip(self.robot, self.node, strict=True)]
@@ -80,7 +99,7 @@ class PostureTable(FrozenValue):
         return {key: np.array(rows) for key, rows in out.items()}
 
 
-def compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
+def _compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
     """Return the posture table of a site.
 
     Raises
@@ -151,5 +170,5 @@ def _compliances(reached: Reached) -> Floats:
     """Return how grips give way in all postures, (P, 6, 6); NaN where no stiffness is known."""
     if not reached.model.arm.joint_stiffness:
         return np.full((len(reached.node), 6, 6), np.nan)
-    found = [compliance(reached.model, posture) for posture in reached.joints]
+    found = [_compliance(reached.model, posture) for posture in reached.joints]
     return np.array(found).reshape(-1, 6, 6)

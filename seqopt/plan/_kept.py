@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from seqopt.arms.reach import has_arms
 from seqopt.engines.registry import recipe_of
 from seqopt.errors import ProblemError
 from seqopt.graph.scenarios import engine_for
@@ -20,7 +19,7 @@ from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import Criterion
 from seqopt.scene.scene import Scene
-from seqopt.sequence.postures import PlanPostures, plan_postures
+from seqopt.sequence._postures import PlanPostures, plan_postures
 from seqopt.sequence.schedule import Schedule
 
 _FEWER = (4, 2, 1)  # postures at each node, where plans with more of them do not keep theirs
@@ -30,7 +29,7 @@ _SAME = 1e-9  # over the size of a value
 def with_postures(problem: Problem, plan: Plan, solved: Callable[[Problem], Plan]) -> Plan:
     """Return a plan with its postures, or one that keeps them, where robots have arms."""
     scene = problem.scene
-    if not has_arms(scene):
+    if not scene.has_arms:
         return plan
     first = _found(plan)
     most = max(robot.arm.postures for robot in scene.robots if robot.arm is not None)

@@ -11,7 +11,7 @@ from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.plan.calling.formulation import End
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.problem._arms import faults_in_words
-from seqopt.sequence.postures import PlanPostures
+from seqopt.sequence._postures import PlanPostures
 
 ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from seqopt.responses.quantities import steps_in_words
 from seqopt.scene.scene import Scene
-from seqopt.sequence.postures import PlanPostures, plan_postures
+from seqopt.sequence._postures import PlanPostures, plan_postures
 from seqopt.sequence.steps import Step
 
 

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 
 from seqopt._files import csv_text
-from seqopt.arms.reach import has_arms
 from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, SeqoptError, StepError
@@ -197,7 +196,7 @@ def _add_largest(
         over = overloads(scene, steps)
         rows[name].update(largest(scene, steps), overloaded=bool(over))
         notes += [f"{name}: {excess}" for excess in over]
-        if has_arms(scene):
+        if scene.has_arms:
             found = arm_faults(scene, parse_plan(scene, csv_text(steps), name))
             notes += [f"{name}: {fault}" for fault in found]
     return notes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from seqopt.arms.reach import permits
+from seqopt.arms._permits import permits
 from seqopt.arrays import Bools, Ints
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenStep

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from seqopt.arms.reach import reachable
+from seqopt.arms._permits import reachable
 from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.sequence.rules import Ending, FreeRules, Newest

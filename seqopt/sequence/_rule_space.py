@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arms.reach import Permits, permits, within_reach
+from seqopt.arms._permits import Permits, permits, within_reach
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse, frozen
 from seqopt.errors import StepError
 from seqopt.network.network import Network

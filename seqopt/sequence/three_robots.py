@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from seqopt.arms.reach import reachable
+from seqopt.arms._permits import reachable
 from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import network_of
 from seqopt.network.network import Network

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
-from seqopt.arms.reach import within_reach
+from seqopt.arms._permits import within_reach
 from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import network_of
 from seqopt.network.network import Network, PartKind

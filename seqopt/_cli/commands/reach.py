@@ -13,7 +13,7 @@ from seqopt._cli.options import POSTURES, declare, form_options, scene_options
 from seqopt._cli.outputs import figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
-from seqopt.arms.listing import posture_table, reach_table
+from seqopt.arms._listing import find_table, reach_table
 from seqopt.arms.reach import find_postures
 from seqopt.scene.scene import Scene
 
@@ -57,7 +57,7 @@ def _files(scene: Scene, table: pd.DataFrame) -> dict[str, bytes | str]:
     """Return the tables, and the picture if it can be drawn, by file name."""
     files: dict[str, bytes | str] = {
         "reach.csv": csv_text(table),
-        "postures.csv": csv_text(posture_table(scene)),
+        "postures.csv": csv_text(find_table(scene).table()),
     }
     if figure_notes():
         return files

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from seqopt.arms.reach import find_postures, permits
+from seqopt.arms._permits import permits
+from seqopt.arms.reach import find_postures
 from seqopt.arrays import Bools, Ints
 from seqopt.errors import StepError
 from seqopt.scene.scene import Scene

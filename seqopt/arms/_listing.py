@@ -1,11 +1,11 @@
-"""Posture tables for people: which robot reaches which node, and every posture with its joints."""
+"""Which robot reaches which node with how many postures, as a table for people."""
 
 from __future__ import annotations
 
-import numpy as np
 import pandas as pd
 
-from seqopt.arms.reach import find_postures, permits
+from seqopt.arms._permits import permits
+from seqopt.arms.reach import find_postures
 from seqopt.arms.table import PostureTable
 from seqopt.errors import SceneError
 from seqopt.scene.scene import Scene
@@ -33,7 +33,7 @@ def reach_table(scene: Scene) -> pd.DataFrame:
     SceneError
         If no robot has an arm.
     """
-    table, allowed = _table(scene), permits(scene)
+    table, allowed = find_table(scene), permits(scene)
     assert allowed is not None
     rows = []
     for r, name in enumerate(table.robots):
@@ -55,40 +55,8 @@ def reach_table(scene: Scene) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def posture_table(scene: Scene) -> pd.DataFrame:
-    """Return every posture that is kept: joints, flange, and the bricks that the arm hits in it.
-
-    Parameters
-    ----------
-    scene : Scene
-        With a robot that has an arm.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row for every posture: ``robot``, ``node``; ``joint_1`` and so on, rad or m; ``flange_x``
-        and so on, where the flange is, m; ``toward_x`` and so on, where the tool points;
-        ``hits``, names of bricks with semicolons between.
-
-    Raises
-    ------
-    SceneError
-        If no robot has an arm.
-    """
-    table = _table(scene)
-    columns: dict[str, object] = {
-        "robot": [table.robots[r] for r in table.robot],
-        "node": [table.nodes[n] for n in table.node],
-    }
-    columns |= {f"joint_{k}": joint for k, joint in enumerate(table.joints.T, start=1)}
-    columns |= {f"flange_{name}": table.place[:, i] for i, name in enumerate("xyz")}
-    columns |= {f"toward_{name}": table.axes[:, i, 2] for i, name in enumerate("xyz")}
-    names = np.array(table.bricks)
-    columns["hits"] = [";".join(map(str, names[hit].tolist())) for hit in table.hits]
-    return pd.DataFrame(columns)
-
-
-def _table(scene: Scene) -> PostureTable:
+def find_table(scene: Scene) -> PostureTable:
+    """Return the posture table of a scene in which a robot has an arm."""
     found = find_postures(scene)
     if found is None:
         raise SceneError(f"scene {scene.name}: no robot has an arm; give one in its scene file")

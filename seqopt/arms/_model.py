@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -20,8 +19,6 @@ from seqopt.errors import ExtraError, SceneError
 from seqopt.scene.arm import Arm
 
 UP = 4  # folders above a URDF in which packages that it names are looked for
-_SAMPLES = 200  # postures from which it is known which links always touch
-_ALWAYS = 0.95  # share of them
 
 
 def needs_extra() -> None:
@@ -180,27 +177,6 @@ class ArmModel:
         low[:, -1], high[:, -1] = -half, half
         return low + shift, high + shift
 
-    @cached_property
-    def apart(self) -> tuple[tuple[int, int], ...]:
-        """The pairs of bodies that must not touch, fixed ones first, the tool last.
-
-        Left out are neighbors, and what touches in nearly all postures.
-        """
-        from seqopt.arms._collisions import touching  # noqa: PLC0415  # it needs this module
-
-        bodies = [*self.fixed, *self.moving]
-        owner = [body.joint for body in bodies] + [self.model.frames[self.flange].parentJoint]
-        parent = self.model.parents
-
-        def near(i: int, j: int) -> bool:
-            return bool(owner[i] == owner[j] or parent[owner[j]] == owner[i])
-
-        pairs = [(i, j) for j in range(len(owner)) for i in range(j) if not near(i, j)]
-        drawn = self.draw(np.random.default_rng(0), _SAMPLES)
-        placed = self.placed(drawn, np.full(_SAMPLES, self.arm.tool_length))
-        share = touching(self, placed, pairs).mean(axis=0)
-        return tuple(pair for pair, often in zip(pairs, share, strict=True) if often < _ALWAYS)
-
 
 def flange_of(model: Any, arm: Arm) -> str:
     """Return the name of the frame that carries the tool."""
@@ -209,26 +185,6 @@ def flange_of(model: Any, arm: Arm) -> str:
     if name not in names:
         raise SceneError(f"arm: the model has no frame {name}; give one of {', '.join(names)}")
     return name
-
-
-def compliance(model: ArmModel, posture: Floats) -> Floats:
-    """Return how a grip gives way in a posture, (6, 6): m/N, and rad/(N m) for rotations.
-
-    By the stiffnesses of its joints alone: J diag(1/k) Jᵀ, of the node that is held, translations
-    first, in the axes of the scene.
-
-    Raises
-    ------
-    SceneError
-        If the arm does not give a stiffness for every joint.
-    """
-    stiffness = np.array(model.arm.joint_stiffness)
-    if len(stiffness) != model.joints:
-        raise SceneError(
-            f"arm: {len(stiffness)} joint stiffnesses for {model.joints} joints; give one each"
-        )
-    jacobian = model.jacobian(posture)
-    return np.asarray(jacobian / stiffness @ jacobian.T)
 
 
 def _axes(arm: Arm) -> Floats:
