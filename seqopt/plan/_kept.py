@@ -33,10 +33,10 @@ def with_postures(problem: Problem, plan: Plan, solved: Callable[[Problem], Plan
         return plan
     first = _found(plan)
     most = max(robot.arm.postures for robot in scene.robots if robot.arm is not None)
-    floor = _floor(plan)
+    floor, bounds = _floor(plan)
     if not first.unreached or recipe_of(problem.engine) is None:
         proven = bool(floor) and not first.unreached
-        return replace(plan, arms=KeptPostures(first, most, most, floor, proven))
+        return replace(plan, arms=KeptPostures(first, most, most, floor, bounds, proven))
     for fewer in (count for count in _FEWER if count < most):
         try:
             other = solved(_narrowed(problem, plan, fewer))
@@ -45,8 +45,8 @@ def with_postures(problem: Problem, plan: Plan, solved: Callable[[Problem], Plan
         found = _found(other)
         if not found.unreached:
             best = bool(floor) and _no_worse(other, floor)
-            return replace(other, arms=KeptPostures(found, most, fewer, floor, best))
-    return replace(plan, arms=KeptPostures(first, most, most, floor, best=False))
+            return replace(other, arms=KeptPostures(found, most, fewer, floor, bounds, best))
+    return replace(plan, arms=KeptPostures(first, most, most, floor, bounds, best=False))
 
 
 def _found(plan: Plan) -> PlanPostures:
@@ -55,12 +55,12 @@ def _found(plan: Plan) -> PlanPostures:
     return found
 
 
-def _floor(plan: Plan) -> dict[str, float]:
-    """Return what no plan stays below, where that is proven of the first goals."""
+def _floor(plan: Plan) -> tuple[dict[str, float], tuple[float, ...]]:
+    """Return what no plan stays below, where that is proven, as people read it and as it is."""
     proof = plan.certificate
     if proof is None or plan.gap is None:
-        return {}
-    return plan._by_goal(proof.bounds[: len(plan.goals)])
+        return {}, ()
+    return plan._by_goal(proof.bounds[: len(plan.goals)]), proof.bounds
 
 
 def _no_worse(plan: Plan, floor: dict[str, float]) -> bool:

@@ -88,6 +88,8 @@ class KeptPostures(Terse):
     floor : dict of str to float
         What no plan stays below with any of those that were looked at, by goal; empty where that
         is not known, as without proof.
+    bounds : tuple of float
+        The same in the units of goals.
     best : bool
         Whether it is proven that none is better.
     """
@@ -96,6 +98,7 @@ class KeptPostures(Terse):
     asked: int
     most: int
     floor: dict[str, float]
+    bounds: tuple[float, ...]
     best: bool
 
     def described(self) -> dict[str, object]:
