@@ -68,6 +68,8 @@ def solve(model: ArmModel, target: Target, draws: np.random.Generator) -> list[F
 
     wanted = model.base.actInv(pin.SE3(target.axes, target.place))
     found: list[Floats] = []
+    if np.linalg.norm(target.place - model.base.translation) > model.span:
+        return found
     for first in model.draw(draws, _TRIES):
         posture = _descend(pin, model, wanted, first)
         if posture is None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -108,6 +109,20 @@ class ArmModel:
         self.above = sum(body.joint == 1 for body in self.moving)  # what turns about the base
         self.low: Floats = np.where(turns, np.maximum(lower, -np.pi), lower)
         self.high: Floats = np.where(turns, np.minimum(upper, np.pi), upper)
+
+        known = len(arm.joint_stiffness)
+        if known not in (0, self.joints):
+            raise SceneError(
+                f"arm: {known} joint stiffnesses for {self.joints} joints; give one each"
+            )
+
+    @cached_property
+    def span(self) -> float:
+        """No flange is farther from the root of the model than this, m."""
+        frame, joints = self.model.frames[self.flange], [*self.model.jointPlacements][1:]
+        links = [*joints, frame.placement]
+        slides = np.maximum(np.abs(self.low), np.abs(self.high))[~self.turns].sum()
+        return float(sum(np.linalg.norm(link.translation) for link in links) + slides)
 
     @property
     def joints(self) -> int:

@@ -40,9 +40,7 @@ def grip_compliance(arm: Arm, posture: Floats) -> Floats:
 
 def _compliance(model: ArmModel, posture: Floats) -> Floats:
     stiffness = np.array(model.arm.joint_stiffness)
-    if len(stiffness) != model.joints:
-        raise SceneError(
-            f"arm: {len(stiffness)} joint stiffnesses for {model.joints} joints; give one each"
-        )
+    if not len(stiffness):
+        raise SceneError("arm: its joints have no stiffness; give joint_stiffness")
     jacobian = model.jacobian(posture)
     return np.asarray(jacobian / stiffness @ jacobian.T)

@@ -6,7 +6,7 @@ import hashlib
 import io
 import re
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -16,21 +16,20 @@ import numpy as np
 from seqopt._files import make_folder, read_bytes, write_bytes
 from seqopt.arms._model import UP, model_path
 from seqopt.arms._reached import Site
-from seqopt.arms.table import PostureTable, _compute_table
-from seqopt.work.progress import Tell
+from seqopt.arms.table import PostureTable
 
 _VERSION = 1  # of what is computed: tables of another one are not taken
 _NAMES = ("robots", "nodes", "bricks")
 _MESH = re.compile(rb'filename="(?:package://|file://)?([^"]+)"')
 
 
-def stored_table(folder: Path, site: Site, tell: Tell) -> PostureTable:
+def stored_table(folder: Path, site: Site, compute: Callable[[], PostureTable]) -> PostureTable:
     """Return the table of a site from a folder, or compute it and keep it there."""
     make_folder(folder)
     path = folder / f"postures-{_key(site)}.npz"
     if path.exists() and (found := _read(path)) is not None:
         return found
-    table = _compute_table(site, tell)
+    table = compute()
     write_bytes(path, _content(table))
     return table
 

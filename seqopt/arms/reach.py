@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 from seqopt.arms._reached import Site
@@ -45,15 +45,16 @@ def find_postures(
         return None
     site = Site.of(scene)
     known = _known(site)
-    if "table" not in known:
-        tell = progress or (lambda _: None)
-        if cache is None:
-            known["table"] = _compute_table(site, tell)
-        else:
-            known["table"] = stored_table(Path(cache), site, tell)
-    return known["table"]
+    compute = partial(_compute_table, site, progress or (lambda _: None))
+    if cache is not None and Path(cache) not in known:
+        known[Path(cache)] = stored_table(Path(cache), site, lambda: known.get(None) or compute())
+        known.setdefault(None, known[Path(cache)])
+    if None not in known:
+        known[None] = compute()
+    return known[None]
 
 
 @lru_cache(maxsize=_SITES)
-def _known(site: Site) -> dict[str, PostureTable]:  # noqa: ARG001  # what it holds is kept by site
+def _known(site: Site) -> dict[Path | None, PostureTable]:  # noqa: ARG001  # kept by site
+    """Return the table of a site, if it is known, and under the folders that have it."""
     return {}
