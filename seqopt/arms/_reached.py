@@ -105,7 +105,7 @@ def reached_alone(site: Site, most: int) -> Reached:
     bricks = obstacles(
         [(convex(c - c.mean(axis=0)), _at(c.mean(axis=0))) for c in corners], corners
     )
-    _require_free(site, robot, overlap(fixed_bodies(model), bricks).any(axis=0))
+    _require_free(site, robot, np.asarray(overlap(fixed_bodies(model), bricks).any(axis=0)))
     places, joints, flanges = _solved(site, model)
     placed = model.placed(joints, np.array([flange.tool for flange in flanges]))
     up = np.array(site.up)

@@ -190,8 +190,9 @@ def _sets(scene: Scene, places: Mapping[str, Sequence[Base]]) -> Iterator[dict[s
 def _kind(robot: Robot) -> object:
     """Return what counts of a robot beside its name and base."""
     assert robot.arm is not None
-    axes = {"x_axis": (1.0, 0.0, 0.0), "y_axis": (0.0, 1.0, 0.0)}
-    return replace(robot, name="any", arm=replace(robot.arm, position=(0.0, 0.0, 0.0), **axes))
+    x, y, nowhere = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 0.0)
+    arm = replace(robot.arm, position=nowhere, x_axis=x, y_axis=y)
+    return replace(robot, name="any", arm=arm)
 
 
 def _standing(scene: Scene, bases: Mapping[str, Base]) -> Scene:
@@ -201,8 +202,9 @@ def _standing(scene: Scene, bases: Mapping[str, Base]) -> Scene:
         base = bases.get(robot.name)
         if base is None or robot.arm is None:
             return robot
-        axes = {"x_axis": base.x_axis, "y_axis": base.y_axis}
-        return replace(robot, arm=replace(robot.arm, position=base.position, **axes))
+        x, y = base.x_axis, base.y_axis
+        arm = replace(robot.arm, position=base.position, x_axis=x, y_axis=y)
+        return replace(robot, arm=arm)
 
     return scene.with_robots(*map(at, scene.robots))
 

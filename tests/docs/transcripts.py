@@ -29,7 +29,7 @@ PAGES = (
     "coming_from",
     *(
         f"guides/{name}"
-        for name in ("own_robots", "both_sides", "limits", "certificate", "infeasible")
+        for name in ("own_robots", "arms", "both_sides", "limits", "certificate", "infeasible")
     ),
 )
 BLOCK = re.compile(r"```(sh|python)\n(.*?)```(?:\n\n```text\n(.*?)```)?", flags=re.DOTALL)

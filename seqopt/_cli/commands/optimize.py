@@ -6,7 +6,7 @@ import argparse
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from math import isfinite
 from typing import Any
 
@@ -226,7 +226,10 @@ def run(options: argparse.Namespace) -> Answer:
     how = _how(options, formulation)
     assemble = time.perf_counter() - start
     tell = options.tell if formulation.on is On.STATES else within(options.tell, limit)
-    choose = partial(solve, formulation=formulation, time_limit=limit, progress=tell, **how)
+
+    def choose(problem: Problem) -> Plan:
+        return solve(problem, formulation, time_limit=limit, progress=tell, **how)
+
     bases = None if options.bases is None else _bases(options, asked.problem, choose)
     plan = choose(asked.problem) if bases is None else bases.plan
     found = _Found(asked, plan, assemble, asked_prover(options, plan.engine.network), bases)
