@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+from seqopt.arms.reach import find_postures
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError
@@ -122,6 +123,7 @@ def _asked(
         made = with_robots(made, options.pop("robots"))
     if not free:
         _refuse(options, FREE_WORDS, f"only the free schedule has it; give schedule={FREE!r}")
+    find_postures(made, options.get("cache"), options.get("progress"))
     criterion, name, formulation = given
     engine = make_engine(name, build_network(made), options.pop("mortar", None))
     moves = _free_rules(options) if free else _open(engine.network, schedule, options)

@@ -24,7 +24,7 @@ ROOMS = (
     {"_files", "work"},
     {"_showing"},
     {"scene"},
-    {"network"},
+    {"network", "arms"},
     {"sequence", "contact"},
     {"engines", "stability"},
     {"responses"},

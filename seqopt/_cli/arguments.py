@@ -97,6 +97,7 @@ COMMANDS = {
     "analyze": _Command("compute forces and displacements in every step", "commands.analyze"),
     "assess": _Command("prove which steps stand, and with what margins", "commands.assess"),
     "report": _Command("make a page that shows plans step by step", "commands.report"),
+    "reach": _Command("say which arms reach which nodes, and how", "commands.reach"),
     "scene": _Command("check, describe, export or list scenes", "commands.scene"),
     "import": _Command(
         "make a scene of an assembly of COMPAS, a mesh or a table", "commands.importing"

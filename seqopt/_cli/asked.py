@@ -17,6 +17,7 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import LIMITED, make_engine
 from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.network.network import Network
+from seqopt.problem._arms import arm_faults
 from seqopt.problem.requirements import overloads
 from seqopt.report.comparison import idle_note
 from seqopt.responses.table import OUTSIDE, REMEDY
@@ -117,6 +118,12 @@ def exceeded(scene: Scene, *tables: pd.DataFrame) -> tuple[str, ...]:
     return tuple(str(excess) for table in tables for excess in overloads(scene, table))
 
 
+def arm_notes(scene: Scene, builds: Mapping[str, Sequence[Step]]) -> tuple[str, ...]:
+    """Return which steps of builds arms cannot be in, in words. ``builds``: by what they are."""
+    faults = ((name, fault) for name, steps in builds.items() for fault in arm_faults(scene, steps))
+    return tuple(f"{name}{': ' * bool(name)}{fault}" for name, fault in faults)
+
+
 def asked_prover(options: argparse.Namespace, network: Network) -> BuildProver:
     """Return what says which steps of builds stand, with the mortars that a command shows."""
     own = getattr(options, "stands", None) or getattr(options, "mortar", None) or "epoxy"
@@ -149,10 +156,11 @@ def strictly(
     over: Sequence[str],
     outside: Sequence[object] = (),
     verdicts: Mapping[str, Sequence[BuildVerdicts]] | None = None,
+    unreached: Sequence[str] = (),
 ) -> Answer:
     """Return an answer, `marked`, with payloads that are `exceeded` and the status of --strict.
 
-    ``verdicts``: by build, with the mortar of the scene last.
+    ``verdicts``: by build, with the mortar of the scene last; ``unreached``: as of `arm_notes`.
     """
     answer = marked(answer, outside)
     answer = replace(answer, facts={**answer.facts, "payloads_exceeded": list(over)})
@@ -162,7 +170,16 @@ def strictly(
         answer = replace(answer, facts={**answer.facts, "stability": found})
         last = {name: own[-1] for name, own in verdicts.items()}
         falls = [f"{name}, {own}" for name, own in last.items() if own.count(Verdict.FALLS)]
-    wrong = {"payload exceeded": over, OUTSIDE: [*map(str, outside)], "does not stand": falls}
+    if unreached:
+        lines = (f"arms: {each}" for each in unreached)
+        answer = replace(answer, notes=(*answer.notes, *lines))
+        answer = replace(answer, facts={**answer.facts, "arms_cannot": list(unreached)})
+    wrong = {
+        "payload exceeded": over,
+        "arms cannot": unreached,
+        OUTSIDE: [*map(str, outside)],
+        "does not stand": falls,
+    }
     said = [f"seqopt: {name}: {'; '.join(each)}" for name, each in wrong.items() if each]
     if not options.strict or not said or answer.status is not Status.DONE:
         return answer

@@ -67,6 +67,9 @@ STABILITY = {
     "--no-stability": "do not prove which steps stand, dry and with epoxy (or the mortar of "
     "--stands or --mortar): quicker"
 }
+POSTURES = {
+    "--cache DIR": "where robots have arms: keep their postures there, and use what is there"
+}
 CSV_OUT = {"--out FILE": "CSV file to write (default: standard output)"}
 
 

@@ -19,9 +19,11 @@ from seqopt._cli.values import (
     parse_robots,
     parse_rules,
 )
+from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
+from seqopt.plan._bases import without_arms
 from seqopt.plan.calling.formulation import On, find_formulation
 from seqopt.problem.problem import (
     Orders,
@@ -78,8 +80,13 @@ def asked_problem(options: argparse.Namespace) -> Asked:
     options.order = None if sought else options.order
     criterion = _criterion(options, of_states=of_states)
     scene = asked_scene(options)
+    if getattr(options, "bases", None) is not None:
+        if options.schedule != FREE or options.order is not None or sought:
+            raise ProblemError(f"--bases: it goes with --schedule {FREE} in the scene's own order")
+        scene = without_arms(scene)  # bases are chosen afterwards
     if options.robots.isdecimal():
         scene = with_robots(scene, int(options.robots))
+    find_postures(scene, getattr(options, "cache", None), options.tell)
     words: dict[str, Any] = {"limits": parse_limits(options.limit, scene)}
     budgets = getattr(options, "budget", [])
     (parse_caps if of_states else parse_budgets)(budgets)  # said before anything is built

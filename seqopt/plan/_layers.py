@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, SolverError, StepError
 from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers, steps_over, travel
@@ -24,12 +24,14 @@ from seqopt.plan.calling.formulation import (
     formulations,
     timed,
 )
+from seqopt.plan.judge._posture_rules import check_postures
 from seqopt.plan.judge.certificate import certify_partial, judge, require_anew
 from seqopt.plan.plan import Plan
 from seqopt.plan.search._pair_search import search_pairs
 from seqopt.plan.search._window_search import search_windows
 from seqopt.problem.criteria import Among
 from seqopt.problem.problem import Aim, AskedBudget
+from seqopt.sequence.steps import Step
 
 CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, without budgets
 
@@ -106,7 +108,7 @@ def _solve_all(graph: PlacementProblem, formulation: Formulation, run: Run) -> P
     seconds["solve"] -= selection.compile_seconds
     with timed(seconds, "verify"):
         certificate = judge(graph, selection, formulation)
-        steps = graph.steps(selection.choice)
+        steps = _checked(graph.steps(selection.choice), graph)
         for layers in _from_cache(graph):
             require_anew(layers, selection.choice)
     stages = {**stages, **{stage: seconds[stage] for stage in ("compile", "solve", "verify")}}
@@ -135,7 +137,7 @@ def _solve_windows(graph: PlacementProblem, formulation: Formulation, run: Run) 
         found = search_windows(graph, Watch(run.time_limit))
     respond = sum(part.evaluation.seconds for part in (found.alone, *found.shared))
     with timed(seconds, "verify"):
-        steps = graph.steps(found.choice)
+        steps = _checked(graph.steps(found.choice), graph)
         require_anew(graph, found.choice, found.met)
     stages = {"respond": respond, "rank": seconds["search"] - respond, "verify": seconds["verify"]}
     chosen = Selection(found.choice, np.nan)
@@ -154,9 +156,20 @@ def _solve_lazily(graph: PlacementProblem, formulation: Formulation, run: Run) -
     chosen, along = found.selection, found.along
     with timed(seconds, "verify"):
         certificate = certify_partial(found.costs, chosen, found.objective)
-        steps = graph.steps(chosen.choice)
+        steps = _checked(graph.steps(chosen.choice), graph)
         require_anew(graph, chosen.choice, along.met)
     return Plan(graph, graph, formulation, chosen, certificate, steps, seconds, along, found.models)
+
+
+def _checked(steps: tuple[Step, ...], graph: PlacementProblem) -> tuple[Step, ...]:
+    """Return steps in which arms can be; a `SolverError` names one in which they cannot."""
+    nominal = graph.nominal if isinstance(graph, ScenarioLayers) else graph
+    try:
+        if isinstance(nominal, Layers):
+            check_postures(nominal.schedule.scene, steps)
+    except StepError as error:
+        raise SolverError(f"a choice is not allowed: {error}") from error
+    return steps
 
 
 def _from_cache(graph: PlacementProblem) -> Iterator[Layers]:

@@ -1,4 +1,4 @@
-"""What is known of a plan, and of the order that it is for."""
+"""What is known of a plan, of the order that it is for, and of the postures of its robots."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
 
+from seqopt.arrays import Terse
 from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.plan.calling.formulation import End
 from seqopt.plan.judge.certificate import TOLERANCE
+from seqopt.problem._arms import faults_in_words
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import length_text
+from seqopt.sequence._postures import PlanPostures
 
 ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
 
@@ -75,3 +78,56 @@ class FoundOrder:
         if is_tolerance(goal.response):  # of which more is better
             return f"no order above {length_text(goal.shown(self.selection.bound))}{claimed}"
         return f"no order below {self.selection.bound:.6g}{claimed}"
+
+
+@dataclass(frozen=True, repr=False)
+class KeptPostures(Terse):
+    """The postures of a plan, and what is known of plans with others.
+
+    Attributes
+    ----------
+    postures : PlanPostures
+        By step, and the steps that arms cannot be in.
+    asked, most : int
+        How many postures at each node were looked at, and with how many the plan was made.
+    floor : dict of str to float
+        What no plan stays below with any of those that were looked at, by goal; empty where that
+        is not known, as without proof.
+    bounds : tuple of float
+        The same in the units of goals.
+    best : bool
+        Whether it is proven that none is better.
+    """
+
+    postures: PlanPostures
+    asked: int
+    most: int
+    floor: dict[str, float]
+    bounds: tuple[float, ...]
+    best: bool
+
+    def described(self) -> dict[str, object]:
+        """Return what the summary of a plan says of arms, ready for JSON."""
+        cannot = faults_in_words(self.postures)
+        found = {
+            "postures_at_a_node": self.most,
+            "of": self.asked,
+            "bound": self.floor,
+            "best_of_table": self.best,
+        }
+        return {"arms": {"said": str(self), "cannot": list(cannot), **found}}
+
+    def __str__(self) -> str:
+        faults = faults_in_words(self.postures)
+        if faults:
+            return "; ".join(faults)
+        kept = "all postures are kept while robots hold"
+        if self.best:
+            return f"{kept}; no plan is better with {_up_to(self.asked)} at a node"
+        at = f"{kept}; made with {_up_to(self.most)} at a node"
+        floor = ", ".join(f"{name} {value:.6g}" for name, value in self.floor.items())
+        return f"{at}, with {_up_to(self.asked)} no plan is below {floor}" if floor else at
+
+
+def _up_to(count: int) -> str:
+    return f"up to {count} postures" if count > 1 else "one posture"

@@ -18,7 +18,7 @@ from seqopt.graph.layers.layers import Layers
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.graph.states.states import States
-from seqopt.plan._status import ENDS, FoundOrder, Status
+from seqopt.plan._status import ENDS, FoundOrder, KeptPostures, Status
 from seqopt.plan._tables import (
     Objectives,
     alternatives,
@@ -78,6 +78,8 @@ class Plan(ShownBuild):
         How many models a lazy search solved; None if all were solved.
     order : FoundOrder or None
         The build order, where it was sought.
+    arms : KeptPostures or None
+        The postures of arms; None where no robot has one, or a graph was solved.
 
     Examples
     --------
@@ -99,6 +101,7 @@ class Plan(ShownBuild):
     search: WindowSearch | None = None
     looked_at: int | None = None
     order: FoundOrder | None = None
+    arms: KeptPostures | None = None
 
     def __repr__(self) -> str:
         what = f"{self.scene_name!r}, {self.method!r}, " if self.steps else ""
@@ -362,8 +365,8 @@ class Plan(ShownBuild):
         unit would save; ``limits``, ``rules``, ``scenarios``, what ``stands``; how it ``ended`` and
         what ``stopped`` it; ``steps``, ``steps_before_release`` without those that let all go at
         the end, ``regrips``, ``idle_robots``, which never grip; limits of the linear range that are
-        left, which model was ``enough``, and payloads that are exceeded; ``models_evaluated``,
-        ``states_in_proof``, ``seconds``;
+        left, which model was ``enough``, what is known of ``arms``, and payloads that are exceeded;
+        ``models_evaluated``, ``states_in_proof``, ``seconds``;
         of criteria of ranks the sums under both ``objectives`` and of heuristics ``gap_parts``; of
         an order that was sought ``order``, ``orders`` (among which), ``order_status``,
         ``order_bound`` (on the first aim, of any order), ``order_bound_proven``,
@@ -399,6 +402,7 @@ def _summarized(plan: Plan) -> dict[str, object]:
         "idle_robots": list(idle_robots(scene, plan.steps)),
         "outside_linear_range": [str(departure) for departure in plan.departures],
         "enough": plan.enough.facts(),
+        **({} if plan.arms is None else plan.arms.described()),
         "payload_exceeded": [str(excess) for excess in plan.overloads],
         "models_evaluated": plan.models,
         "states_in_proof": 0 if proof is None else proof.states,

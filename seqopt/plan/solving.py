@@ -15,6 +15,7 @@ from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.scenarios import ScenarioLayers, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
+from seqopt.plan._kept import with_postures
 from seqopt.plan._layers import solve_layers, with_budgets
 from seqopt.plan._states import solve_orders, solve_states
 from seqopt.plan.calling.formulation import Formulation, On, Run, as_formulation
@@ -318,7 +319,12 @@ def _solved(problem: Any, formulation: Formulation | str | None, run: Run) -> Pl
             f"aim {asked}: {found.name} minimizes the {found.aim.value} of costs; "
             "take another formulation"
         )
-    return replace(SOLVE[on](graph_of(problem, on), found, run), problem=problem)
+
+    def solved(asked: Problem) -> Plan:
+        return SOLVE[on](graph_of(asked, on), found, run)
+
+    plan = with_postures(problem, solved(problem), solved)
+    return replace(plan, problem=problem)
 
 
 def _able(problem: Problem) -> tuple[On, ...]:

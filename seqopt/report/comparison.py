@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from seqopt._files import csv_text
 from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, SeqoptError, StepError
@@ -22,6 +23,7 @@ from seqopt.plan.calling.formulation import On, formulations
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve
+from seqopt.problem._arms import arm_faults
 from seqopt.problem.criteria import RankSum, WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion, overloads
@@ -32,7 +34,7 @@ from seqopt.responses.resources import Resources
 from seqopt.responses.table import Departure, LinearRange, analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, FreeRules
-from seqopt.sequence.schedule_file import MOST, find_schedule
+from seqopt.sequence.schedule_file import MOST, find_schedule, parse_plan
 from seqopt.sequence.steps import AnyStep, idle_robots
 from seqopt.sequence.three_robots import modified_sequential
 from seqopt.sequence.two_robots import METHODS, degeneration
@@ -195,6 +197,9 @@ def _add_largest(
         over = overloads(scene, steps)
         rows[name].update(largest(scene, steps), overloaded=bool(over))
         notes += [f"{name}: {excess}" for excess in over]
+        if scene.has_arms:
+            found = arm_faults(scene, parse_plan(scene, csv_text(steps), name))
+            notes += [f"{name}: {fault}" for fault in found]
     return notes
 
 

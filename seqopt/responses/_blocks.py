@@ -38,6 +38,7 @@ from seqopt.engines._auto import Level, LevelChoice
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
 from seqopt.errors import FileError, MemoryShortError, SceneError
+from seqopt.responses._arms import for_arms
 from seqopt.responses._tolerance import allowed_by, is_tolerance, misfits
 from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite, robot_response
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
@@ -317,7 +318,7 @@ class Batch(FrozenValue):
     steps: tuple[OpenStep, ...]
     names: tuple[frozenset[str], ...]  # responses that each step needs
     rows: Ints  # (P, r); grips, for all possible choices of one step after the other
-    possible: tuple[Bools, ...]  # (C,); which choices of each step leave no node held twice
+    possible: tuple[Bools, ...]  # (C,); which choices of each step are possible: no node held twice
     states: Ints  # (S, r); the different grip sets in them, numbers ascending
     state: Ints  # (P,); which of these each choice leads to
 
@@ -383,7 +384,10 @@ def batch_of(schedule: Schedule, steps: Sequence[OpenStep], wanted: Wanted) -> B
     """Return what open steps with as many bricks and as many grips have in common."""
     names = tuple(frozenset(wanted(schedule.moves[step.moves[-1]].bricks)) for step in steps)
     choices = [combinations(schedule, step) for step in steps]
-    possible = tuple(no_node_twice(rows) for rows in choices)
+    possible = tuple(
+        no_node_twice(rows) & for_arms(schedule.scene, step, rows)
+        for step, rows in zip(steps, choices, strict=True)
+    )
     parts = zip(steps, choices, possible, strict=True)
     rows = np.concatenate([grip_rows(schedule, step, nodes[ok]) for step, nodes, ok in parts])
     states, state = distinct(np.sort(rows, axis=1))

@@ -72,6 +72,21 @@ def printable(where: str, value: str) -> str:
     return value
 
 
+_UNIT = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
+
+
+def unit_axes(value: object, where: str, first: str, second: str) -> None:
+    """Require two fields that are unit vectors at right angles."""
+    where = f"{where}: {first} and {second}"
+    a, b = (vector(where, getattr(value, name)) for name in (first, second))
+    size, other, cosine = (
+        math.fsum(x * y for x, y in zip(*pair, strict=True)) for pair in ((a, a), (b, b), (a, b))
+    )
+    if max(abs(size - 1), abs(other - 1), abs(cosine)) > _UNIT:
+        raise SceneError(f"{where} are {list(a)} and {list(b)}; give perpendicular unit vectors")
+    settle(value, **{first: a, second: b})
+
+
 def whole(where: str, value: int) -> int:
     """Return a whole number up to `LARGEST_NUMBER`, as bricks and nodes have for names."""
     try:

@@ -29,11 +29,13 @@ from seqopt.scene._checks import (
     short,
     sizes,
     stiffness,
+    unit_axes,
     unless_none,
     vector,
     whole,
     wholes,
 )
+from seqopt.scene.arm import Arm
 from seqopt.scene.shape import Polyhedron
 
 _UNIT = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
@@ -43,15 +45,6 @@ _SAME_PLACE = 1e-6  # distance treated as zero, over the size of a block
 
 def _dot(a: Vector, b: Vector) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _unit_axes(value: object, where: str, first: str, second: str) -> None:
-    """Require two fields that are unit vectors at right angles."""
-    where = f"{where}: {first} and {second}"
-    a, b = (vector(where, getattr(value, name)) for name in (first, second))
-    if max(abs(_dot(a, a) - 1), abs(_dot(b, b) - 1), abs(_dot(a, b))) > _UNIT:
-        raise SceneError(f"{where} are {list(a)} and {list(b)}; give perpendicular unit vectors")
-    settle(value, **{first: a, second: b})
 
 
 def _six(where: str, given: Iterable[float]) -> tuple[float, ...]:
@@ -217,7 +210,7 @@ class Brick(Terse):
         settle(self, name=whole("brick: its name", self.name))
         where = f"brick {self.name}"
         check(self, where, position=vector, dimensions=sizes)
-        _unit_axes(self, where, "length_axis", "width_axis")
+        unit_axes(self, where, "length_axis", "width_axis")
         check(self, where, density=density, nodes=wholes, placing_node=whole)
         if len(set(self.nodes)) != 2 or len(self.nodes) != 2:
             raise SceneError(f"{where}: nodes are {list(self.nodes)}; give two different numbers")
@@ -293,7 +286,7 @@ class Spring(Terse):
 
     def _check(self, where: str) -> None:
         check(self, where, position=vector)
-        _unit_axes(self, where, "along", "across")
+        unit_axes(self, where, "along", "across")
         check(self, where, translational_stiffness=stiffness, rotational_stiffness=stiffness)
         check(self, where, thickness=unless_none(length), face=unless_none(_convex_polygon))
 
@@ -425,6 +418,8 @@ class Robot(Terse):
     rotational_stiffness : float or Vector, optional
         The same for turning the node: moments over angles, N m/rad, one number or three about the
         scene's axes. By default a grip lets its node turn.
+    arm : Arm, optional
+        Its arm, which must reach a node as well; see `seqopt.arms`.
 
     Raises
     ------
@@ -447,6 +442,7 @@ class Robot(Terse):
     reach: Reach = field(default_factory=Anywhere)
     stiffness: float | Vector | None = None
     rotational_stiffness: float | Vector | None = None
+    arm: Arm | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         printable("robot", self.name)
@@ -455,3 +451,4 @@ class Robot(Terse):
         check(self, where, stiffness=unless_none(partial(_each_way, unit="N/m, or none if rigid")))
         turning = partial(_each_way, unit="N m/rad, or none if its node may turn")
         check(self, where, rotational_stiffness=unless_none(turning))
+        check(self, where, arm=unless_none(partial(kind_of, kind=Arm)))

@@ -235,6 +235,11 @@ class Scene(Shown):
     def _within_reach(self) -> dict[Reach, tuple[tuple[int, ...], ...]]:
         return {}
 
+    @property
+    def has_arms(self) -> bool:
+        """Whether a robot has an arm, which must reach what it holds; see `seqopt.arms`."""
+        return any(robot.arm is not None for robot in self.robots)
+
     @cached_property
     def placed(self) -> tuple[Brick, ...]:
         """The bricks in build order."""

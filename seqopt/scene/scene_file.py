@@ -12,7 +12,7 @@ import math
 import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from importlib import resources
 from pathlib import Path
@@ -25,6 +25,7 @@ from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import cut, reading_json, short
 from seqopt.scene._loads import Load
+from seqopt.scene.arm import Arm
 from seqopt.scene.library.arch_form import ArchForm, arch, barrel_vault, chain
 from seqopt.scene.library.dome import DomeShape, dome
 from seqopt.scene.library.vault import VaultShape, herringbone_vault
@@ -287,9 +288,22 @@ def load_scene(name: str | Path) -> Scene:
     path = Path(name)
     if not path.suffix and not os.path.lexists(path):
         raise SceneError(_no_such(name))
-    scene = _parse_scene(read_text(path), name)
+    scene = _with_models(_parse_scene(read_text(path), name), path.parent.joinpath)
     warn_of(scene, name)
     return scene
+
+
+def _with_models(scene: Scene, found: Callable[[str], Path]) -> Scene:
+    """Return a scene whose arms have their models, if they are files, where these are found."""
+
+    def placed(robot: Robot) -> Robot:
+        if robot.arm is None or robot.arm.in_package:
+            return robot
+        return replace(robot, arm=replace(robot.arm, urdf=str(found(robot.arm.urdf))))
+
+    if all(robot.arm is None for robot in scene.robots):
+        return scene
+    return replace(scene, robots=tuple(map(placed, scene.robots)))
 
 
 def _no_such(name: str) -> str:
@@ -333,7 +347,11 @@ def _scene_from_dict(document: dict[str, Any]) -> Scene:
     content["grounds"] = [Ground(**ground) for ground in content["grounds"]]
     content["loads"] = [Load(**load) for load in content.get("loads", ())]
     content["robots"] = [
-        Robot(**{**robot, "reach": _reach(robot.get("reach", {"kind": "anywhere"}))})
+        Robot(
+            **robot
+            | {"reach": _reach(robot.get("reach", {"kind": "anywhere"}))}
+            | ({"arm": Arm(**robot["arm"])} if robot.get("arm") else {})
+        )
         for robot in content["robots"]
     ]
     return Scene(**content)
@@ -363,6 +381,11 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     names = {cls: kind for kind, cls in _REACHES.items()}
     for entry, robot in zip(document["robots"], scene.robots, strict=True):
         entry["reach"] = {"kind": names[type(robot.reach)], **entry["reach"]}
+        if robot.arm is None:
+            del entry["arm"]
+        else:
+            usual = {each.name: each.default for each in fields(Arm)}
+            entry["arm"] = {k: v for k, v in entry["arm"].items() if v != usual[k]}
     return document
 
 
@@ -400,7 +423,14 @@ def save_scene(scene: Scene, path: Path) -> None:
     ...     load_scene(f"{folder}/own.json") == scene
     True
     """
-    write_text(path, dump_scene(scene))
+    folder = Path(os.path.abspath(path)).parent  # noqa: PTH100  # links are not followed
+    write_text(path, dump_scene(_with_models(scene, partial(_from, folder))))
+
+
+def _from(folder: Path, model: str) -> Path:
+    """Return where a model is, from a folder if it is in it."""
+    place = Path(os.path.abspath(model))  # noqa: PTH100
+    return place.relative_to(folder) if place.is_relative_to(folder) else place
 
 
 def _reach(entry: dict[str, Any]) -> Reach:

@@ -10,11 +10,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from seqopt.arms._permits import reachable
 from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.sequence.rules import Ending, FreeRules, Newest
 from seqopt.sequence.schedule import islands
-from seqopt.sequence.steps import Grips, Step, StepKind, reachable
+from seqopt.sequence.steps import Grips, Step, StepKind
 from seqopt.sequence.two_robots import placing_node
 
 

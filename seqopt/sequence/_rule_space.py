@@ -14,11 +14,12 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
 
+from seqopt.arms._permits import Permits, permits, within_reach
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse, frozen
 from seqopt.errors import StepError
 from seqopt.network.network import Network
@@ -70,17 +71,14 @@ def sort_robots(
     alike: dict[tuple[object, ...], RobotKind] = {}
     for i in rules.team(scene):
         robot = scene.robots[i]
-        reach = np.array(
-            [
-                node not in scene.blocked_nodes and robot.reach.covers(scene.node_position(node))
-                for node in node_numbers(network)
-            ]
-        )
+        own = {*chain.from_iterable(within_reach(scene, robot))}
+        reach = np.array([node in own for node in node_numbers(network)])
         newest = reach if rules.newest is not Newest.PLACING else _placing(network, robot, reach)
         places = not rules.placers or robot.name in rules.placers
         cap = robot.payload if rules.payload is Payload.KEPT else np.inf
         cap = min(cap, (caps or {}).get(robot.name, np.inf))
-        key = (reach.tobytes(), newest.tobytes(), places, cap, scene.grip_kinds.of_robot[i])
+        alone = (robot.arm and robot.name, scene.grip_kinds.of_robot[i])
+        key = (reach.tobytes(), newest.tobytes(), places, cap, *alone)
         first = alike.setdefault(key, RobotKind((), reach, newest, places, cap))
         alike[key] = replace(first, robots=(*first.robots, i))
     return tuple(alike.values())
@@ -119,6 +117,18 @@ class StateRows(Terse):
     def slots(self) -> tuple[tuple[int, int], ...]:
         """First column of every kind, and the one after its last."""
         return tuple(pairwise(np.cumsum([0, *(len(kind.robots) for kind in self.kinds)]).tolist()))
+
+    @cached_property
+    def _permits(self) -> Permits | None:
+        return permits(self.network.scene)
+
+    def for_arms(self, bricks: int, states: Ints) -> Bools:
+        """Return which states (n, c) arms can be in while so many bricks stand, (n,)."""
+        if self._permits is None:
+            return np.ones(len(states), dtype=bool)
+        held = np.zeros((len(states), len(self.network.scene.robots)), dtype=np.int64)
+        held[:, [r for kind in self.kinds for r in kind.robots]] = states[:, : self.robots]
+        return self._permits.allowed(bricks, held)
 
     def codes(self, states: Ints) -> Ints:
         """Return a number (n,) for every state (n, c) that no other one of its level has."""
@@ -212,7 +222,8 @@ class FreeSpace(StateRows):
         rows, near = np.flatnonzero(able), self._near(bricks)
         moves = self._takes(states[rows], [near[kind.reach[near]] for kind in self.kinds])
         moves.states[:, self.robots :] += 1
-        return Moves(rows[moves.source], moves.states, moves.way)
+        ok = self.for_arms(bricks, moves.states)
+        return Moves(rows[moves.source[ok]], moves.states[ok], moves.way[ok])
 
     def releases(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which one robot lets go, or at the end all do, as rules allow."""
@@ -314,7 +325,7 @@ class FreeSpace(StateRows):
         return Moves(source, new, way)
 
     def _lawful_only(self, bricks: int, moves: Moves) -> Moves:
-        ok = self.lawful(bricks, moves.states)
+        ok = self.lawful(bricks, moves.states) & self.for_arms(bricks, moves.states)
         return Moves(moves.source[ok], moves.states[ok], moves.way[ok])
 
 

@@ -96,6 +96,7 @@ class ScheduleSpace(StateRows):
             after[:, robot] = np.tile(places.ravel(), len(states))
         held = self.held(after)
         kept = ~((held[:, 1:] == held[:, :-1]) & (held[:, 1:] > 0)).any(axis=1)  # a node each
+        kept &= self.for_arms(step.bricks, after)
         source, after = source[kept], after[kept]
         way = self._ways(states[source], after) if self.parks else np.zeros(len(source))
         return ((Moves(source, after, way), step.kind is StepKind.REPOSITION),)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from itertools import chain
 from numbers import Integral
 
+from seqopt.arms._permits import reachable
 from seqopt.errors import StepError
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
@@ -89,11 +89,6 @@ def require_steps(steps: Sequence[Step]) -> Sequence[Step]:
             "give the steps of a method, a plan, or a filled schedule"
         )
     return steps
-
-
-def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
-    """Return the nodes of the first bricks that a robot may hold, in build order."""
-    return tuple(chain.from_iterable(scene.within_reach(robot)[:bricks]))
 
 
 def check_sequence(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
+from seqopt.arms._permits import within_reach
 from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import network_of
 from seqopt.network.network import Network, PartKind
@@ -67,7 +68,7 @@ def _take_turns(
         for placer, holder in starts or permutations(robots, 2)
     }
     for k, brick in enumerate(scene.placed):
-        able = {robot for robot in rank if scene.within_reach(scene.robots[robot])[k]}
+        able = {robot for robot in rank if within_reach(scene, scene.robots[robot])[k]}
         possible = {pair: way for pair, way in ways.items() if pair[0] in able}
         if not possible:
             raise _nobody(scene, [pair[0] for pair in ways], able, k)
@@ -105,7 +106,7 @@ def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list
 
     Bricks are places in build order; of all ways the first is taken, role by role.
     """
-    reach = {r: scene.within_reach(scene.robots[r]) for r in robots}
+    reach = {r: within_reach(scene, scene.robots[r]) for r in robots}
     fits = [[r for r in robots if all(reach[r][b] for b in role)] for role in roles]
     found = _first_match(fits)
     if found:
@@ -218,7 +219,7 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     case takes the brick's own placing node where it is within reach.
     """
     scene = network.scene
-    free = scene.within_reach(robot)[scene.since[brick.name] - 1]
+    free = within_reach(scene, robot)[scene.since[brick.name] - 1]
     if not free:
         raise StepError(
             f"brick {brick.name}: {robot.name} reaches none of its free nodes {list(brick.nodes)}; "

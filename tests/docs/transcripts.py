@@ -29,7 +29,15 @@ PAGES = (
     "coming_from",
     *(
         f"guides/{name}"
-        for name in ("own_robots", "both_sides", "limits", "certificate", "infeasible", "driving")
+        for name in (
+            "own_robots",
+            "arms",
+            "both_sides",
+            "limits",
+            "certificate",
+            "infeasible",
+            "driving",
+        )
     ),
 )
 BLOCK = re.compile(r"```(sh|python)\n(.*?)```(?:\n\n```text\n(.*?)```)?", flags=re.DOTALL)

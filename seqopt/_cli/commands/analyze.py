@@ -10,6 +10,7 @@ import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import (
+    arm_notes,
     asked_engine,
     asked_scene,
     asked_steps,
@@ -21,6 +22,7 @@ from seqopt._cli.asked import (
 )
 from seqopt._cli.options import (
     CSV_OUT,
+    POSTURES,
     STEPS_USAGE,
     declare,
     engine_options,
@@ -32,6 +34,7 @@ from seqopt._cli.outputs import keep_apart, put_table
 from seqopt._cli.values import length_word, parse_time_limit
 from seqopt._files import write_bytes
 from seqopt._interrupts import ending
+from seqopt.arms.reach import find_postures
 from seqopt.engines._auto import AutoEngine, Level
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.registry import provenance
@@ -88,7 +91,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "archive (.npz)",
         "--time-limit SECONDS": "stop after it, with the steps that were computed by then",
     }
-    declare(how, about)
+    declare(how, about | POSTURES)
     form_options(command, strict=True)
 
 
@@ -96,6 +99,7 @@ def run(options: argparse.Namespace) -> Answer:
     """Analyze every step of a sequence."""
     keep_apart(options, options.out, options.fields)
     scene = asked_scene(options)
+    find_postures(scene, options.cache, options.tell)
     network = build_network(scene)
     engine, steps = asked_engine(options, network), asked_steps(options, network)
     limit = parse_time_limit(options.time_limit)
@@ -133,7 +137,8 @@ def run(options: argparse.Namespace) -> Answer:
         status=ended,
         **said,
     )
-    return strictly(answer, options, exceeded(scene, table), outside)
+    unreached = arm_notes(scene, {"": computed})
+    return strictly(answer, options, exceeded(scene, table), outside, unreached=unreached)
 
 
 def _tolerance_notes(

@@ -23,6 +23,7 @@ from seqopt._cli.asked import (
     strictly,
 )
 from seqopt._cli.options import (
+    POSTURES,
     criterion_options,
     declare,
     engine_options,
@@ -39,6 +40,7 @@ from seqopt._cli.outputs import (
 )
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_criterion, parse_grip_range, parse_robots
+from seqopt.arms.reach import find_postures
 from seqopt.engines.registry import provenance
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import FormulationKind, formulations
@@ -102,7 +104,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     robots_option(basic, "all methods, each of which takes as many as it needs")
     declare(basic, WRITTEN)
     criterion_options(command)
-    engine_options(command)
+    declare(engine_options(command), POSTURES)
     form_options(command, strict=True, builds=True)
 
 
@@ -111,6 +113,7 @@ def run(options: argparse.Namespace) -> Answer:
     range_of_grips = options.grips if ".." in (options.grips or "") else ""
     grips = parse_grip_range(range_of_grips) if range_of_grips else ()
     scene = asked_scene(options, ranged=True)
+    find_postures(scene, options.cache, options.tell)
     engine = asked_engine(options, build_network(scene))
     criterion = asked_criterion(options)
     require_out(options)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite
@@ -12,6 +13,7 @@ from typing import Any
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import (
     asked_prover,
+    asked_scene,
     exceeded,
     idle_notes,
     level_notes,
@@ -19,6 +21,7 @@ from seqopt._cli.asked import (
     scene_facts,
     strictly,
 )
+from seqopt._cli.bases import asked_places
 from seqopt._cli.options import (
     LIMIT,
     RULE,
@@ -34,13 +37,16 @@ from seqopt._cli.outputs import ALWAYS, plan_files, require_out, write_outputs, 
 from seqopt._cli.posing import Asked, asked_problem
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import parse_options, parse_size, parse_time_limit
+from seqopt._files import csv_text
 from seqopt.errors import ProblemError
 from seqopt.graph.states.states import States
+from seqopt.plan._bases import FoundBases, choose_bases
 from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation, formulation_names
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.out_of_sample import Trial, judge_unseen, worst_values
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve, usual
+from seqopt.problem._arms import faults_in_words
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import OWN
 from seqopt.responses._tolerance import value_text
@@ -114,6 +120,11 @@ WORKERS = {
     "--workers N": "processes to share the work among; pays from about ten seconds (default: "
     "%(default)s)"
 }
+BASES = {
+    "--bases grid|FILE": "with --schedule free: where the bases of arms stand is chosen too, by "
+    "the best plan that they allow: among places of a grid around the bricks (grid:METERS for its "
+    "spacing), or those of a CSV file with the columns robot, x, y, z, heading_deg"
+}
 MEMORY = {
     "--cache DIR": "keep answers there and use what is there: a run that was ended goes on",
     "--max-memory SIZE": "what responses and costs may take, as 500MB or 2GB (default: four fifths "
@@ -128,7 +139,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     form_options(command, strict=True, builds=True)
     states = "what plans are compared by, state after state, with any schedule"
     declare(command.add_argument_group(states), AIM | STANDING)
-    declare(command.add_argument_group("with --schedule free"), RULE)
+    declare(command.add_argument_group("with --schedule free"), RULE | BASES)
     criterion_options(command)
     engine_options(command)
     declare(command.add_argument_group("how far the search goes (advanced)"), SEARCH)
@@ -167,6 +178,7 @@ class _Found:
     plan: Plan
     assemble: float
     prover: BuildProver
+    bases: FoundBases | None = None
 
     @cached_property
     def trial(self) -> Trial | None:
@@ -217,12 +229,30 @@ def run(options: argparse.Namespace) -> Answer:
     how = _how(options, formulation)
     assemble = time.perf_counter() - start
     tell = options.tell if formulation.on is On.STATES else within(options.tell, limit)
-    plan = solve(asked.problem, formulation, time_limit=limit, progress=tell, **how)
-    found = _Found(asked, plan, assemble, asked_prover(options, plan.engine.network))
-    written = write_outputs(
-        options, lambda: plan_files(plan, found.report, found.prover, found.trial)
-    )
-    return _answer(options, found, written)
+
+    def choose(problem: Problem) -> Plan:
+        return solve(problem, formulation, time_limit=limit, progress=tell, **how)
+
+    bases = None if options.bases is None else _bases(options, asked.problem, choose)
+    plan = choose(asked.problem) if bases is None else bases.plan
+    found = _Found(asked, plan, assemble, asked_prover(options, plan.engine.network), bases)
+
+    def files() -> dict[str, bytes | str]:
+        made = plan_files(plan, found.report, found.prover, found.trial)
+        return made if bases is None else made | {"bases.csv": csv_text(bases.tried)}
+
+    return _answer(options, found, write_outputs(options, files))
+
+
+def _bases(
+    options: argparse.Namespace, problem: Problem, choose: Callable[[Problem], Plan]
+) -> FoundBases:
+    """Return the best plan over the bases that are asked for."""
+    if options.no_proof:
+        raise ProblemError("--no-proof: bases are compared by proven plans; leave it out")
+    scene = asked_scene(options)
+    places = asked_places(scene, options.bases)
+    return choose_bases(problem, scene, places, choose, options.tell)
 
 
 def _how(options: argparse.Namespace, formulation: Formulation) -> dict[str, Any]:
@@ -245,21 +275,26 @@ def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]
     over = () if stopped else exceeded(scene, table)
     lines = [f"{_said(found)}; {written_to(options.out)}"]
     lines += [f"stability, {each}" for each in found.own]
+    lines += [] if found.bases is None else [wrapped(found.bases.said)]
     facts: dict[str, object] = {
         "scene": scene_facts(scene),
         "summary": found.report,
         "proof": _proof(plan),
     }
+    if found.bases is not None:
+        facts["bases"] = found.bases.tried
     if plan.order is not None:
         order = plan.order.selection.order
         facts["order"] = order
         lines.append(wrapped(", ".join(map(str, order)), first="order: "))
+    arms = () if plan.arms is None else (f"arms: {plan.arms}",)
     answer = Answer(
         facts={**facts, "plan": table},
         text="\n".join([*lines, *(f"payload exceeded: {excess}" for excess in over)]),
         written=written,
         notes=(
             *_posed_notes(found.asked.problem),
+            *arms,
             *(() if stopped else (*plan.enough.lines, f"proof: {_proof(plan)}")),
             *idle_notes(scene, plan.steps),
             *refused(found.prover),
@@ -267,7 +302,8 @@ def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]
         failures=(INTERRUPTED,) if stopped else (),
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )
-    return strictly(answer, options, over, plan.departures, found.verdicts)
+    unreached = () if plan.arms is None else faults_in_words(plan.arms.postures)
+    return strictly(answer, options, over, plan.departures, found.verdicts, unreached)
 
 
 def _said(found: _Found) -> str:

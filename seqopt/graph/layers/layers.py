@@ -91,6 +91,12 @@ def _window_anew(evaluation: Evaluation, move: int, before: int) -> tuple[StepCh
     return tuple(replace(each, moves=moves[each.step.number]) for each in found.steps)
 
 
+def _possible(choices: StepChoices) -> Bools:
+    """Return which choices have any response at all: all are NaN where arms cannot be."""
+    known = [~np.isnan(values) for values in choices.responses.values()]
+    return np.asarray(np.any(known, axis=0) if known else True)
+
+
 def _after(choices: StepChoices, before: int) -> StepChoices:
     """Return a step, of two open moves only the choices after a candidate of the first."""
     row = before if len(choices.moves) == 2 else slice(None)
@@ -268,7 +274,7 @@ class Layers(Shown):
         if spread and isinstance(criterion, RankSum):
             criterion = replace(criterion, ranked=Ranked.CONDITIONAL)
         costs = criterion.costs(choices.responses, move.bricks, len(move.candidates))
-        costs = np.where(np.isfinite(costs), costs, np.inf)
+        costs = np.where(np.isfinite(costs) & _possible(choices), costs, np.inf)
         for limit in self.limits:
             costs[limit.exceeded(choices.responses[limit.response])] = np.inf
         return costs

@@ -302,7 +302,8 @@ def _alike(book: RuleBook, most: Mapping[int, float]) -> list[tuple[int, ...]]:
         nodes = [book.newest_nodes[r, b] for b in range(1, last + 1)]
         own = scene.robots[r]
         gives = (own.stiffness, own.rotational_stiffness)
-        key = (book.reached[r, last], tuple(nodes), may, most[r], gives)
+        arm = own.arm and r  # no other robot is where it is
+        key = (book.reached[r, last], tuple(nodes), may, most[r], gives, arm)
         groups.setdefault(key, []).append(r)
     return [tuple(group) for group in groups.values() if len(group) > 1]
 

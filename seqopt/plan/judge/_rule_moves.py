@@ -16,6 +16,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import StepError
 from seqopt.network.network import Network
+from seqopt.plan.judge._posture_rules import PostureRules
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.rules import Ending, Newest
 from seqopt.sequence.schedule import Hold, OpenGrip, Schedule, holds, islands
@@ -68,6 +69,7 @@ class RuleTables:
         names = [book.network.scene.robots[r].name for r in book.team]
         self._able = [not self._rules.placers or name in self._rules.placers for name in names]
         self._book, self._place = book, place
+        self._postures = PostureRules(book.network.scene, book.team)
         self._known: dict[int, _Places] = {}
 
     def _of(self, bricks: int) -> _Places:
@@ -121,7 +123,9 @@ class RuleTables:
         for robot in self._takers() if bricks else ():
             source, after, way = self._taken(states, able, robot, self._of(bricks).reach[robot])
             after[:, self.robots :] += 1
-            yield Follows(bricks, source, self.in_order(after), regrip=True, way=way)
+            ok = self._postures.allow(bricks, after)
+            held = self.in_order(after[ok])
+            yield Follows(bricks, source[ok], held, regrip=True, way=way[ok])
         for source, after in self._released(bricks, states):
             none = np.zeros(len(source))
             yield Follows(bricks, source, self.in_order(after), regrip=False, way=none)
@@ -132,7 +136,7 @@ class RuleTables:
                 newest = self._of(bricks + 1).newest[robot]
                 source, after, way = self._taken(states, keeps, robot, newest)
                 after[:, self.robots :] = 0
-                ok = self.keep(bricks + 1, after)
+                ok = self.keep(bricks + 1, after) & self._postures.allow(bricks + 1, after)
                 placed = self.in_order(after[ok])
                 yield Follows(bricks + 1, source[ok], placed, regrip=False, way=way[ok])
 
@@ -243,6 +247,7 @@ class ScheduleTables:
         at = [scene.node_position(node) for node in self.nodes[1:].tolist()]
         self._at = np.array([[np.nan] * 3, *at])
         self._place = {node: i for i, node in enumerate(self.nodes.tolist())}
+        self._postures = PostureRules(scene, self.team)
         self._holds = {
             (hold.robot, number): hold
             for hold in holds(scene, schedule.steps)
@@ -264,6 +269,8 @@ class ScheduleTables:
         source, after, way = np.arange(len(states)), states, np.zeros(len(states))
         for robot in range(self.robots):
             source, after, way = self._moved(robot, level + 1, (source, after, way))
+        ok = self._postures.allow(self.bricks_at(level + 1), after)
+        source, after, way = source[ok], after[ok], way[ok]
         regrip = self._schedule.steps[level].kind is StepKind.REPOSITION
         yield Follows(level + 1, source, after, regrip=regrip, way=way)
 

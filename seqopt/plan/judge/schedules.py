@@ -19,6 +19,7 @@ import pandas as pd
 from seqopt.errors import SolverError
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
+from seqopt.plan.judge._posture_rules import check_postures
 from seqopt.plan.judge._proof import BELOW, Hint, Proof
 from seqopt.plan.judge._rule_moves import check_scheduled
 from seqopt.plan.judge._standing_proof import proven_margins, require_margin
@@ -82,6 +83,7 @@ def _as_claimed(problem: States, selection: StatePath, steps: Sequence[Step]) ->
         check_scheduled(problem.rules, steps)
     else:
         check_free(problem.network, problem.rules, steps)
+    check_postures(problem.network.scene, steps)
     values = plan_values(problem, steps, selection.objective)
     for goal, value, claimed in zip(problem.names, values, selection.objective, strict=True):
         if not abs(value - claimed) <= TOLERANCE * max(abs(value), abs(claimed)):

@@ -1,0 +1,93 @@
+"""The command ``reach``: which robot's arm reaches which node, with how many postures."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+
+import pandas as pd
+
+from seqopt._cli.answer import Answer
+from seqopt._cli.asked import asked_scene, scene_facts
+from seqopt._cli.options import POSTURES, declare, form_options, scene_options
+from seqopt._cli.outputs import figure_notes, require_out, write_outputs
+from seqopt._cli.terminal import wrapped
+from seqopt._files import csv_text
+from seqopt.arms._listing import find_table, reach_table
+from seqopt.arms.reach import find_postures
+from seqopt.scene.scene import Scene
+
+DESCRIPTION = (
+    "Say which robots reach which nodes with their arms, with how many postures, and up to how "
+    "many bricks. Robots have arms in the scene file; the extra arms computes postures."
+)
+EXAMPLES = ("seqopt reach my.json --out reach", "seqopt reach my.json --cache postures --json")
+WRITTEN = {"--out DIR": "folder to write reach.csv, postures.csv and a picture to"}
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``reach``."""
+    basic = command.add_argument_group("which scene")
+    scene_options(basic)
+    declare(basic, WRITTEN | POSTURES)
+    form_options(command)
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Say what arms reach, and write it if asked."""
+    scene = asked_scene(options)
+    require_out(options)
+    find_postures(scene, options.cache, options.tell)
+    table = reach_table(scene)
+    written = write_outputs(options, lambda: _files(scene, table))
+    lines = [*_described(scene, table)]
+    if written:
+        lines.append(f"written to {options.out}: reach.csv, postures.csv")
+    else:
+        lines.append("--out DIR writes a row for every robot and node, and every posture")
+    return Answer(
+        facts={"scene": scene_facts(scene), "reach": table},
+        text="\n".join(map(wrapped, lines)),
+        written=written,
+        notes=figure_notes() if written else (),
+    )
+
+
+def _files(scene: Scene, table: pd.DataFrame) -> dict[str, bytes | str]:
+    """Return the tables, and the picture if it can be drawn, by file name."""
+    files: dict[str, bytes | str] = {
+        "reach.csv": csv_text(table),
+        "postures.csv": csv_text(find_table(scene).table()),
+    }
+    if figure_notes():
+        return files
+    from seqopt.report._reach import reach_picture  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report._style import picture_files  # noqa: PLC0415
+
+    return files | picture_files("reach", reach_picture(table))
+
+
+def _described(scene: Scene, table: pd.DataFrame) -> Iterator[str]:
+    """Yield what each robot reaches, in words."""
+    free = [node for node in table["node"].unique() if node not in scene.blocked_nodes]
+    last = len(scene.bricks)
+    for name, rows in table[table["node"].isin(free)].groupby("robot", sort=False):
+        able = rows[rows["to_bricks"] > 0]
+        to_end = able[able["to_bricks"] == last]
+        yield (
+            f"{name}: reaches {len(able)} of {len(free)} nodes when their bricks are placed, "
+            f"{len(to_end)} of them up to the last brick; "
+            f"{able['postures'].median() if len(able) else 0:g} postures at a node, by the median"
+        )
+        lacking = [str(node) for node in rows["node"][rows["to_bricks"] == 0]]
+        if lacking:
+            yield f"  never: {_listed(lacking)}"
+        early = able[able["to_bricks"] < last]
+        if len(early):
+            pairs = zip(early["node"], early["to_bricks"], strict=True)
+            yield f"  up to fewer bricks: {_listed([f'{n} ({to})' for n, to in pairs])}"
+
+
+def _listed(names: list[str], most: int = 30) -> str:
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more

@@ -1,0 +1,17 @@
+"""Arms that must reach: postures of robots at nodes, free of bricks, the ground and each other.
+
+A robot of a scene may have an arm, `seqopt.scene.arm.Arm`: a model, a base and a tool. What it
+reaches is then looked up in a table of postures, which pinocchio and coal compute once (extra
+``arms``). Schedules, methods, plans and judges ask this table::
+
+    scene = seqopt.load_scene("mine.json")             # whose robots have arms
+    table = find_postures(scene, cache="postures")     # kept there for the next time
+    table.table()                                      # every posture with its joints
+    plan = seqopt.optimize(scene, "free")              # with postures in every step
+    print(plan.arms)                                   # whether they are kept while robots hold
+"""
+
+from seqopt.arms.reach import find_postures
+from seqopt.arms.table import PostureTable
+
+__all__ = ["PostureTable", "find_postures"]

@@ -1,0 +1,259 @@
+"""The model of an arm: its links as convex bodies, where they are in a posture, and its Jacobian.
+
+Pinocchio reads the URDF and computes where frames are; bodies are convex hulls of the meshes that
+the URDF gives for collisions. It needs the extra ``arms``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import ExtraError, SceneError
+from seqopt.scene.arm import Arm
+
+UP = 4  # folders above a URDF in which packages that it names are looked for
+
+
+def needs_extra() -> None:
+    """Raise an `ExtraError` if what computes postures is not installed."""
+    for name in ("pinocchio", "coal"):
+        if find_spec(name) is None:
+            raise ExtraError("arms need pinocchio and coal: pip install 'seqopt[arms]'")
+
+
+def model_path(arm: Arm) -> Path:
+    """Return where the URDF of an arm is.
+
+    Raises
+    ------
+    SceneError
+        If there is no such file, or no such package is installed.
+    """
+    if not arm.in_package:
+        path = Path(arm.urdf)
+        if not path.is_file():
+            raise SceneError(f"arm: there is no file {arm.urdf}; give a URDF, or package:path")
+        return path
+    package, _, rest = arm.urdf.partition(":")
+    spec = find_spec(package)
+    if spec is None or not spec.submodule_search_locations:
+        raise SceneError(f"arm: package {package} is not installed; pip install {package}")
+    for path in (Path(root, rest) for root in spec.submodule_search_locations):
+        if path.is_file():
+            return path
+    raise SceneError(f"arm: package {package} has no file {rest}")
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A convex body of an arm.
+
+    ``joint``: that moves it, 0 for none; ``shape``: as coal has it; ``rotation``, ``shift``: where
+    it is from that joint; ``points`` (m, 3): its corners, from there.
+    """
+
+    name: str
+    joint: int
+    shape: Any
+    rotation: Floats
+    shift: Floats
+    points: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Where moving bodies are in postures, in the axes of the scene.
+
+    ``rotation`` (P, L, 3, 3); ``shift`` (P, L, 3), m; ``low``, ``high`` (P, L, 3): boxes around
+    them, m; ``tools`` (P,): how long the body of the tool, the last one, is, m.
+    """
+
+    rotation: Floats
+    shift: Floats
+    low: Floats
+    high: Floats
+    tools: Floats
+
+    def rows(self, rows: Ints | Bools) -> Placed:
+        """Return those of some postures."""
+        parts = (self.rotation, self.shift, self.low, self.high, self.tools)
+        return Placed(*(part[rows] for part in parts))
+
+
+class ArmModel:
+    """An arm as pinocchio and coal have it, with its base where it stands."""
+
+    def __init__(self, arm: Arm) -> None:
+        needs_extra()
+        import pinocchio as pin  # noqa: PLC0415  # an extra
+
+        self.arm, path = arm, model_path(arm)
+        self.model, geometry = _read(pin, path, arm)
+        self.data = self.model.createData()
+        self.flange = self.model.getFrameId(flange_of(self.model, arm))
+        self.base = pin.SE3(_axes(arm), np.array(arm.position))
+        bodies = [*_bodies(geometry)]
+        self.fixed = [body for body in bodies if body.joint == 0]
+        self.moving = [body for body in bodies if body.joint > 0]
+        lower, upper = self.model.lowerPositionLimit, self.model.upperPositionLimit
+        turns = np.array([joint.shortname().startswith("JointModelR") for joint in _joints(self)])
+        self.turns: Bools = turns
+        self.above = sum(body.joint == 1 for body in self.moving)  # what turns about the base
+        self.low: Floats = np.where(turns, np.maximum(lower, -np.pi), lower)
+        self.high: Floats = np.where(turns, np.minimum(upper, np.pi), upper)
+
+        known = len(arm.joint_stiffness)
+        if known not in (0, self.joints):
+            raise SceneError(
+                f"arm: {known} joint stiffnesses for {self.joints} joints; give one each"
+            )
+
+    @cached_property
+    def span(self) -> float:
+        """No flange is farther from the root of the model than this, m."""
+        frame, joints = self.model.frames[self.flange], [*self.model.jointPlacements][1:]
+        links = [*joints, frame.placement]
+        slides = np.maximum(np.abs(self.low), np.abs(self.high))[~self.turns].sum()
+        return float(sum(np.linalg.norm(link.translation) for link in links) + slides)
+
+    @property
+    def joints(self) -> int:
+        """How many joints move it."""
+        return int(self.model.nq)
+
+    def draw(self, draws: np.random.Generator, count: int) -> Floats:
+        """Return postures (count, joints) within its limits, drawn at random."""
+        return self.low + draws.random((count, self.joints)) * (self.high - self.low)
+
+    def flange_pose(self, posture: Floats) -> tuple[Floats, Floats]:
+        """Return the axes (3, 3), as columns, and the place (3,) of the flange in the scene."""
+        import pinocchio as pin  # noqa: PLC0415  # an extra
+
+        pin.forwardKinematics(self.model, self.data, posture)
+        found = self.base * pin.updateFramePlacement(self.model, self.data, self.flange)
+        return found.rotation, found.translation
+
+    def jacobian(self, posture: Floats) -> Floats:
+        """Return how the node that is held moves and turns with joints, (6, joints).
+
+        Translation first, then rotation, in the axes of the scene.
+        """
+        import pinocchio as pin  # noqa: PLC0415  # an extra
+
+        axes, _ = self.flange_pose(posture)
+        pin.computeJointJacobians(self.model, self.data, posture)
+        frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        own = pin.getFrameJacobian(self.model, self.data, self.flange, frame)
+        turned = np.vstack([self.base.rotation @ own[:3], self.base.rotation @ own[3:]])
+        away = self.arm.tool_length * axes[:, 2]
+        turned[:3] += np.cross(turned[3:], away, axis=0)
+        return np.asarray(turned)
+
+    def placed(self, postures: Floats, tools: Floats) -> Placed:
+        """Return where moving bodies are in postures (P, joints).
+
+        ``tools`` (P,): how long the body of the tool is in each, m.
+        """
+        import pinocchio as pin  # noqa: PLC0415  # an extra
+
+        count, links = len(postures), len(self.moving) + 1
+        rotation, shift = np.zeros((count, links, 3, 3)), np.zeros((count, links, 3))
+        for i, posture in enumerate(postures):
+            pin.forwardKinematics(self.model, self.data, posture)
+            for k, body in enumerate(self.moving):
+                at = self.data.oMi[body.joint]
+                rotation[i, k] = at.rotation @ body.rotation
+                shift[i, k] = at.rotation @ body.shift + at.translation
+            end = pin.updateFramePlacement(self.model, self.data, self.flange)
+            rotation[i, -1] = end.rotation
+            shift[i, -1] = end.translation + 0.5 * tools[i] * end.rotation[:, 2]
+        rotation = self.base.rotation @ rotation
+        shift = shift @ self.base.rotation.T + self.base.translation
+        low, high = self._boxes(rotation, shift, tools)
+        return Placed(rotation, shift, low, high, tools)
+
+    def _boxes(self, rotation: Floats, shift: Floats, tools: Floats) -> tuple[Floats, Floats]:
+        """Return the lowest and highest coordinates of bodies, each (P, L, 3), m."""
+        low, high = np.zeros(shift.shape), np.zeros(shift.shape)
+        for k, body in enumerate(self.moving):
+            points = np.einsum("pij,mj->pmi", rotation[:, k], body.points)
+            low[:, k], high[:, k] = points.min(axis=1), points.max(axis=1)
+        axis = rotation[:, -1, :, 2]
+        half = 0.5 * tools[:, None] * np.abs(axis)
+        half += self.arm.tool_radius * np.sqrt(np.clip(1 - axis**2, 0.0, None))
+        low[:, -1], high[:, -1] = -half, half
+        return low + shift, high + shift
+
+
+def flange_of(model: Any, arm: Arm) -> str:
+    """Return the name of the frame that carries the tool."""
+    names = [frame.name for frame in model.frames]
+    name = arm.flange or ("tool0" if "tool0" in names else names[-1])
+    if name not in names:
+        raise SceneError(f"arm: the model has no frame {name}; give one of {', '.join(names)}")
+    return name
+
+
+def _axes(arm: Arm) -> Floats:
+    """Return the directions of the base as columns."""
+    x, y = np.array(arm.x_axis), np.array(arm.y_axis)
+    return np.column_stack([x, y, np.cross(x, y)])
+
+
+def _joints(model: ArmModel) -> list[Any]:
+    return [*model.model.joints][1:]
+
+
+def _read(pin: Any, path: Path, arm: Arm) -> tuple[Any, Any]:
+    """Return the model of a URDF, joints locked that do not move the flange, and its bodies."""
+    folders = [str(folder) for folder in [*path.resolve().parents][:UP]]
+    try:
+        model = pin.buildModelFromUrdf(str(path))
+        geometry = pin.buildGeomFromUrdf(
+            model, str(path), pin.GeometryType.COLLISION, package_dirs=folders
+        )
+    except (ValueError, RuntimeError) as error:
+        why = str(error).strip().splitlines()[0]
+        raise SceneError(f"arm: {path} cannot be read ({why}); give a URDF with meshes") from error
+    end = model.frames[model.getFrameId(flange_of(model, arm))].parentJoint
+    moves = {*model.supports[end]}
+    still = [joint for joint in range(1, model.njoints) if joint not in moves]
+    if still:
+        model, geometry = pin.buildReducedModel(model, geometry, still, pin.neutral(model))
+    if model.nq != model.nv or not np.isfinite(model.upperPositionLimit).all():
+        raise SceneError(f"arm: {path} has a joint without limits; give it some")
+    if not model.nq:
+        raise SceneError(f"arm: no joint of {path} moves its flange; name another flange")
+    return model, geometry
+
+
+def _bodies(geometry: Any) -> Iterator[Body]:
+    """Yield the convex bodies of a model."""
+    import coal  # noqa: PLC0415  # an extra
+
+    for each in geometry.geometryObjects:
+        shape = each.geometry
+        if isinstance(shape, coal.BVHModelBase):
+            shape.buildConvexHull(True, "Qt")  # noqa: FBT003  # coal's own
+            shape = shape.convex
+        at = each.placement
+        points = _corners(shape)
+        yield Body(each.name, each.parentJoint, shape, at.rotation, at.translation, points)
+
+
+def _corners(shape: Any) -> Floats:
+    """Return points (m, 3) in whose convex hull a shape lies."""
+    if hasattr(shape, "num_points"):
+        return np.array([shape.point(i) for i in range(shape.num_points)]).reshape(-1, 3)
+    shape.computeLocalAABB()
+    box = shape.aabb_local
+    ends = np.array([box.min_, box.max_])
+    return np.array([ends[[i, j, k], [0, 1, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])

@@ -1,0 +1,168 @@
+"""What arms allow in the build order of a scene: who reaches which node, and who together.
+
+Of a state it is asked whether there are postures that go together; with one posture of every robot
+at every node this is the one that a robot keeps while it holds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from seqopt.arms._choice import choose
+from seqopt.arms.reach import find_postures
+from seqopt.arms.table import PostureTable
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
+from seqopt.scene.parts import Robot
+from seqopt.scene.scene import Scene
+
+_SCENES = 32  # of which it is kept, the last ones that were asked for
+_WAYS = 8_000_000  # of holding that are looked at together
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Permits(FrozenValue):
+    """What the postures of a table allow in the build order of a scene.
+
+    Robots are those of the scene; nodes are places in build order from 1, brick by brick, and 0 is
+    that of a robot that holds nothing, or has no arm.
+
+    Attributes
+    ----------
+    rows : (R, 2B + 1, K) int
+        The postures with which plans are made, as rows of the table, the best first; -1 for none.
+    ends : (P + 1,) float
+        By row, from which brick count on something stands that is hit in it; infinite for never,
+        and zero, as the last one, for no posture.
+    collide : (P + 1, P + 1) bool
+        Which rows are in each other's way; no posture is in no one's.
+    armed : tuple of int
+        The robots that have arms.
+    """
+
+    rows: Ints
+    ends: Floats
+    collide: Bools
+    armed: tuple[int, ...]
+
+    @cached_property
+    def until(self) -> Floats:
+        """From which brick count on each robot cannot hold each node, (R, 2B + 1)."""
+        out = self.ends[self.rows].max(axis=2)
+        out[:, 0] = np.inf
+        out[[r for r in range(len(out)) if r not in self.armed]] = np.inf
+        return frozen(out)
+
+    def allowed(self, bricks: int, held: Ints) -> Bools:
+        """Return which states have postures that go together, (n,).
+
+        ``held`` (n, R): places that robots hold, a column each; none above 0 is a free robot.
+        """
+        rows = held.clip(min=0)
+        out = np.ones(len(rows), dtype=bool)
+        for robot in self.armed:
+            out &= self.until[robot, rows[:, robot]] > bricks
+        step = max(1, _WAYS // self.rows.shape[2] ** len(self.armed))
+        able = np.flatnonzero(out)
+        for start in range(0, len(able), step):
+            block = able[start : start + step]
+            out[block] = self._together(bricks, rows[block])
+        return out
+
+    def _together(self, bricks: int, held: Ints) -> Bools:
+        """Return which states have postures that go together, of those with some for each."""
+        ways = np.ones((len(held), 1), dtype=bool)
+        earlier: list[Ints] = []
+        for robot in self.armed:
+            rows = self.rows[robot, held[:, robot]]
+            free = held[:, robot] == 0
+            rows[free, 0] = -1
+            usable = self.ends[rows] > bricks
+            usable[free, 0] = True
+            longer = ways[:, :, None] & usable[:, None, :]
+            for k, before in enumerate(earlier):
+                after = before.shape[1] ** (len(earlier) - 1 - k)
+                apart = ~self.collide[before[:, :, None], rows[:, None, :]]
+                spread = np.repeat(apart, after, axis=1)
+                longer &= np.tile(spread, (1, longer.shape[1] // spread.shape[1], 1))
+            ways = longer.reshape(len(held), -1)
+            earlier.append(rows)
+        return np.asarray(ways.any(axis=1))
+
+
+def permits(scene: Scene) -> Permits | None:
+    """Return what arms allow in the build order of a scene; None if no robot has one."""
+    return _permits(scene) if scene.has_arms else None
+
+
+@lru_cache(maxsize=_SCENES)
+def _permits(scene: Scene) -> Permits:
+    table = find_postures(scene)
+    assert table is not None
+    nodes = _placed_nodes(scene)
+    place = {node: i for i, node in enumerate(nodes, start=1)}
+    since = np.array([scene.since[name] for name in table.bricks], dtype=float)
+    ends = np.where(table.hits, since, np.inf).min(axis=1, initial=np.inf)
+    at = np.array([place[node] for node in table.nodes])[table.node]
+    number = [r for r, robot in enumerate(scene.robots) if robot.arm is not None]
+    collide = np.pad(table.collide, ((0, 1), (0, 1)))
+    most = max(arm.postures for arm in (robot.arm for robot in scene.robots) if arm is not None)
+    rows = np.full((len(scene.robots), len(nodes) + 1, most), -1)
+    best = _chosen(table, at, ends, len(nodes))
+    for own, r in enumerate(number):
+        arm = scene.robots[r].arm
+        assert arm is not None
+        for p in np.unique(at[table.robot == own]).tolist():
+            some = np.flatnonzero((table.robot == own) & (at == p))
+            order = np.lexsort((-ends[some], some != best[own, p]))[: arm.postures]
+            rows[r, p, : len(order)] = some[order]
+    return Permits(rows, np.append(ends, 0.0), collide, tuple(number))
+
+
+def _chosen(table: PostureTable, at: Ints, ends: Floats, nodes: int) -> Ints:
+    """Return the posture of every robot of a table at every place, (R, nodes + 1).
+
+    ``at`` (P,): places of postures; ``ends`` (P,): from which brick count on they hit something.
+    """
+    first = (at + 1) // 2  # the count at which the brick of a place is placed
+    last = nodes // 2 + 1
+    usable = (np.minimum(ends, last) - first).clip(min=0) / (last - first)
+    count = (np.arange(nodes + 1) + 1) // 2
+    together = 1.0 / (1.0 + np.abs(count[:, None] - count))
+    none = np.full((len(table.robots), nodes + 1), -1)
+    return choose((table.robot, at), usable, table.collide, together, none)
+
+
+def _placed_nodes(scene: Scene) -> tuple[int, ...]:
+    return tuple(node for brick in scene.placed for node in brick.nodes)
+
+
+def within_reach(scene: Scene, robot: Robot) -> tuple[tuple[int, ...], ...]:
+    """Return the nodes, not blocked, that a robot reaches, brick by brick in build order.
+
+    That of an arm is in reach if a posture of it is possible when the brick is placed.
+    """
+    own = scene.within_reach(robot)
+    if robot.arm is None:
+        return own
+    found = permits(scene)
+    assert found is not None
+    until = found.until[scene.robots.index(robot)]
+    return tuple(
+        tuple(n for i, n in enumerate(b.nodes) if n in nodes and until[2 * k + i + 1] > k + 1)
+        for k, (b, nodes) in enumerate(zip(scene.placed, own, strict=True))
+    )
+
+
+def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
+    """Return the nodes of the first bricks that a robot may hold while these stand, in order."""
+    nodes = [node for brick in within_reach(scene, robot)[:bricks] for node in brick]
+    if robot.arm is None:
+        return tuple(nodes)
+    found = permits(scene)
+    assert found is not None
+    until = found.until[scene.robots.index(robot)]
+    place = {node: i for i, node in enumerate(_placed_nodes(scene), start=1)}
+    return tuple(node for node in nodes if until[place[node]] > bricks)

@@ -1,0 +1,202 @@
+"""The postures of one arm at all nodes, free of what stands still, and the bricks that they hit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from seqopt.arms._choice import diverse
+from seqopt.arms._collisions import (
+    apart_pairs,
+    convex,
+    fixed_bodies,
+    hits,
+    obstacles,
+    overlap,
+    touching,
+)
+from seqopt.arms._inverse import solve, targets
+from seqopt.arms._model import ArmModel, Placed
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import SceneError
+from seqopt.scene.arm import MOST
+from seqopt.scene.parts import Brick, Robot
+from seqopt.scene.scene import Scene
+
+_KEPT = 64  # robots of which postures are kept, the last ones that were asked for
+_BY_POSTURE = ("node", "joints", "axes", "place", "hits")
+_SEED = 4600  # with the number of the node, of what is drawn for it
+
+
+@dataclass(frozen=True)
+class Site:
+    """What postures depend on: bricks and nodes, arms and what is up; not the build order.
+
+    ``bricks``: by their names, ascending; ``blocked``: nodes that nobody may hold.
+    """
+
+    bricks: tuple[Brick, ...]
+    robots: tuple[Robot, ...]
+    blocked: tuple[int, ...]
+    up: tuple[float, float, float]
+
+    @classmethod
+    def of(cls, scene: Scene) -> Site:
+        """Return that of a scene; robots without an arm are in no one's way."""
+        bricks = tuple(sorted(scene.bricks, key=lambda brick: brick.name))
+        robots = tuple(
+            replace(robot, payload=1.0, arm=replace(robot.arm, postures=MOST))
+            for robot in scene.robots
+            if robot.arm is not None
+        )
+        return cls(bricks, robots, tuple(sorted(scene.blocked_nodes)), scene.up)
+
+    def alone(self, robot: int) -> Site:
+        """Return the same with one of the robots, whatever its name."""
+        return replace(self, robots=(replace(self.robots[robot], name="alone"),))
+
+    def together(self, one: int, two: int) -> bool:
+        """Return whether two robots must keep apart."""
+        arms = (self.robots[one].arm, self.robots[two].arm)
+        return all(arm is not None and arm.keeps_apart for arm in arms)
+
+    @property
+    def nodes(self) -> tuple[int, ...]:
+        """All nodes, brick by brick."""
+        return tuple(node for brick in self.bricks for node in brick.nodes)
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """The postures of one robot at all nodes, as a table has them, and where its bodies are.
+
+    ``found`` (N,): how many there are at each node, before all but some are left out.
+    """
+
+    model: ArmModel
+    node: Ints
+    joints: Floats
+    axes: Floats
+    place: Floats
+    hits: Bools
+    placed: Placed
+    found: Ints
+
+    def rows(self, rows: Ints) -> Reached:
+        """Return some of the postures."""
+        parts = {name: getattr(self, name)[rows] for name in _BY_POSTURE}
+        return replace(self, placed=self.placed.rows(rows), **parts)
+
+
+@lru_cache(maxsize=_KEPT)
+def reached_alone(site: Site, most: int) -> Reached:
+    """Return the postures of the one robot of a site at all nodes: at most so many at each.
+
+    They touch neither the ground, which is level with the lower one of its base and of the lowest
+    brick, nor the arm itself, nor, the tool aside, the brick that is gripped.
+    """
+    (robot,) = site.robots
+    assert robot.arm is not None
+    model, corners = ArmModel(robot.arm), [_corners(brick) for brick in site.bricks]
+    bricks = obstacles(
+        [(convex(c - c.mean(axis=0)), _at(c.mean(axis=0))) for c in corners], corners
+    )
+    _require_free(site, robot, np.asarray(overlap(fixed_bodies(model), bricks).any(axis=0)))
+    places, joints, flanges = _solved(site, model)
+    placed = model.placed(joints, np.array([flange.tool for flange in flanges]))
+    up = np.array(site.up)
+    ground = min(float(model.base.translation @ up), *(float((c @ up).min()) for c in corners))
+    clear = ~np.asarray(touching(model, placed, apart_pairs(model)).any(axis=1))
+    clear &= (_lowest(model, placed, up) > ground)[:, model.above :].all(axis=1)
+    rows = np.flatnonzero(clear)
+    struck = hits(model, placed.rows(rows), bricks)
+    held = places[rows] // 2  # the tool goes around the brick that it grips, the arm does not
+    at = np.arange(len(rows))
+    some = np.flatnonzero(~struck[at, :-1, held].any(axis=1))
+    struck[at, -1, held] = False
+    hit = np.asarray(struck.any(axis=1))
+    counts = np.bincount(places[rows[some]], minlength=len(site.nodes))
+    some = some[diverse(places[rows[some]], joints[rows[some]], hit[some], most)]
+    kept = rows[some]
+    return Reached(
+        model=model,
+        node=places[kept],
+        joints=joints[kept],
+        axes=np.array([flanges[i].axes for i in kept]).reshape(-1, 3, 3),
+        place=np.array([flanges[i].place for i in kept]).reshape(-1, 3),
+        hits=hit[some],
+        placed=placed.rows(kept),
+        found=counts,
+    )
+
+
+def _require_free(site: Site, robot: Robot, inside: Bools) -> None:
+    """Raise a `SceneError` if a base stands in a brick. ``inside`` (B,): in which it does."""
+    if inside.any():
+        name = site.bricks[int(inside.argmax())].name
+        raise SceneError(f"robot {robot.name}: the base of its arm hits brick {name}; move it")
+
+
+def beside_others(site: Site, alone: Sequence[Reached]) -> list[Reached]:
+    """Return the postures of robots that touch no base of another one.
+
+    Raises `SceneError` if two bases touch.
+    """
+    bases = [fixed_bodies(each.model) for each in alone]
+    out = []
+    for i, own in enumerate(alone):
+        clear = np.ones(len(own.node), dtype=bool)
+        for j in (j for j in range(len(alone)) if j != i and site.together(i, j)):
+            if overlap(bases[i], bases[j]).any():
+                one, two = (site.robots[k].name for k in (i, j))
+                raise SceneError(f"robot {one}: the base of its arm hits that of {two}; move one")
+            clear &= ~np.asarray(hits(own.model, own.placed, bases[j]).any(axis=(1, 2)))
+        out.append(own.rows(np.flatnonzero(clear)))
+    return out
+
+
+def _solved(site: Site, model: ArmModel) -> tuple[Ints, Floats, list[Any]]:
+    """Return the nodes, as places, the joints and the targets of all postures of a robot."""
+    reach = site.robots[0].reach
+    nodes, joints, flanges = [], [], []
+    for place, node in enumerate(site.nodes):
+        brick = site.bricks[place // 2]
+        if node in site.blocked or not reach.covers(brick.node_position(node)):
+            continue
+        draws = np.random.default_rng((_SEED, place))
+        for target in targets(model, brick, node):
+            for posture in solve(model, target, draws):
+                nodes.append(place)
+                joints.append(posture)
+                flanges.append(target)
+    rows = np.array(joints).reshape(-1, model.joints)
+    return np.array(nodes, dtype=np.int64), rows, flanges
+
+
+def _lowest(model: ArmModel, placed: Placed, up: Floats) -> Floats:
+    """Return how high the lowest point of each moving body is, (P, L), m."""
+    out = placed.shift @ up
+    for k, body in enumerate(model.moving):
+        out[:, k] += (placed.rotation[:, k].transpose(0, 2, 1) @ up @ body.points.T).min(axis=1)
+    lean = placed.rotation[:, -1, :, 2] @ up
+    out[:, -1] -= 0.5 * placed.tools * np.abs(lean)
+    out[:, -1] -= model.arm.tool_radius * np.sqrt(np.clip(1.0 - lean**2, 0.0, None))
+    return np.asarray(out)
+
+
+def _at(place: Floats) -> Any:
+    import coal  # noqa: PLC0415  # an extra
+
+    return coal.Transform3s(np.eye(3), place)
+
+
+def _corners(brick: Brick) -> Floats:
+    """Return the corners of a brick (m, 3), m."""
+    if brick.shape is not None:
+        return np.array(brick.position) + brick.shape.points
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    return np.asarray(brick.position + 0.5 * signs * np.array(brick.dimensions) @ brick.frame)

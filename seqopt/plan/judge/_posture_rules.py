@@ -1,0 +1,94 @@
+"""Which states the arms of robots can be in, looked up in the posture table, one by one.
+
+A second route to what `seqopt.arms.reach.Permits` says: it takes from there with which postures
+plans are made, and asks the table itself what these hit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from seqopt.arms._permits import permits
+from seqopt.arms.reach import find_postures
+from seqopt.arrays import Bools, Ints
+from seqopt.errors import StepError
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Step
+
+
+class PostureRules:
+    """What a posture table allows to robots in a scene.
+
+    ``team``: the robots of columns of states, by their indices.
+    """
+
+    def __init__(self, scene: Scene, team: Sequence[int]) -> None:
+        self._table, found = find_postures(scene), permits(scene)
+        self._armed = [(c, r) for c, r in enumerate(team) if scene.robots[r].arm is not None]
+        self._known: dict[tuple[int, ...], bool] = {}
+        self._options: dict[tuple[int, int, int], int] = {}
+        if self._table is not None and found is not None:
+            self._rows = found.rows
+            column = {name: i for i, name in enumerate(self._table.bricks)}
+            self._placed = [column[name] for name in scene.build_order]
+            self._apart = [_bits(~np.array(row)) for row in self._table.collide]
+
+    def allow(self, bricks: int, states: Ints) -> Bools:
+        """Return which states have postures that go together while so many bricks stand, (n,).
+
+        ``states`` (n, c): places in build order of the nodes held, from 1; none above 0 is free.
+        """
+        if self._table is None or not self._armed:
+            return np.ones(len(states), dtype=bool)
+        held = states[:, [column for column, _ in self._armed]].clip(min=0)
+        return np.array([self._allows(bricks, row) for row in held.tolist()], dtype=bool)
+
+    def _allows(self, bricks: int, places: list[int]) -> bool:
+        key = (bricks, *places)
+        if key not in self._known:
+            pairs = zip(self._armed, places, strict=True)
+            masks = [self._mask(bricks, robot, place) for (_, robot), place in pairs if place]
+            self._known[key] = self._fit(masks)
+        return self._known[key]
+
+    def _mask(self, bricks: int, robot: int, place: int) -> int:
+        """Return the postures of a robot at a place that hit nothing, as bits of a number."""
+        key = (bricks, robot, place)
+        if key not in self._options:
+            assert self._table is not None
+            standing = self._placed[:bricks]
+            rows = [row for row in self._rows[robot, place].tolist() if row >= 0]
+            clear = (row for row in rows if not self._table.hits[row, standing].any())
+            self._options[key] = sum(1 << row for row in clear)
+        return self._options[key]
+
+    def _fit(self, masks: Sequence[int]) -> bool:
+        """Return whether there is a posture in each set that goes with those in the others."""
+        if not masks:
+            return True
+        first, rest = masks[0], masks[1:]
+        while first:
+            row = (first & -first).bit_length() - 1
+            left = [mask & self._apart[row] for mask in rest]
+            if all(left) and self._fit(left):
+                return True
+            first &= first - 1
+        return False
+
+
+def _bits(row: Bools) -> int:
+    """Return a row of flags as a number, the first one its lowest bit."""
+    return int.from_bytes(np.packbits(row, bitorder="little").tobytes(), "little")
+
+
+def check_postures(scene: Scene, steps: Sequence[Step]) -> None:
+    """Raise a `StepError` if arms have no postures that go together in a step."""
+    rules = PostureRules(scene, range(len(scene.robots)))
+    nodes = [node for brick in scene.placed for node in brick.nodes]
+    place = {None: 0} | {node: i for i, node in enumerate(nodes, start=1)}
+    for step in steps:
+        held = np.array([[place[node] for node in step.grips]])
+        if not rules.allow(step.bricks, held)[0]:
+            raise StepError(f"step {step.number}: arms cannot hold {list(step.held)} together")

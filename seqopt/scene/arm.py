@@ -1,0 +1,128 @@
+"""The arm of a robot: which model it is, where its base stands, and how its tool grips a brick.
+
+Lengths are in m, joint stiffnesses in N m/rad. What an arm reaches is worked out in `seqopt.arms`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from seqopt.arrays import Terse, Vector
+from seqopt.errors import SceneError
+from seqopt.scene._checks import (
+    check,
+    kind_of,
+    length,
+    not_negative,
+    positive,
+    printable,
+    rows,
+    settle,
+    short,
+    unit_axes,
+    vector,
+    whole_between,
+)
+
+MOST = 8  # postures of a robot at a node that are kept of those that are found
+SIDES = ("length", "width", "thickness")
+"""The pairs of faces of a brick, by the axis that they are across."""
+_FACES = (*SIDES, *(sign + side for side in SIDES for sign in "+-"))
+
+
+def _model(where: str, given: str | Path) -> str:
+    """Return where a URDF is, if that is text."""
+    if not isinstance(given, str | Path) or not str(given):
+        raise SceneError(f"{where} is {short(given)}; give the path of a URDF, or package:path")
+    return printable(where, os.fspath(given))
+
+
+def _faces(where: str, given: Iterable[str]) -> tuple[str, ...]:
+    """Return faces of a brick, each of them known."""
+    found = rows(where, given, f"some of {', '.join(_FACES)}")
+    if not found or any(face not in _FACES for face in found):
+        raise SceneError(f"{where} are {short(given)}; give some of {', '.join(_FACES)}")
+    return found
+
+
+def _stiffnesses(where: str, given: Iterable[float]) -> tuple[float, ...]:
+    """Return positive stiffnesses, one a joint."""
+    return tuple(positive(where, each, "N m/rad") for each in rows(where, given, "numbers"))
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Arm(Terse):
+    """An arm on a fixed base that grips bricks with a straight tool.
+
+    Parameters
+    ----------
+    urdf : str or pathlib.Path
+        The model: the path of a URDF, or ``package:path`` of one in an installed package.
+    position : Vector
+        Where the root of the model stands, m.
+    tool_length, tool_radius : float
+        How far the node that is held is from the flange, along the flange's z, and how thick the
+        tool is, m.
+    x_axis, y_axis : Vector
+        Directions of the base: unit vectors at right angles.
+    fingers : float
+        How far the fingers stand out from the face of the brick that they grip, m: here and inside
+        the brick the tool is not checked for collisions.
+    faces : tuple of str
+        From where the tool comes to a brick: ``length``, ``width`` or ``thickness`` for both faces
+        across an axis, or with a sign for one of them.
+    flange : str
+        The frame of the model that carries the tool; by default ``tool0``, or the last one.
+    postures : int
+        With how many postures at each node plans are made: with one, every plan keeps it; of
+        several, a step needs some that go together, and whether they can be kept is found after.
+    keeps_apart : bool
+        Whether it must not touch other arms that keep apart; False for what reach alone allows.
+    joint_stiffness : tuple of float
+        Of every joint, N m/rad; empty where it is not known.
+
+    Raises
+    ------
+    SceneError
+        If a value is not finite, not positive where it must be, or not consistent.
+
+    Examples
+    --------
+    >>> Arm(urdf="ur10.urdf", position=(0.0, 1.5, 0.0), tool_length=0.3, tool_radius=0.05).faces
+    ('width', 'thickness')
+    """
+
+    urdf: str
+    position: Vector
+    tool_length: float
+    tool_radius: float
+    x_axis: Vector = (1.0, 0.0, 0.0)
+    y_axis: Vector = (0.0, 1.0, 0.0)
+    fingers: float = 0.02
+    faces: tuple[str, ...] = ("width", "thickness")
+    flange: str = ""
+    postures: int = MOST
+    keeps_apart: bool = True
+    joint_stiffness: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        check(self, "arm", urdf=_model, position=vector, faces=_faces, flange=printable)
+        unit_axes(self, "arm", "x_axis", "y_axis")
+        lengths = {"tool_length": length, "tool_radius": length, "fingers": not_negative}
+        check(self, "arm", **lengths, joint_stiffness=_stiffnesses)
+        settle(self, keeps_apart=kind_of("arm: keeps_apart", self.keeps_apart, bool))
+        settle(self, postures=whole_between("arm: postures", self.postures, 1, MOST))
+        if not self.fingers < self.tool_length:
+            raise SceneError(
+                f"arm: fingers stand out {self.fingers:g} m from a brick, and the whole tool is "
+                f"{self.tool_length:g} m long; give a longer tool"
+            )
+
+    @property
+    def in_package(self) -> bool:
+        """Whether the model is one of an installed package."""
+        package, colon, path = self.urdf.partition(":")
+        return bool(colon and path) and len(package) > 1 and package.isidentifier()

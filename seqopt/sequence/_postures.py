@@ -1,0 +1,169 @@
+"""Which postures the arms of robots take in the steps of a plan, whoever made it.
+
+A robot keeps its posture from the step in which it takes a node to the last in which it holds it.
+In every step no arm may hit a brick that stands, and no two arms each other. All postures of the
+table are tried, not only those with which plans are made here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+from seqopt.arms.reach import find_postures
+from seqopt.arms.table import PostureTable
+from seqopt.arrays import Terse
+from seqopt.scene.scene import Scene
+from seqopt.sequence.schedule import Hold, holds
+from seqopt.sequence.steps import Step
+
+_Way = tuple[int, ...]  # a posture for every hold of a step, as rows of the table
+_MOST_WAYS = 20_000  # of one step that are kept
+
+
+@dataclass(frozen=True)
+class Unreached:
+    """A step that arms cannot be in: its number, which robots hold what, and why in words."""
+
+    step: int
+    why: str
+
+
+@dataclass(frozen=True, repr=False)
+class PlanPostures(Terse):
+    """The postures of a plan.
+
+    Attributes
+    ----------
+    table : PostureTable
+        Of the scene.
+    steps : tuple of tuple of (int or None)
+        By step, which row of the table each robot of the scene is in; None for a robot that holds
+        nothing or has no arm, and for all where there is no way.
+    unreached : tuple of Unreached
+        The steps that arms cannot be in, or not without changing a posture while they hold.
+    """
+
+    table: PostureTable
+    steps: tuple[tuple[int | None, ...], ...]
+    unreached: tuple[Unreached, ...]
+
+
+def plan_postures(scene: Scene, steps: Sequence[Step]) -> PlanPostures | None:
+    """Return the postures of a plan, one after the other, or the steps that have none.
+
+    Parameters
+    ----------
+    scene : Scene
+    steps : sequence of Step
+        Of a plan for it.
+
+    Returns
+    -------
+    PlanPostures or None
+        None if no robot has an arm.
+
+    Raises
+    ------
+    ExtraError
+        If pinocchio and coal are not installed.
+    """
+    table = find_postures(scene)
+    return None if table is None else _Search(scene, table, steps).found()
+
+
+class _Search:
+    """Goes through a plan with every way of holding that is possible so far.
+
+    Where a step has none, or none that goes on from the step before, it begins anew: the steps
+    that follow are judged by themselves.
+    """
+
+    def __init__(self, scene: Scene, table: PostureTable, steps: Sequence[Step]) -> None:
+        self._scene, self._table, self._steps = scene, table, steps
+        self._holds = [h for h in holds(scene, steps) if scene.robots[h.robot].arm is not None]
+        self._since = [scene.since[name] for name in table.bricks]
+
+    def found(self) -> PlanPostures:
+        """Return what there is."""
+        faults: list[Unreached] = []
+        kept: list[dict[_Way, _Way | None]] = []  # by step: ways, and what each comes from
+        before: tuple[Hold, ...] = ()
+        for step in self._steps:
+            now = tuple(h for h in self._holds if h.first <= step.number <= h.last)
+            ways, why = self._ways(step, now)
+            onward = self._onward(before, now, kept[-1] if kept else {(): None}, ways)
+            if ways and not onward:
+                why = "arms would have to change postures while they hold"
+            if why:
+                faults.append(Unreached(step.number, why))
+                onward = dict.fromkeys(ways, None)
+            kept.append(onward)
+            before = now if onward else ()
+            if not onward:
+                kept[-1] = {(): None}
+        return PlanPostures(self._table, self._traced(kept), tuple(faults))
+
+    def _ways(self, step: Step, now: Sequence[Hold]) -> tuple[list[_Way], str]:
+        """Return all ways to hold in a step by itself; if there are none, why."""
+        options = [self._options(step, hold) for hold in now]
+        names = [f"{self._scene.robots[h.robot].name} at node {h.node}" for h in now]
+        for name, rows in zip(names, options, strict=True):
+            if not rows:
+                return [], f"{name} has no posture"
+        ways: list[_Way] = [()]
+        for k, rows in enumerate(options):
+            longer = [(*way, row) for way in ways for row in rows if self._free(way, row)]
+            if not longer:
+                return [], f"{self._in_the_way(names, options, k)} are in each other's way"
+            ways = longer[:_MOST_WAYS]
+        return ways, ""
+
+    def _options(self, step: Step, hold: Hold) -> list[int]:
+        """Return the postures of a hold that hit no brick that stands."""
+        assert hold.node is not None
+        rows = self._table.rows(self._scene.robots[hold.robot].name, hold.node)
+        standing = [since <= step.bricks for since in self._since]
+        return [int(row) for row in rows if not (self._table.hits[row] & standing).any()]
+
+    def _free(self, way: _Way, row: int) -> bool:
+        return not any(self._table.collide[row, other] for other in way)
+
+    def _in_the_way(self, names: Sequence[str], options: Sequence[list[int]], last: int) -> str:
+        """Return which robots cannot hold together: two if two cannot, else all up to the last."""
+        for i, j in combinations(range(last + 1), 2):
+            if not any(self._free((a,), b) for a in options[i] for b in options[j]):
+                return f"{names[i]} and {names[j]}"
+        return ", ".join(names[:last]) + f" and {names[last]}"
+
+    def _onward(
+        self,
+        before: Sequence[Hold],
+        now: Sequence[Hold],
+        known: dict[_Way, _Way | None],
+        ways: Sequence[_Way],
+    ) -> dict[_Way, _Way | None]:
+        """Return the ways of a step in which holds that go on keep their postures."""
+        same = [(before.index(hold), i) for i, hold in enumerate(now) if hold in before]
+        able: dict[_Way, _Way] = {}
+        for way in known:
+            able.setdefault(tuple(way[i] for i, _ in same), way)
+        pairs = ((way, able.get(tuple(way[i] for _, i in same))) for way in ways)
+        return {way: source for way, source in pairs if source is not None}
+
+    def _traced(
+        self, kept: Sequence[dict[_Way, _Way | None]]
+    ) -> tuple[tuple[int | None, ...], ...]:
+        """Return one way through all steps, from the last one back."""
+        out: list[tuple[int | None, ...]] = []
+        wanted: _Way | None = None
+        for step, ways in zip(reversed(self._steps), reversed(kept), strict=True):
+            way = next(iter(ways)) if wanted is None else wanted
+            wanted = ways[way]
+            now = [h for h in self._holds if h.first <= step.number <= h.last]
+            rows: list[int | None] = [None] * len(self._scene.robots)
+            for hold, row in zip(now, way, strict=len(way) > 0):
+                rows[hold.robot] = row
+            out.append(tuple(rows))
+        return tuple(reversed(out))
