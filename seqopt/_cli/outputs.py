@@ -53,6 +53,8 @@ def comparison_files(result: Comparison) -> dict[str, bytes | str]:
 
 def softness_files(table: pd.DataFrame) -> dict[str, bytes | str]:
     """Return what builds come to for grips of several stiffnesses, as table and picture."""
+    if table.empty:
+        return {}
     files: dict[str, bytes | str] = {"grips.csv": csv_text(table)}
     if figure_notes():
         return files

@@ -98,8 +98,11 @@ def parse_robots(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",")) if text else ()
 
 
-def parse_grip_range(text: str) -> tuple[float, ...]:
-    """Return the stiffnesses of a range, as ``1e5..1e9``, N/m."""
+def _parse_grip_range(text: str | None) -> tuple[float, ...]:
+    """Return the stiffnesses of a range, as ``1e5..1e9``, N/m; none of one stiffness."""
+    if ".." not in (text or ""):
+        return ()
+    assert text is not None
     ends = [number_word(end, f"--grips {short(text)[1:-1]}") for end in text.split("..")]
     if len(ends) != 2 or not ends[0] < ends[1]:
         raise SceneError(

@@ -20,7 +20,7 @@ from seqopt.arrays import Bools, Floats
 from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines._hands import read_hands
-from seqopt.engines._planar import find_plane, leaves_plane, off_plane
+from seqopt.engines._planar import _leaves_plane, find_plane, off_plane
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import (
     Fields,
@@ -106,7 +106,7 @@ class _RigidBricks(NamedEngine):
         columns = grip_columns(self.network, bricks, grips)
         flat = np.asarray(self._flat[columns].all(axis=1))
         hands = read_hands(self.network, columns, grips, moved)
-        return flat if hands is None else flat & ~leaves_plane(self._mirror, hands, columns)
+        return flat if hands is None else flat & ~_leaves_plane(self._mirror, hands, columns)
 
 
 def _of(moved: ArrayLike | None, which: Bools) -> Floats | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,10 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import GripError
 from seqopt.network.network import Network
-
-if TYPE_CHECKING:
-    from seqopt.engines.interface import Basis
-
 
 _Number = TypeVar("_Number", np.float64, np.bool_)
 
@@ -54,15 +50,15 @@ class Hands(FrozenValue):
         """Whether all are of one kind."""
         return self.give is None or len(self.give) == 1
 
-    def within(self, basis: Basis) -> Hands:
-        """Return them in the directions of a basis: a plane's, or all."""
-        give, count = self.give, len(basis.force)
+    def within(self, force: Floats, wrench: Floats) -> Hands:
+        """Return them in the directions of a `Basis`: a plane's, or all."""
+        give, count = self.give, len(force)
         if count == self.directions:
             return self
         if give is not None:
-            ways = basis.force if self.turns is None else basis.wrench
+            ways = force if self.turns is None else wrench
             give = ways @ give @ ways.T
-        moved = None if self.moved is None else self.moved @ basis.force.T
+        moved = None if self.moved is None else self.moved @ force.T
         return replace(self, moved=moved, give=give, directions=count)
 
     def far(self, sets: int, grips: int) -> Floats:
@@ -92,7 +88,7 @@ class Hands(FrozenValue):
         return np.broadcast_to(of_kind[self.kind], (sets, grips, *of_kind.shape[1:]))
 
 
-def lever_of(network: Network) -> float:
+def _lever_of(network: Network) -> float:
     """Return the length of the longest inner edge, by which moments are measured, m."""
     ends = network.node_position[network.inner]
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max())
@@ -121,7 +117,7 @@ def read_hands(
 
 def _giving(network: Network, grips: ArrayLike) -> Hands:
     """Return hands that give way as their kinds do, and are not moved."""
-    kinds, lever = network.scene.grip_kinds, lever_of(network)
+    kinds, lever = network.scene.grip_kinds, _lever_of(network)
     scale = np.repeat([1.0, lever], 3)
     give = kinds.compliance * np.outer(scale, scale)
     turns = kinds.turns if kinds.turns.any() else None

@@ -67,7 +67,7 @@ def off_plane(network: Network, plane: _Plane) -> Floats:
     return away
 
 
-def leaves_plane(plane: _Plane, hands: Hands, columns: Ints) -> Bools:
+def _leaves_plane(plane: _Plane, hands: Hands, columns: Ints) -> Bools:
     """Return the hands of which grip sets (S,) are moved, or give way, out of a plane."""
     out = np.zeros(len(columns), dtype=bool)
     if hands.moved is not None:
@@ -190,7 +190,7 @@ class PlanarEngine(NamedEngine):
         """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self.network, bricks, grips)
         hands = read_hands(self.network, columns, grips, moved)
-        if hands is not None and leaves_plane(self._plane, hands, columns).any():
+        if hands is not None and _leaves_plane(self._plane, hands, columns).any():
             raise GripError(f"a grip is moved, or gives way, out of the scene's plane; {_ELSE}")
         away = self._away[columns]
         if away.any():

@@ -35,7 +35,7 @@ _EIGENVALUE_TOLERANCE = 1e-6  # relative
 
 
 def _spectrum(
-    network: Network, bricks: int, columns: Ints, hands: Hands | None
+    network: Network, bricks: int, columns: Ints, hands: Hands | None = None
 ) -> tuple[float, float, Floats]:
     """Return how the constrained stiffness, scaled by its diagonal, resists motions.
 

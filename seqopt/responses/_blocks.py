@@ -389,7 +389,7 @@ def batch_of(schedule: Schedule, steps: Sequence[OpenStep], wanted: Wanted) -> B
         for step, rows in zip(steps, choices, strict=True)
     )
     parts = zip(steps, choices, possible, strict=True)
-    rows = np.concatenate([grip_rows(schedule, step, nodes[ok]) for step, nodes, ok in parts])
+    rows = np.concatenate([_grip_rows(schedule, step, nodes[ok]) for step, nodes, ok in parts])
     states, state = distinct(np.sort(rows, axis=1))
     return Batch(schedule, tuple(steps), names, rows, possible, states, state)
 
@@ -427,7 +427,7 @@ def combinations(schedule: Schedule, step: OpenStep) -> Ints:
     return np.stack([column.ravel() for column in columns], axis=1).astype(np.int64)
 
 
-def grip_rows(schedule: Schedule, step: OpenStep, nodes: Ints) -> Ints:
+def _grip_rows(schedule: Schedule, step: OpenStep, nodes: Ints) -> Ints:
     """Return the numbers of grips on nodes (P, r) that the robots of a step hold."""
     return schedule.scene.grip_kinds.numbers(nodes, _robots_holding(step))
 

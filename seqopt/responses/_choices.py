@@ -32,11 +32,11 @@ from seqopt.responses._blocks import (
     StepChoices,
     Store,
     Wanted,
+    _grip_rows,
     batch_of,
     choices_of,
     combinations,
     distinct,
-    grip_rows,
     no_node_twice,
     open_store,
     require_memory,
@@ -349,4 +349,4 @@ def _window_states(schedule: Schedule, step: OpenStep, choice: Sequence[int]) ->
         node = schedule.moves[first].candidates[choice[first]]
         step = replace(step, grips=tuple(node if g == OpenGrip(first) else g for g in step.grips))
     rows = combinations(schedule, step)
-    return np.sort(grip_rows(schedule, step, rows[no_node_twice(rows)]), axis=1)
+    return np.sort(_grip_rows(schedule, step, rows[no_node_twice(rows)]), axis=1)

@@ -39,7 +39,7 @@ from seqopt._cli.outputs import (
     write_outputs,
 )
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import asked_criterion, parse_grip_range, parse_robots
+from seqopt._cli.values import _parse_grip_range, asked_criterion, parse_robots
 from seqopt.arms.reach import find_postures
 from seqopt.engines.registry import provenance
 from seqopt.network.build import build_network
@@ -110,8 +110,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Answer:
     """Compare all ways to build a scene."""
-    range_of_grips = options.grips if ".." in (options.grips or "") else ""
-    grips = parse_grip_range(range_of_grips) if range_of_grips else ()
+    grips = _parse_grip_range(options.grips)
     scene = asked_scene(options, ranged=True)
     find_postures(scene, options.cache, options.tell)
     engine = asked_engine(options, build_network(scene))
@@ -124,32 +123,26 @@ def run(options: argparse.Namespace) -> Answer:
     blocks = [text]
     if options.details:
         blocks.append(format_details(result, scene))
-    softly = held_softly(engine, _shown_tables(result), grips, options.tell) if grips else None
-    turns = turning_points(softly, _fixed(result)) if softly is not None else ()
-    if softly is not None:
-        blocks.append("\n".join([SOFTLY, *softness_lines(softly, [*_shown_tables(result)])]))
-        blocks.append("\n".join([TURNS, *_listed(turns or [NO_TURN])]))
+    softly = held_softly(engine, _shown_tables(result), grips, options.tell)
+    turns = turning_points(softly, _fixed(result)) if grips else ()
+    if grips:
+        blocks += _softly(softly, turns)
         headings = (*headings, SOFTLY, TURNS)
     written: tuple[Path, ...] = ()
     if options.out is not None:
         options.tell("drawing figures")
         files = comparison_files(result) | {"summary.json": json.dumps(about, indent=2) + "\n"}
         page = {PAGE: comparison_page(engine, result)}
-        if softly is not None:
-            files |= softness_files(softly)
+        files |= softness_files(softly)
         written = write_outputs(options, lambda: files | page)
         blocks.append(_where(options.out))
     else:
         more = "" if options.details else "; --details shows more here"
         blocks.append(wrapped(f"--out DIR writes tables, figures and a step viewer{more}."))
     answer = Answer(
-        facts={
-            **about,
-            "scene": scene_facts(scene),
-            "criterion": criterion.name,
-            **_facts(result),
-            "grips": None if softly is None else {"rows": softly, "turns": list(turns)},
-        },
+        facts=about
+        | {"scene": scene_facts(scene), "criterion": criterion.name, **_facts(result)}
+        | ({"grips": {"rows": softly, "turns": list(turns)}} if grips else {}),
         text="\n\n".join(blocks),
         headings=headings,
         written=written,
@@ -166,6 +159,13 @@ def run(options: argparse.Namespace) -> Answer:
     return strictly(answer, options, over, left, result.verdicts)
 
 
+def _softly(table: pd.DataFrame, turns: Sequence[str]) -> list[str]:
+    """Return what the builds come to as grips become softer, and where conclusions turn."""
+    lines = [wrapped(line, first="- ") for line in turns or [NO_TURN]]
+    shown = softness_lines(table, [*dict.fromkeys(table["build"])])
+    return ["\n".join([SOFTLY, *shown]), "\n".join([TURNS, *lines])]
+
+
 def _shown_tables(result: Comparison) -> dict[str, pd.DataFrame]:
     """Return the responses of the builds that differ in their largest ones, by name."""
     figures = result.table[[*RESPONSES]].round(3).apply(tuple, axis=1)
@@ -178,11 +178,6 @@ def _fixed(result: Comparison) -> list[str]:
     """Return the methods that leave nothing to choose."""
     fixed = result.table.index[result.table["problem"] == CLOSED]
     return [name for name in map(str, fixed) if name in _shown_tables(result)]
-
-
-def _listed(lines: Sequence[str]) -> list[str]:
-    """Return lines as entries of a list."""
-    return [wrapped(line, first="- ") for line in lines]
 
 
 def _where(folder: Path) -> str:

@@ -11,12 +11,12 @@ from seqopt.engines._hands import Hands
 from seqopt.engines.rigid._operator import ComplianceOperator
 from seqopt.engines.rigid._pairs import (
     Pairs,
-    as_rows,
-    brace,
-    by_grip,
-    count_grips,
+    _as_rows,
+    _brace,
+    _by_grip,
+    _count_grips,
+    _soften,
     pairs_of,
-    soften,
 )
 
 
@@ -140,21 +140,21 @@ def _with_hands(
     ``size`` (k, S): of the forces, N; ``flexibility`` (k, S): the diagonal, m/N.
     """
     given, softer = np.zeros_like(own), np.zeros_like(own)
-    nodes, grips = len(own) - operator.loose, count_grips(operator, len(own))
+    nodes, grips = len(own) - operator.loose, _count_grips(operator, len(own))
     if hands.moved is not None:
         moved = _in_rows(operator, np.abs(hands.moved))
         given[: len(moved)] += moved
     if hands.give is not None:
         parts = np.abs(hands.each_give(own.shape[1], grips))
-        bears = by_grip(operator, size.T, grips)
-        given[:nodes] += as_rows(operator, np.einsum("srij,srj->sri", parts, bears))
-        softer[:nodes] = as_rows(operator, np.diagonal(parts, axis1=2, axis2=3))
+        bears = _by_grip(operator, size.T, grips)
+        given[:nodes] += _as_rows(operator, np.einsum("srij,srj->sri", parts, bears))
+        softer[:nodes] = _as_rows(operator, np.diagonal(parts, axis1=2, axis2=3))
     return np.asarray((own * flexibility + given) / (flexibility + softer))
 
 
 def _in_rows(operator: ComplianceOperator, moved: Floats) -> Floats:
     """Return what hands move (S, r, d) as rows of all unknowns (k, S), loose motions left out."""
-    rows = as_rows(operator, moved)
+    rows = _as_rows(operator, moved)
     return np.pad(rows, ((0, moved.shape[1] * operator.moments), (0, 0)))
 
 
@@ -173,7 +173,7 @@ def still_forces(
     counted. Between two rigid grips on one brick there is no force.
     """
     pairs, rows = pairs_of(operator, columns), np.ascontiguousarray(index.T)
-    apart = None if off is None else as_rows(operator, off)
+    apart = None if off is None else _as_rows(operator, off)
     asked = _Asked(operator, pairs, rows, hands)
     return _solved(asked, np.ascontiguousarray(moved.T), apart)[0].T
 
@@ -206,7 +206,7 @@ def share_pairs(
         between = found[np.arange(len(sets)), edges]
     shift = between[:, None] * pairs.axis
     shift[columns[sets, pairs.first] % 2 == 1] *= -1.0  # the axis leads to the second node
-    own = count_grips(operator, force.shape[1]) * operator.directions
+    own = _count_grips(operator, force.shape[1]) * operator.directions
     nodes = force[:, :own].reshape(len(force), -1, pairs.axis.shape[1])
     nodes[sets, pairs.first] += shift
     nodes[sets, pairs.second] -= shift
@@ -238,12 +238,12 @@ def _solved(asked: _Asked, dead: Floats, off: Floats | None = None) -> tuple[Flo
     np.negative(dead, out=system[-1])
     scale = 1 / operator.softness if operator.loose else 1.0
     if hands is not None and hands.give is not None:
-        spread = soften(system, operator, pairs, hands, off)
+        spread = _soften(system, operator, pairs, hands, off)
         force, pivot = _solve_positive(system, operator.loose, scale)
         return spread(force, pivot)
     if off is not None:
         system[-1, : len(off)] -= off
     if len(pairs.sets):
-        nodes = count_grips(operator, count) * operator.directions
-        brace(system[:nodes, :nodes], pairs)
+        nodes = _count_grips(operator, count) * operator.directions
+        _brace(system[:nodes, :nodes], pairs)
     return _solve_positive(system, operator.loose, scale)

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.engines._hands import lever_of
+from seqopt.engines._hands import _lever_of
 from seqopt.engines.interface import SPACE, Basis
 from seqopt.engines.rigid._growth import Growth, SpanningTree
 from seqopt.engines.rigid._response_maps import (
@@ -36,7 +36,7 @@ class ComplianceOperator(FrozenValue):
     Row ``dm + i`` is a unit force in direction ``i`` of d at the ``m``-th inner node
     (`Network.inner`) of the h bricks that are loaded, l = 2dh loads in all: d = 3 in space, 2 in a
     plane. Where hands bear moments, those on a brick, over a lever, follow the forces at its nodes,
-    and what they move are rotations times the lever: `load_rows` counts. One more row at the end of
+    and what they move are rotations times the lever: see `_load_rows`. One more row at the end of
     all but the first two arrays is the weight of the b bricks, with what else loads them and how
     the ground moves.
 
@@ -115,7 +115,7 @@ class ComplianceOperator(FrozenValue):
         """Return which loads act at every grip, and after them all loose motions, (S, k)."""
         every = len(self.held) == self.bricks
         nodes = columns if every else 2 * self.place[columns // 2] + columns % 2
-        rows = load_rows(nodes, self.directions, self.moments)
+        rows = _load_rows(nodes, self.directions, self.moments)
         if self.loose:
             after = len(self.flexibility) - self.loose + np.arange(self.loose)
             rows = np.hstack([rows, np.tile(after, (len(rows), 1))])
@@ -183,7 +183,7 @@ class ComplianceOperator(FrozenValue):
         return self.twist if name in _OF_TWISTS else self.wrench
 
 
-def load_rows(nodes: Ints, directions: int, moments: int) -> Ints:
+def _load_rows(nodes: Ints, directions: int, moments: int) -> Ints:
     """Return the loads (S, k) at nodes (S, r): forces at all of them, then moments on bricks.
 
     ``nodes``: as indices into ``network.inner.ravel()`` of the bricks that are loaded.
@@ -208,7 +208,7 @@ class OperatorBuilder:
         self._moments = len(basis.moment) if network.scene.grip_kinds.turns.any() else 0
         if self._moments:
             turned = np.zeros((len(self._nodes), self._moments, len(basis.wrench)))
-            turned[..., -self._moments :] = lever_of(network) * np.eye(self._moments)
+            turned[..., -self._moments :] = _lever_of(network) * np.eye(self._moments)
             self._nodes = np.concatenate([self._nodes, turned], axis=1)
 
     def operator(self, bricks: int, held: Ints | None = None) -> ComplianceOperator:

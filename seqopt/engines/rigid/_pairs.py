@@ -61,12 +61,12 @@ def _couples(grips: int) -> Ints:
     return frozen(np.array([*combinations(range(grips), 2)], dtype=np.int64).reshape(-1, 2).T)
 
 
-def count_grips(operator: ComplianceOperator, count: int) -> int:
+def _count_grips(operator: ComplianceOperator, count: int) -> int:
     """Return how many grips sets of as many unknowns have."""
     return (count - operator.loose) // (operator.directions + operator.moments)
 
 
-def by_grip(operator: ComplianceOperator, force: Floats, grips: int) -> Floats:
+def _by_grip(operator: ComplianceOperator, force: Floats, grips: int) -> Floats:
     """Return what hands bear, (S, r, w), of unknowns (S, k)."""
     width = operator.directions
     first, last = grips * width, grips * (width + operator.moments)
@@ -76,7 +76,7 @@ def by_grip(operator: ComplianceOperator, force: Floats, grips: int) -> Floats:
     return np.dstack([shift, force[:, first:last].reshape(len(force), grips, operator.moments)])
 
 
-def as_rows(operator: ComplianceOperator, each: Floats) -> Floats:
+def _as_rows(operator: ComplianceOperator, each: Floats) -> Floats:
     """Return numbers of grips (S, r, w) as rows (k, S) of unknowns, loose motions left out."""
     width, sets = operator.directions, len(each)
     first = each[:, :, :width].reshape(sets, each.shape[1] * width)
@@ -86,7 +86,7 @@ def as_rows(operator: ComplianceOperator, each: Floats) -> Floats:
     return np.ascontiguousarray(np.hstack([first, rest]).T)
 
 
-def brace(system: Floats, pairs: Pairs) -> None:
+def _brace(system: Floats, pairs: Pairs) -> None:
     """Give the force between two grips on one brick a flexibility, so that there is one answer."""
     count, sets = system.shape[1:]
     width = pairs.axis.shape[1]
@@ -102,7 +102,7 @@ def brace(system: Floats, pairs: Pairs) -> None:
 _Spread = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 
-def soften(
+def _soften(
     system: Floats, operator: ComplianceOperator, pairs: Pairs, hands: Hands, off: Floats | None
 ) -> _Spread:
     """Let hands give way in equations (k + 1, k, S), as of `_solve_positive`, in place.
@@ -114,7 +114,7 @@ def soften(
     returns forces (k, S) and pivots (k, S) of the grips from those of the equations.
     """
     count, sets = system.shape[1:]
-    grips = count_grips(operator, count)
+    grips = _count_grips(operator, count)
     rigid = pairs.rigid(hands, sets, grips)
     close = _nearly_rigid(system, operator, pairs, hands) & ~rigid
     apart = _told_apart(system, operator, pairs.only(close), hands, off) if close.any() else None
@@ -125,7 +125,7 @@ def soften(
         system[:, :, apart.sets] = apart.system
     if rigid.any():
         nodes = grips * operator.directions
-        brace(system[:nodes, :nodes], pairs.only(rigid))
+        _brace(system[:nodes, :nodes], pairs.only(rigid))
     _let_turn(system, operator, hands)
     return _as_they_are if apart is None else apart.joined
 
@@ -145,7 +145,7 @@ def _nearly_rigid(
     if not len(pairs.sets):
         return np.zeros(0, dtype=bool)
     width = operator.directions
-    give = hands.each_give(system.shape[2], count_grips(operator, system.shape[1]))
+    give = hands.each_give(system.shape[2], _count_grips(operator, system.shape[1]))
     own = give[pairs.sets, pairs.first] + give[pairs.sets, pairs.second]
     along = np.einsum("pi,pij,pj->p", pairs.axis, own[:, :width, :width], pairs.axis)
     rows = width * pairs.second[:, None] + np.arange(width)
@@ -163,7 +163,7 @@ def _rows_of(operator: ComplianceOperator, grips: int, grip: int, ways: int) -> 
 
 def _add_give(system: Floats, operator: ComplianceOperator, hands: Hands) -> None:
     """Add to equations, in place, how every hand gives way."""
-    grips = count_grips(operator, system.shape[1])
+    grips = _count_grips(operator, system.shape[1])
     assert hands.give is not None
     ways, used = hands.give.shape[2], np.asarray(hands.give.any(axis=0))
     for grip in range(grips):
@@ -182,7 +182,7 @@ def _lower(ways: int) -> list[tuple[int, int]]:
 def _let_turn(system: Floats, operator: ComplianceOperator, hands: Hands) -> None:
     """Let hands that bear no moment bear none, where others of the scene do, in place."""
     count, sets = system.shape[1:]
-    grips = count_grips(operator, count)
+    grips = _count_grips(operator, count)
     free = ~hands.each_turns(sets, grips)
     if not operator.moments or not free.any():
         return
@@ -249,7 +249,7 @@ def _told_apart(
 
 def _full_give(operator: ComplianceOperator, hands: Hands, sets: int, count: int) -> Floats:
     """Return how hands give way as matrices (n, k, k) of all unknowns."""
-    grips = count_grips(operator, count)
+    grips = _count_grips(operator, count)
     each, out = hands.each_give(sets, grips), np.zeros((sets, count, count))
     for grip in range(grips):
         rows = _rows_of(operator, grips, grip, each.shape[2])

@@ -30,7 +30,7 @@ from scipy.sparse import csgraph
 from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._hands import Hands, lever_of
+from seqopt.engines._hands import Hands, _lever_of
 from seqopt.engines.interface import SPACE, Basis, Fields, join_sets, merge_sets, no_sets
 from seqopt.engines.rigid._grip_equations import grip_forces, still_forces
 from seqopt.engines.rigid._mechanism import Shared, Ungripped, require_resistance, ungripped_system
@@ -45,8 +45,8 @@ from seqopt.engines.rigid._mixed import (
     unchanged,
     unscaled,
 )
-from seqopt.engines.rigid._operator import ComplianceOperator, load_rows
-from seqopt.engines.rigid._pairs import by_grip
+from seqopt.engines.rigid._operator import ComplianceOperator, _load_rows
+from seqopt.engines.rigid._pairs import _by_grip
 from seqopt.engines.rigid._response_maps import ResponseMaps, inner_edges, loads_of, scene_maps
 from seqopt.errors import SolverError
 from seqopt.network._mechanics import point_motion
@@ -195,7 +195,7 @@ def _operator(
     network, bricks = parts.network, parts.bricks
     moments = (len(states) - loose) // bricks - 6
     weight = np.zeros(len(states))
-    at = load_rows(np.arange(2 * bricks)[None], 3, moments)[0]
+    at = _load_rows(np.arange(2 * bricks)[None], 3, moments)[0]
     weight[at[: 6 * bricks]] = network.inner_weight[: 2 * bricks].ravel()
     wrench, twist = unscaled(parts, states)
     wrench = wrench[:, parts.acting].reshape(len(states), -1)
@@ -267,12 +267,12 @@ class Refinement:
 
 
 def _loaded(parts: Ungripped) -> sparse.csr_array:
-    """Return what loads do to scaled twists, (l, 6b), as `load_rows` numbers them in space."""
+    """Return what loads do to scaled twists, (l, 6b), as `_load_rows` numbers them in space."""
     network, size = parts.network, 6 * parts.bricks
     if not network.scene.grip_kinds.turns.any():
         return parts.inner
     turned = np.zeros((3 * parts.bricks, size))
-    turned[np.arange(3 * parts.bricks), _turns(parts.bricks)] = lever_of(network)
+    turned[np.arange(3 * parts.bricks), _turns(parts.bricks)] = _lever_of(network)
     both = sparse.vstack([parts.inner, sparse.csr_array(turned * parts.twist_unit)], format="csr")
     each = np.hstack([np.arange(size).reshape(-1, 6), size + np.arange(size // 2).reshape(-1, 3)])
     return sparse.csr_array(both[each.ravel()])
@@ -319,7 +319,7 @@ class _Corrector:
         """Return the fields of a few sets."""
         operator, parts, bricks = self.operator, self.parts, self.bricks
         index = operator.load_index(columns)
-        own = None if hands is None else hands.within(self.basis)
+        own = None if hands is None else hands.within(self.basis.force, self.basis.wrench)
         found = grip_forces(operator, columns, index, hands=own)
         if operator.loose:
             for at in np.flatnonzero(~(found.lowest >= _HARDLY_HELD)):
@@ -356,7 +356,7 @@ class _Corrector:
         out = np.asarray(nodes @ self.basis.force).reshape(sets, 3 * grips)
         if not self.operator.moments:
             return out
-        borne = by_grip(self.operator, force, grips)[..., width:] @ self.basis.moment
+        borne = _by_grip(self.operator, force, grips)[..., width:] @ self.basis.moment
         return np.hstack([out, borne.reshape(sets, 3 * grips)])
 
     def _correct(self, asked: _Asked, states: Floats, force: Floats) -> Bools:
@@ -381,7 +381,7 @@ class _Corrector:
         """Return what must be added to scaled answers (S, n) and grip forces (S, 3r)."""
         operator, parts, columns = self.operator, self.parts, asked.columns
         joints, grips = len(parts.wrench_unit), columns.shape[1]
-        at = load_rows(columns, 3, 3 if operator.moments else 0)
+        at = _load_rows(columns, 3, 3 if operator.moments else 0)
         pulled = loads_of(at, force, self.pulls.shape[0]).matrix @ self.pulls
         missing = -(parts.matrix @ states.T).T
         missing[:, joints:] += pulled
@@ -415,7 +415,7 @@ class _Corrector:
         width, moments = self.operator.directions, self.operator.moments
         out = np.zeros((len(force), grips, width + moments))
         if hands.give is not None:
-            bears = by_grip(self.operator, self._at_grips(force, grips), grips)
+            bears = _by_grip(self.operator, self._at_grips(force, grips), grips)
             out += np.einsum("srij,srj->sri", hands.each_give(len(force), grips), bears)
         if hands.moved is not None:
             out[..., :width] -= hands.moved

@@ -39,7 +39,7 @@ from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mechanism import Shared, share
 from seqopt.engines.rigid._mixed import LAST_CORRECTION
 from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder
-from seqopt.engines.rigid._pairs import Pairs, by_grip, pairs_of
+from seqopt.engines.rigid._pairs import Pairs, _by_grip, pairs_of
 from seqopt.engines.rigid._refinement import Refinement
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
@@ -79,7 +79,7 @@ class _Tried:
         found["grip_force"] = nodes.reshape(*columns.shape, operator.directions)
         found["grip_moment"] = np.zeros((*columns.shape, 3))
         if operator.moments:
-            borne = by_grip(operator, force, columns.shape[1])[..., operator.directions :]
+            borne = _by_grip(operator, force, columns.shape[1])[..., operator.directions :]
             found["grip_moment"] = self.lever * borne
         return found
 
@@ -172,7 +172,7 @@ class ComplianceEngine(NamedEngine):
         if bricks <= len(self._tree.spring):
             operator, even = self._operator(bricks, columns), bricks <= self._even
             accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
-            own = None if hands is None else hands.within(self._basis)
+            own = None if hands is None else hands.within(self._basis.force, self._basis.wrench)
             tried = _try_forces(operator, columns, own, even=even, accuracy=accuracy)
         if tried is None or (len(columns) and not tried.trusted.any()):
             return self._refined(bricks, columns, hands, want)
