@@ -118,7 +118,8 @@ def _described(scene: Scene, facts: dict[str, Any]) -> Iterator[str]:
     yield f"network: {facts['nodes']} nodes, {facts['edges']} edges"
     for robot in scene.robots:
         reach = facts["reaches"][robot.name]
-        yield f"{robot.name}: payload {robot.payload:g} N, reach {reach}{_grip(robot)}"
+        at = "" if robot.arm is None else ", arm at ({:g}, {:g}, {:g})".format(*robot.arm.position)
+        yield f"{robot.name}: payload {robot.payload:g} N, reach {reach}{at}{_grip(robot)}"
     yield f"weight: {facts['weight_N']:.1f} N"
     if scene.loading:
         yield f"beside the weight: {scene.loading}"

@@ -11,12 +11,14 @@ from itertools import chain, combinations, islice
 
 import numpy as np
 
+from seqopt.engines.registry import recipe_of
 from seqopt.errors import InfeasibleError, SeqoptError, SolverError
 from seqopt.graph._explore import Explorer
 from seqopt.graph.layers._arcs import array_by_array, where_allowed
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.paths import distances, least_peak
+from seqopt.graph.scenarios import engine_for
 from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import States
 from seqopt.plan.judge._budget_proof import least_within, too_small
@@ -73,6 +75,7 @@ def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
 
 STEPS = (Goal(Measure.STEPS),)
 STANDING = "no requirement to stand"
+ARMS = "arms that reach more, or stand elsewhere"
 Look = Callable[[States], Explorer]
 
 
@@ -178,10 +181,20 @@ def _opening(problem: States, look: Look) -> Iterator[str]:
             yield text
     if problem.demands and look(replace(problem, standing=None, settled=())).whole:
         yield STANDING
+    able = problem.network.scene.has_arms and recipe_of(problem.engine) is not None
+    if able and look(_without_arms(problem)).whole:
+        yield ARMS
     for limit in problem.limits:
         rest = tuple(other for other in problem.limits if other is not limit)
         if look(replace(problem, limits=rest)).whole:
             yield limit.response
+
+
+def _without_arms(problem: States) -> States:
+    """Return a problem of robots that reach what they reach without arms."""
+    scene = problem.network.scene
+    bare = scene.with_robots(*(replace(robot, arm=None) for robot in scene.robots))
+    return replace(problem, engine=engine_for(problem.engine, bare), scenarios=())
 
 
 def _loosened(problem: States) -> Iterator[tuple[str, FreeRules]]:
