@@ -124,6 +124,7 @@ class StandingSets:
         """
         self._proofs, self._others = other._proofs, other._others
         self._others.append(self)
+        self._proofs.keeps = True
         self._screens, self._tilts_known = self._screened(), {}
 
     @property

@@ -273,8 +273,8 @@ class HeldStates:
         self._known = _Known(assembly, case)
         self._tried: set[tuple[bytes, float]] = set()
         self.solved = 0
-        self._answers = [] if earlier is None else earlier
-        for answer, held in self._answers:
+        self._answers = earlier
+        for answer, held in earlier or ():
             self._known.learn(replace(answer, value=0.0), held)
 
     def known(self, places: Ints, payload: Floats) -> Floats:
@@ -320,7 +320,8 @@ class HeldStates:
                 self._programs.append(self._compile(self.assembly, self._asked[i]))
             self.solved += 1
             answer = self._programs[i](held, enough)
-            self._answers.append((answer, held))
+            if self._answers is not None:
+                self._answers.append((answer, held))
             new = new.joined(self._known.learn(answer, held))
             if settled(new.bracket(places, payload))[0]:
                 break

@@ -33,13 +33,15 @@ class Proofs:
     """What screens of one scene share: what one proves, another need not ask.
 
     ``contacts``: of the scene; by brick count and mortar ``upright``, by these ``tilted``: what is
-    known of structures; ``answers``: by brick count, what the programs of all mortars found.
+    known of structures; ``answers``: by brick count, what the programs of all mortars found, if
+    they are kept.
     """
 
     def __init__(self, network: Network) -> None:
         self.contacts = Contacts(network)
         self.upright: dict[tuple[int, Mortar], HeldStates] = {}
         self.tilted: dict[tuple[int, Mortar], TiltedStates] = {}
+        self.keeps = False
         self.answers = defaultdict[int, list[tuple[Answer, Floats]]](list)
 
 
@@ -121,7 +123,7 @@ class Screen:
     def _upright(self, bricks: int) -> HeldStates:
         known, key = self._proofs.upright, (bricks, self.mortar)
         if key not in known:
-            answers = self._proofs.answers[bricks]
+            answers = self._proofs.answers[bricks] if self._proofs.keeps else None
             known[key] = _lacking(self._assembly(bricks), self.mortar, self._compile, answers)
         return known[key]
 

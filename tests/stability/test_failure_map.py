@@ -8,13 +8,17 @@ import numpy as np
 import pytest
 
 import seqopt
+from formulations.contact.limit_analysis import compile_equilibrium
+from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar, find_mortar
 from seqopt.errors import SceneError
-from seqopt.report._failures import cure_words
+from seqopt.report._failures import cure_words, usual_builds
 from seqopt.scene._counts import scene_of_bricks
 from seqopt.sequence.steps import Step, StepKind
+from seqopt.stability._prover import Prover
+from seqopt.stability._screens import Screen
 from seqopt.stability._step_verdicts import step_verdicts
-from seqopt.stability.assessment import Verdict
+from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.failure_map import brick_map, failure_map
 
 FRICTIONS = (0.15, 0.45)
@@ -171,3 +175,30 @@ def test_other_numbers_of_bricks_are_mapped_side_by_side():
     assert found.motions["sequential"].shape == (len(scenes[12][1]["sequential"]), 12, 6)
     figure = found.plot()
     assert [text.get_text() for text in figure.axes[0].texts].count("0 of 15") == 2
+
+
+@pytest.mark.slow
+def test_how_many_steps_fall_is_what_two_other_programs_say():
+    """The counts on the page on stability: by forces and motions, linear and cone programs."""
+    scene = seqopt.load_scene("arch:span=2,rise=0.8,pattern=VLR")
+    network, counts = seqopt.build_network(scene), {}
+    builds, _ = usual_builds(scene)
+    nodes = {node: i for i, node in enumerate((n for b in scene.placed for n in b.nodes), 1)}
+    screen, falls_by_cones = Screen(network, DRY), {}
+    for name, steps in builds.items():
+        own = falls(network, steps, DRY)
+        for step, mine in zip(steps, own, strict=True):
+            key = step.bricks, step.grips
+            if key not in falls_by_cones:
+                assembly = step_assembly(network, *key)
+                proven = Prover(assembly, compile_equilibrium)(bonded(assembly, DRY))
+                falls_by_cones[key] = _verdict_of(proven) is Verdict.FALLS
+            held = [[nodes[node] if node is not None else 0 for node in step.grips]]
+            by_lines = screen.stands(step.bricks, held)[0]
+            assert mine == falls_by_cones[key] == (by_lines == -1)
+            assert by_lines != 0
+        counts[name] = sum(own), len(own)
+    assert counts["sequential"] == (18, 37)
+    assert counts["cantilever"] == (20, 37)
+    assert counts["three-robot"] == (32, 66)
+    assert counts["free"] == (3, 36)
