@@ -16,7 +16,7 @@ from seqopt.plan.calling.formulation import Formulation, as_formulation
 from seqopt.problem.criteria import Among, Ranked, RankSum
 from seqopt.problem.requirements import NEVER, Criterion, Limit, payload_limits
 from seqopt.problem.standing import Standing
-from seqopt.report.softness import stiffnesses
+from seqopt.report._softness import stiffnesses
 from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses.quantities import TOLERANCE
 from seqopt.responses.resources import Resources

@@ -20,7 +20,7 @@ from seqopt.arrays import Floats
 from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.problem.requirements import Criterion, Limit, as_limits, with_other_limits
+from seqopt.problem.requirements import Criterion, Limit, _with_other_limits, as_limits
 from seqopt.problem.standing import MARGINS, Standing
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, robot_response
@@ -419,8 +419,8 @@ class Problem(Shown):
 
     def __post_init__(self) -> None:
         """Let a tolerance keep to the limits on tension and displacements, too."""
-        said = [(each, with_other_limits([each.response], self.limits)[0]) for each in self.limits]
-        goals = [(each, with_other_limits([each.response], self.limits)[0]) for each in self.goals]
+        said = [(each, _with_other_limits([each.response], self.limits)[0]) for each in self.limits]
+        goals = [(each, _with_other_limits([each.response], self.limits)[0]) for each in self.goals]
         limits = tuple(replace(each, response=name) for each, name in said)
         object.__setattr__(self, "limits", limits)
         object.__setattr__(self, "goals", tuple(replace(e, response=name) for e, name in goals))

@@ -273,7 +273,7 @@ def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
     return tuple(limits)
 
 
-def with_other_limits(names: Sequence[str], limits: Sequence[Limit]) -> tuple[str, ...]:
+def _with_other_limits(names: Sequence[str], limits: Sequence[Limit]) -> tuple[str, ...]:
     """Return names of responses, that of a tolerance with what limits allow wherever grips are."""
     least = {
         name: min((each.bound for each in limits if each.response == name), default=math.inf)

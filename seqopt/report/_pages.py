@@ -25,7 +25,7 @@ from seqopt.report.comparison import (
     shown_table,
 )
 from seqopt.report.page import Build, Scatter, report_page
-from seqopt.responses.quantities import length_text, number_text
+from seqopt.responses.quantities import length_text, _number_text
 from seqopt.responses.table import OUTSIDE, REMEDY, Departure, LinearRange, analyze, builds_in_words
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
@@ -158,7 +158,7 @@ def plan_page(  # a plan, what there is to say about it, and what is beside it
             f"{worst.limit.bound:.4g} N"
         )
     values = largest(scene, table)
-    shown = {n: f"{number_text(values[n])} {LARGEST[n]}" for n in WORDS}
+    shown = {n: f"{_number_text(values[n])} {LARGEST[n]}" for n in WORDS}
     shown["D_max"] = length_text(1e-6 * values["D_max"])
     most = ", ".join(f"{word.split(',')[0]} {shown[n]}" for n, word in WORDS.items())
     sentence = (

@@ -30,10 +30,10 @@ from seqopt.report._robots import Cell
 from seqopt.report._style import BLUE, SMALL, WIDTH, new_picture, styled
 from seqopt.report.draw import (
     View,
+    _draw_robots,
     draw_bricks,
     draw_grips,
     draw_network,
-    draw_robots,
     force_key,
     grip_mark,
 )
@@ -189,7 +189,7 @@ def _draw_step(
         how |= {"edge_force": fields.edge_force[0], "largest_force": largest_force}
         draw_network(axes, network, bricks, VIEW, **how)
         return
-    draw_robots(axes, network.scene, step.grips, VIEW)
+    _draw_robots(axes, network.scene, step.grips, VIEW)
     if fields is not None:
         draw_bricks(axes, network, bricks, VIEW, alpha=0.15)
         how["twist"] = fields.brick_twist[0]

@@ -285,7 +285,7 @@ def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: 
         _write(axes, name, (x, y), (10, LINE * line), color=mark["color"], zorder=6)
 
 
-def draw_robots(axes: Axes, scene: Scene, grips: Sequence[int | None], view: View) -> None:
+def _draw_robots(axes: Axes, scene: Scene, grips: Sequence[int | None], view: View) -> None:
     """Draw the ground and the arms of all robots, behind the structure or before it.
 
     Arms lead from a base to the grip, as sketches; see `seqopt.report._robots`.

@@ -28,7 +28,7 @@ from seqopt.errors import ProblemError
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, overloads
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
-from seqopt.responses.quantities import number_text
+from seqopt.responses.quantities import _number_text
 from seqopt.responses.table import OUTSIDE, Departure, force_column, step_fields
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Brick
@@ -335,6 +335,6 @@ def _asset(name: str) -> str:
 def _table(caption: str, table: pd.DataFrame) -> str:
     """Return a table as HTML, numbers with four digits."""
     body = table.to_html(
-        index=False, border=0, na_rep="", float_format=number_text, classes="wide"
+        index=False, border=0, na_rep="", float_format=_number_text, classes="wide"
     ).replace(' style="text-align: right;"', "")  # as the page does itself
     return f'<figure class="table"><figcaption>{escape(caption)}</figcaption>{body}</figure>'

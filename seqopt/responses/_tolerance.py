@@ -24,7 +24,7 @@ from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.responses._worst_direction import proven_rates, worst_misplacement, worst_rates
 from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, length_text
-from seqopt.responses.table import grips_of
+from seqopt.responses.table import _grips_of
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 
@@ -215,7 +215,7 @@ def step_tolerance(engine: Engine, step: Step, allowed: Allowed = ROBOTS_ALONE) 
     """Return how far the grips of a step may be off, with its proof."""
     scene = engine.network.scene
     holding = [r for r, node in zip(scene.robots, step.grips, strict=True) if node is not None]
-    grips = grips_of(scene, step)
+    grips = _grips_of(scene, step)
     if not holding:
         return Tolerance(np.inf, np.inf)
     if _tied(engine, step.bricks, grips)[0]:

@@ -19,12 +19,12 @@ from seqopt.network.network import Network
 _LISTED = 12  # steps that are named one by one
 
 
-def number_text(value: float) -> str:
+def _number_text(value: float) -> str:
     """Return a number with at least four digits, and no power of ten where it can be read.
 
     Examples
     --------
-    >>> number_text(27.88), number_text(116312.4)
+    >>> _number_text(27.88), _number_text(116312.4)
     ('27.88', '116,312')
     """
     return f"{value:,.0f}" if 1e4 <= abs(value) < 1e12 else f"{value:.4g}"

@@ -10,7 +10,7 @@ from seqopt.errors import SceneError
 from seqopt.scene.library.arch_form import ArchForm
 from seqopt.scene.library.wall import WallShape
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import in_words, made_of_words
+from seqopt.scene.scene_file import _in_words, _made_of_words
 
 _Given = Mapping[str, Any]
 
@@ -34,9 +34,9 @@ def scene_of_bricks(words: str, bricks: int) -> Scene:
             f"scene {words}: its number of bricks is fixed; others are for scenes in words "
             f"({known})"
         )
-    given = in_words(words)
-    now = len(made_of_words(kind, given).bricks)
-    return made_of_words(kind, _COUNTED[kind](given, now, bricks))
+    given = _in_words(words)
+    now = len(_made_of_words(kind, given).bricks)
+    return _made_of_words(kind, _COUNTED[kind](given, now, bricks))
 
 
 def _arch(given: _Given, now: int, bricks: int) -> _Given:

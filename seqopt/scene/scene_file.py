@@ -191,19 +191,19 @@ _READ: dict[Any, tuple[Callable[[str], Any], str]] = {
 def _scene_by_words(words: str) -> Scene:
     """Return the scene of a key of `KINDS`, a colon, and ``name=value`` parted by commas."""
     try:
-        scene = made_of_words(words.partition(":")[0], in_words(words))
+        scene = _made_of_words(words.partition(":")[0], _in_words(words))
     except OverflowError as error:
         raise SceneError(f"scene {words}: its numbers are too large; give smaller ones") from error
     return replace(scene, provenance=f"{scene.provenance} In words: {words}.")
 
 
-def made_of_words(name: str, given: Mapping[str, Any]) -> Scene:
+def _made_of_words(name: str, given: Mapping[str, Any]) -> Scene:
     """Return the scene of a key of `KINDS` with the numbers that it takes."""
     kind = KINDS[name]
     return kind.make(kind.shape(**given)) if kind.shape else kind.make(**given)
 
 
-def in_words(words: str) -> dict[str, Any]:
+def _in_words(words: str) -> dict[str, Any]:
     """Return the numbers that words give a scene, by name.
 
     Three lengths are ``0.2x0.1x0.06``; lengths in m, angles in rad, densities in kg/m³.
@@ -324,7 +324,7 @@ def _parse_scene(text: str, source: str = "text") -> Scene:
     return _scene_from_dict(document)
 
 
-def scene_from_document(document: object, source: str) -> Scene:
+def _scene_from_document(document: object, source: str) -> Scene:
     """Return the scene of a document, such as `scene_to_dict` makes, if it obeys the schema."""
     return _parse_scene(json.dumps(document), source)
 

@@ -138,8 +138,7 @@ def failure_map(
     holds : sequence of str, optional
         What is in the joints: ``dry``, ``bond=PASCAL`` or ``epoxy``.
     axis : str, optional
-        ``friction`` (coefficients), ``tilt`` (degrees, towards eight sides), or ``bricks placed``
-        (steps of at most so many).
+        ``friction`` (coefficients), ``tilt`` (degrees, to eight sides) or ``bricks placed`` (most).
     values : sequence of float, optional
         On the axis.
     progress : callable, optional

@@ -73,9 +73,9 @@ def rules_of(name, candidates):
 
 
 @cache
-def state(name, scenarios, mortar, grips_of):
+def state(name, scenarios, mortar, _grips_of):
     """The worst responses of a state in all scenarios; None where it falls or is overloaded."""
-    bricks, grips = grips_of
+    bricks, grips = _grips_of
     rules = FreeRules() if name == "free" else IGNORED
     engines = engines_of(name, scenarios)
     found = [allowed(engine, rules, bricks, grips) for engine in engines]
@@ -220,9 +220,9 @@ def test_everything_goes_with_everything(name, data):
 
 
 @cache
-def costs_in_each(name, grips_of):
+def costs_in_each(name, _grips_of):
     """What a state costs in every scenario by itself; None where it is not allowed in one."""
-    bricks, grips = grips_of
+    bricks, grips = _grips_of
     rules = FreeRules() if name == "free" else IGNORED
     found = [allowed(engine, rules, bricks, grips) for engine in engines_of(name, 3)]
     if any(each is None for each in found):
@@ -300,10 +300,10 @@ def test_candidates_and_states_have_one_optimum(name, scenarios):
 
 
 @cache
-def with_tolerance(name, grips_of):
+def with_tolerance(name, _grips_of):
     """The four worst responses of a state and its misfit; None where it is not allowed."""
-    worst = state(name, 0, "", grips_of)
-    return None if worst is None else np.append(worst, misfit(engines_of(name, 0)[0], *grips_of))
+    worst = state(name, 0, "", _grips_of)
+    return None if worst is None else np.append(worst, misfit(engines_of(name, 0)[0], *_grips_of))
 
 
 @pytest.mark.slow

@@ -47,8 +47,8 @@ from seqopt.plan.calling.formulation import FormulationKind, formulations
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.requirements import Criterion
 from seqopt.report._pages import PAGE, comparison_page
+from seqopt.report._softness import held_softly, softness_lines, turning_points
 from seqopt.report.comparison import CLOSED, Comparison, compare
-from seqopt.report.softness import held_softly, softness_lines, turning_points
 from seqopt.report.text import format_details
 from seqopt.responses.table import builds_in_words
 from seqopt.scene.scene import Scene

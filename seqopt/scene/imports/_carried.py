@@ -28,7 +28,7 @@ from seqopt.scene.imports._content import (
 from seqopt.scene.imports._meshes import Repaired
 from seqopt.scene.library.common import mobile_robots
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import scene_from_document, scene_to_dict
+from seqopt.scene.scene_file import _scene_from_document, scene_to_dict
 from seqopt.scene.shape import Polyhedron
 
 _HELD = ("bricks", "joints", "grounds")  # what stands on nodes and edges
@@ -112,7 +112,7 @@ def own_scene(
     if own is None or given.detect or any((given.supports, given.law, given.gap)):
         return None
     try:
-        scene = scene_from_document(own.document, "it carries")
+        scene = _scene_from_document(own.document, "it carries")
         changed = _changed(scene, content, blocks, own.bricks)
     except SceneError as error:
         said.append(f"it carries a scene that is not used, {error}")
