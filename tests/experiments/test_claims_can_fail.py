@@ -158,6 +158,11 @@ CHECKS = {
         ("free_formulations",),
         *("value", 0.83, {"bricks": 25, "formulation": "path_beam", "aim": "minmax,steps"}),
     ),
+    "free_formulations loop": Check(
+        free_formulations.loop_holds,
+        ("loop_formulations",),
+        *("value", 1.1, {"bricks": 25, "formulation": "minimax"}),
+    ),
     "paper_counterparts": Check(
         lambda table: not paper_counterparts.faults(NUMBERED, table),
         ("paper_counterparts",),

@@ -18,7 +18,7 @@ from seqopt.plan.solving import graph_of
 from seqopt.responses.table import analyze
 from tests.builders import small_arch
 
-BRICKS = 3
+BRICKS = 4
 AIMS = ["T_max,F_largest", "D_max,steps,regrips", "minmax,steps"]
 RULES = seqopt.FreeRules()
 
