@@ -32,7 +32,7 @@ def diverse(node: Ints, joints: Floats, struck: Bools, most: int) -> Ints:
 
 
 def choose(
-    whose: tuple[Ints, Ints], usable: Floats, collide: Bools, together: Floats, before: Ints
+    whose: tuple[Ints, Ints], usable: Floats, collide: Bools, together: Floats, robots: int
 ) -> Ints:
     """Return one posture of every robot at every place, (R, N), -1 where there is none.
 
@@ -41,13 +41,13 @@ def choose(
 
     ``whose`` (P,), (P,): robot and place; ``usable`` (P,): for which share of its time each can be
     used; ``collide`` (P, P); ``together`` (N, N): how much it counts that two places cannot be held
-    together; ``before`` (R, N): what to begin with, -1 where nothing is known.
+    together; ``robots``: how many there are.
     """
     robot, place = whose
-    out = before.copy()
+    out = np.full((robots, len(together)), -1)
     groups = [np.flatnonzero((robot == r) & (place == n)) for r, n in np.ndindex(*out.shape)]
     for at, rows in enumerate(groups):
-        if len(rows) and out.flat[at] < 0:
+        if len(rows):
             out.flat[at] = rows[int(np.argmax(usable[rows]))]
     chosen = np.zeros(len(robot), dtype=bool)
     chosen[out[out >= 0]] = True

@@ -131,8 +131,8 @@ def _chosen(table: PostureTable, at: Ints, ends: Floats, nodes: int) -> Ints:
     usable = (np.minimum(ends, last) - first).clip(min=0) / (last - first)
     count = (np.arange(nodes + 1) + 1) // 2
     together = 1.0 / (1.0 + np.abs(count[:, None] - count))
-    none = np.full((len(table.robots), nodes + 1), -1)
-    return choose((table.robot, at), usable, table.collide, together, none)
+    whose = (table.robot, at)
+    return choose(whose, usable, table.collide, together, len(table.robots))
 
 
 def _placed_nodes(scene: Scene) -> tuple[int, ...]:

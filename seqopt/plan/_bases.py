@@ -321,6 +321,6 @@ def _bound(plan: Plan) -> tuple[float, ...]:
 def _is_below(one: Sequence[float], other: Sequence[float]) -> bool:
     """Return whether values are better, the first that differs counts."""
     for a, b in zip(one, other, strict=False):
-        if abs(a - b) > _SAME * max(abs(a), abs(b), _SAME):
+        if a != b and not abs(a - b) <= _SAME * max(abs(a), abs(b), _SAME) < inf:
             return a < b
     return False

@@ -25,7 +25,7 @@ from seqopt.report.comparison import (
     shown_table,
 )
 from seqopt.report.page import Build, Scatter, report_page
-from seqopt.responses.quantities import length_text, _number_text
+from seqopt.responses.quantities import _number_text, length_text
 from seqopt.responses.table import OUTSIDE, REMEDY, Departure, LinearRange, analyze, builds_in_words
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE

@@ -28,7 +28,8 @@ from seqopt.errors import ProblemError
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, overloads
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
-from seqopt.responses.quantities import _number_text
+from seqopt.responses.quantities import _number_text, length_text
+from seqopt.responses._tolerance import each_tolerance, held_in_steps, is_linear
 from seqopt.responses.table import OUTSIDE, Departure, force_column, step_fields
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Brick
@@ -39,6 +40,7 @@ from seqopt.sequence.steps import Step
 from seqopt.stability._builds import WORDS, BuildVerdicts
 
 LARGEST = 32767
+_FEW = 100  # bricks up to which it is said how far grips may be off
 FIELDS = ("twist", "edge", "push", "turn")  # packed, a row for every step
 RESPONSES = {
     "F_largest": "largest grip force, N",
@@ -178,6 +180,7 @@ def _build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[st
         "rank": [build.order.index(name) for name in own] if build.order else None,
         "stands": _stands(build.verdicts),
         "marks": _marks(engine.network.scene, build),
+        "off": _off(engine, build),
         "arms": arm_data(engine.network.scene, build.steps, build.arms),
         "steps": [
             {
@@ -193,6 +196,16 @@ def _build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[st
         "forces": [force_column(robot) for robot in engine.network.scene.robots],
         **{name: None if part is None else _packed(part) for name, part in found.items()},
     }
+
+
+def _off(engine: Engine, build: Build) -> list[str]:
+    """Return how far grips may be off in every step, in words; none where that is not known."""
+    scene = engine.network.scene
+    if not is_linear(engine) or len(scene.bricks) > _FEW or build.order:
+        return []
+    found = each_tolerance(engine, held_in_steps(scene, build.steps)).tolist()
+    words = (f"Grips may be {length_text(far)} off." for far in found)
+    return [said if 0 < far < np.inf else "" for far, said in zip(found, words, strict=True)]
 
 
 def _marks(scene: Scene, build: Build) -> list[str]:

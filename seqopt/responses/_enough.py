@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
+from itertools import chain
 
 import numpy as np
 import pandas as pd
@@ -14,10 +15,12 @@ from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.registry import recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.responses._tolerance import held_in_table, least_tolerance
-from seqopt.responses.quantities import NO_TOLERANCE, RESPONSES, length_text
-from seqopt.responses.table import LinearRange
+from seqopt.responses._tolerance import each_tolerance, held_in_table, is_linear
+from seqopt.responses.quantities import RESPONSES, length_text
+from seqopt.responses.table import LinearRange, force_column
+from seqopt.scene.scene import Scene
 
+_FEW = 100  # bricks up to which tolerances take less than a second
 _KNOWN = AutoEngine, PlanarEngine, ComplianceEngine, DiscreteEngine
 
 
@@ -112,14 +115,27 @@ def _left_out(
 
 
 def _off(within: LinearRange, builds: Mapping[str, pd.DataFrame]) -> str:
-    """Return by how much grips may be off, in brackets; nothing where that is not linear."""
-    engine = within.engine
-    if type(engine) not in (AutoEngine, ComplianceEngine):
+    """Return by how much grips may be off, in brackets.
+
+    Nothing where that is not linear, takes long, or a payload is exceeded wherever they are.
+    """
+    scene = within.engine.network.scene
+    if not is_linear(within.engine) or len(scene.bricks) > _FEW or _overloaded(scene, builds):
         return ""
-    scene = engine.network.scene
-    held = (held_in_table(scene, table) for table in builds.values())
-    least, build, step = least_tolerance(engine, held)
-    if not 1 / NO_TOLERANCE < least < np.inf:
+    held = {name: held_in_table(scene, table) for name, table in builds.items()}
+    found = each_tolerance(within.engine, [*chain.from_iterable(held.values())])
+    at = int(found.argmin())
+    if not 0 < found[at] < np.inf:
         return ""
-    where = f"step {step}{f' of {[*builds][build]}' if len(builds) > 1 else ''}"
-    return f" (rigid grips {length_text(least)} off exceed a payload: {where})"
+    places = [(name, step) for name, steps in held.items() for step, *_ in steps]
+    where = f"step {places[at][1]}{f' of {places[at][0]}' if len(builds) > 1 else ''}"
+    return f" (rigid grips {length_text(found[at])} off exceed a payload: {where})"
+
+
+def _overloaded(scene: Scene, builds: Mapping[str, pd.DataFrame]) -> bool:
+    """Return whether a robot carries more than its payload in a step of some builds."""
+    return any(
+        bool((table[force_column(robot)].abs() > robot.payload).any())
+        for table in builds.values()
+        for robot in scene.robots
+    )

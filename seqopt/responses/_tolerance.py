@@ -6,7 +6,7 @@ are linear in that: one solution for every grip and direction tells the worst of
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from operator import itemgetter
@@ -20,6 +20,7 @@ from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Engine, Want, grip_columns, select_sets
 from seqopt.engines.registry import make_engine, recipe_of
+from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.responses._worst_direction import proven_rates, worst_misplacement, worst_rates
@@ -249,24 +250,26 @@ def held_in_steps(scene: Scene, steps: Sequence[Step]) -> list[_Held]:
     return [(step.number, step.bricks, scene.grip_numbers(step.grips)) for step in steps]
 
 
-def least_tolerance(engine: Engine, builds: Iterable[Sequence[_Held]]) -> tuple[float, int, int]:
-    """Return how far grips may be off in all steps of builds, m, in which build, and which step.
+def is_linear(engine: Engine) -> bool:
+    """Return whether an engine is known to be linear in where grips are, in all directions."""
+    return type(engine) in (AutoEngine, ComplianceEngine)
 
-    All steps of a brick count with as many grips are solved at once, equal ones of several builds
-    once.
+
+def each_tolerance(engine: Engine, steps: Sequence[_Held]) -> Floats:
+    """Return how far grips may be off in every step, m.
+
+    All steps of a brick count with as many grips are solved at once, equal ones once.
     """
-    asked: dict[tuple[int, int, tuple[int, ...]], tuple[int, int]] = {}
-    for build, steps in enumerate(builds):
-        for step, bricks, held in steps:
-            asked.setdefault((bricks, len(held), held), (build, step))
-    worst = (0.0, -1, -1)
+    asked: dict[tuple[int, int, tuple[int, ...]], list[int]] = {}
+    for place, (_, bricks, held) in enumerate(steps):
+        asked.setdefault((bricks, len(held), held), []).append(place)
+    out = np.full(len(steps), np.inf)
     for (bricks, _), same in groupby(sorted(asked), key=itemgetter(0, 1)):
         mine = [*same]
         found = misfits(engine, bricks, np.array([held for *_, held in mine], dtype=np.int64))
-        at = int(found.argmax())
-        if found[at] > worst[0]:
-            worst = (float(found[at]), *asked[mine[at]])
-    return (1 / worst[0] if worst[0] else np.inf, *worst[1:])
+        for key, misfit in zip(mine, found.tolist(), strict=True):
+            out[asked[key]] = np.inf if misfit == 0 else 0.0 if misfit >= NO_TOLERANCE else 1 / misfit
+    return out
 
 
 _SOFTEST, _STIFFEST = 1e2, 1e12  # N/m, between which a stiffness is sought
@@ -284,8 +287,8 @@ def stiffness_for(engine: Engine, steps: Sequence[Step], distance: float) -> flo
 
     def enough(stiffness: float | None) -> bool:
         soft = scene.with_grips(stiffness)
-        found = least_tolerance(make_engine(name, soft), [held_in_steps(soft, steps)])
-        return found[0] >= distance
+        found = each_tolerance(make_engine(name, soft), held_in_steps(soft, steps))
+        return bool(found.min(initial=np.inf) >= distance)
 
     if enough(None):
         return np.inf

@@ -323,7 +323,7 @@
     out.append(text("h2", `${build.name}, step ${step.number} of ${build.steps.length}`));
     const newest = structure.bricks.find((_, i) => rank(build, i) === step.bricks - 1);
     const what = step.kind === "place" ? `Brick ${newest.name} is placed` : step.kind === "release" ? "A robot lets go" : "A robot takes a new grip";
-    out.append(text("p", `${what}; ${step.bricks} of ${structure.bricks.length} bricks stand.` + (build.stands[s] ? ` It ${build.stands[s]}.` : "")));
+    out.append(text("p", `${what}; ${step.bricks} of ${structure.bricks.length} bricks stand.` + (build.stands[s] ? ` It ${build.stands[s]}.` : "") + (build.off[s] ? ` ${build.off[s]}` : "")));
     if (build.marks[s]) out.append(text("p", build.marks[s], "over"));
     const grips = document.createElement("table"), rows = document.createElement("table");
     grips.innerHTML = "<tr><th>robot</th><th>brick</th><th>node</th><th>force, N</th></tr>";
