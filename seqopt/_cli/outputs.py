@@ -20,7 +20,7 @@ from seqopt.plan.plan import Plan
 from seqopt.report._pages import PAGE, plan_page
 from seqopt.report.comparison import Comparison
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
-from seqopt.sequence.exports.formats import export_plan
+from seqopt.sequence.exports._tasks import plan_tasks, tasks_csv, tasks_json
 from seqopt.stability._builds import BuildProver
 
 ALWAYS = ("plan.csv", "summary.json", "scene.json", PAGE)  # names in the folder of any plan
@@ -94,8 +94,8 @@ def plan_files(
 def _task_files(plan: Plan) -> dict[str, str]:
     """Return what robots do, for those who program them, by file name."""
     scene = plan.engine.network.scene
-    forms = {"tasks.json": "tasks", "tasks.csv": "tasks_csv"}
-    return {name: export_plan(scene, plan.steps, form) for name, form in forms.items()}
+    tasks = [*plan_tasks(scene, plan.steps)]
+    return {"tasks.json": tasks_json(scene, tasks), "tasks.csv": tasks_csv(tasks)}
 
 
 def _plain(value: object) -> Any:

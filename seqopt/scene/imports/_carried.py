@@ -44,7 +44,7 @@ def carry(graph: Entry, keys: Mapping[int, str], scene: Scene, unit: str | None)
     document = scene_to_dict(scene)
     held = {kind: [*enumerate(document.pop(kind))] for kind in _HELD}
     del document["build_order"]
-    nodes, edges = graph["node"], graph.setdefault("edge", {})
+    nodes, edges = entry("source", graph, "node", "vertex"), graph.setdefault("edge", {})
     for left in (*nodes.values(), *(e for ends in edges.values() for e in ends.values())):
         for name in ("brick", "grounds", "joints"):  # of a scene that it carried before
             (left or {}).pop(name, None)
@@ -62,31 +62,32 @@ def carry(graph: Entry, keys: Mapping[int, str], scene: Scene, unit: str | None)
 
 def carried(graph: Entry, source: str) -> Carried | None:
     """Return the scene that a graph carries; None if it carries none."""
-    own = (graph.get("attributes") or {}).get(_KEY)
-    if own is None:
+    attributes, where = graph.get("attributes"), f"{source}: {_KEY}"
+    if not isinstance(attributes, dict) or attributes.get(_KEY) is None:
         return None
-    where = f"{source}: {_KEY}"
+    own = mapping(where, attributes[_KEY])
     document = {**mapping(where, entry(where, own, "scene"))}
-    nodes: dict[str, Entry] = {
-        key: node for key, node in graph["node"].items() if (node or {}).get("brick") is not None
-    }
-    edges = [e or {} for ends in (graph.get("edge") or {}).values() for e in ends.values()]
+    found = mapping(where, entry(where, graph, "node", "vertex"))
+    held = {key: mapping(where, node or {}) for key, node in found.items()}
+    nodes = {key: node for key, node in held.items() if node.get("brick") is not None}
+    ends = [mapping(where, e or {}) for e in mapping(where, graph.get("edge") or {}).values()]
+    edges = [mapping(where, edge or {}) for row in ends for edge in row.values()]
     parts = {
         "bricks": [node["brick"] for node in nodes.values()],
         "grounds": _gathered(where, [*nodes.values()], "grounds"),
         "joints": _gathered(where, edges, "joints"),
     }
-    for kind, found in parts.items():
-        document[kind] = _sorted(f"{where}: {kind}", found)
+    document |= {kind: _sorted(f"{where}: {kind}", rows) for kind, rows in parts.items()}
     names = {key: entry(f"{where}: brick", node["brick"], "name") for key, node in nodes.items()}
-    turns = sorted((entry(where, node, "order"), names[key]) for key, node in nodes.items())
-    document["build_order"] = [name for _, name in turns]
+    turn = {key: number(where, entry(where, node, "order")) for key, node in nodes.items()}
+    document["build_order"] = [names[key] for key in sorted(nodes, key=turn.__getitem__)]
     return Carried(document, names, own.get("unit"))
 
 
 def own_density(where: str, node: Entry) -> float | None:
     """Return the density of the brick on a node, kg/m³, if it has one."""
-    value = (node.get("brick") or {}).get("density")
+    brick = node.get("brick")
+    value = None if brick is None else entry(f"{where}: brick", brick, "density")
     return None if value is None else number(f"{where}: density", value)
 
 
@@ -97,7 +98,7 @@ def _gathered(where: str, holders: Sequence[Entry], name: str) -> list[Any]:
 
 def _sorted(where: str, found: Sequence[Any]) -> list[Entry]:
     """Return parts in the order that they had in their scene."""
-    parts = sorted(found, key=lambda part: float(entry(where, part, "place")))
+    parts = sorted(found, key=lambda part: number(where, entry(where, part, "place")))
     return [{key: value for key, value in part.items() if key != "place"} for part in parts]
 
 

@@ -7,7 +7,6 @@ the robot, or up where the robot may be anywhere.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,7 +16,7 @@ from seqopt.arrays import Floats, Vector
 from seqopt.scene.boxes import as_vector, vertices_of
 from seqopt.scene.parts import Brick, Ground, Joint, Robot, Side, Sphere
 from seqopt.scene.scene import Scene
-from seqopt.scene.shape import fans, normal_of
+from seqopt.scene.shape import fans
 
 _SQUARE = 0.9  # cosine from which on a joint lies on a face
 _NEVER, _LATER = 4.0, 2.0  # what a face costs that a joint lies on, now or once more bricks stand
@@ -86,30 +85,29 @@ def _faces_seen(brick: Brick, at: Floats) -> tuple[Floats, Floats]:
     Of all faces in front of it, where it sees none so.
     """
     points, faces = vertices_of(brick)
-    size = float(np.ptp(points, axis=0).max())
-    seen, ahead = [], []
-    for face in faces:
-        corners = points[list(face)]
-        normal = normal_of(corners)
-        normal = normal / np.linalg.norm(normal)
-        depth = float((corners[0] - at) @ normal)
-        ahead.append((normal, depth))
-        if depth > 0 and _within(points, face, at, normal, _EDGE * size):
-            seen.append((normal, depth))
-    found = seen or [pair for pair in ahead if pair[1] > 0] or ahead
-    return np.array([normal for normal, _ in found]), np.array([depth for _, depth in found])
+    corners = points[fans(faces)]
+    owner = np.repeat(np.arange(len(faces)), [len(face) - 2 for face in faces])
+    signed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    total = np.stack([np.bincount(owner, column) for column in signed.T], axis=1)
+    normals = total / np.linalg.norm(total, axis=1, keepdims=True)
+    depths = np.einsum("fi,fi->f", points[[face[0] for face in faces]] - at, normals)
+    slack = _EDGE * float(np.ptp(points, axis=0).max())
+    within = _within(corners, signed, normals[owner], at, slack)
+    seen = (depths > 0) & (np.bincount(owner, within) > 0.5)
+    kept = seen if seen.any() else depths > 0
+    return (normals[kept], depths[kept]) if kept.any() else (normals, depths)
 
 
-def _within(points: Floats, face: Sequence[int], at: Floats, normal: Floats, slack: float) -> bool:
-    """Return whether a point lies before a face, whose fan of triangles may have signs."""
-    count = 0
-    for corners in points[fans([face])]:
-        edges = np.roll(corners, -1, axis=0) - corners
-        sign = float(np.sign(normal_of(corners) @ normal))
-        lengths = np.maximum(np.linalg.norm(edges, axis=1), slack)
-        inward = sign * (np.cross(edges, at - corners) @ normal) / lengths
-        count += int(sign) * bool((inward >= -slack).all())
-    return count > 0
+def _within(corners: Floats, signed: Floats, normals: Floats, at: Floats, slack: float) -> Floats:
+    """Return for triangles (T, 3, 3) of fans whether a point lies before them, with their signs.
+
+    ``signed`` (T, 3) is against the normal of its face where the fan folds back.
+    """
+    sign = np.sign(np.einsum("ti,ti->t", signed, normals))
+    edges = np.roll(corners, -1, axis=1) - corners
+    lengths = np.maximum(np.linalg.norm(edges, axis=2), slack)
+    inward = np.einsum("tki,ti->tk", np.cross(edges, at - corners), normals) / lengths
+    return np.asarray(sign * (sign[:, None] * inward >= -slack).all(axis=1))
 
 
 def _covers(scene: Scene, brick: Brick) -> tuple[Floats, Floats]:

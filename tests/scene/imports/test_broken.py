@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import copy
+import json
 
 from hypothesis import given
 from hypothesis import strategies as st
 
+from experiments.harness.scenes import running_bond
 from seqopt.errors import SeqoptError
+from seqopt.network.build import build_network
 from seqopt.scene.imports._building import build_scene
 from seqopt.scene.imports._content import Given
 from seqopt.scene.imports.formats import _DOCUMENTS as READERS
 from seqopt.scene.imports.formats import sniffed
-from tests.documents import DOCUMENTS
+from seqopt.sequence.exports.formats import export_plan
+from seqopt.sequence.two_robots import METHODS
+from tests.documents import DOCUMENTS as OTHERS
 
 JUNK = (None, True, -1, 0, 3, 1e308, -1e-300, 10**400, "", "x", [], {}, [[1]], {"data": 1}, [0] * 3)
 
@@ -26,6 +31,9 @@ def places(held, before=()):
         yield from places(value, (*before, key))
 
 
+WALL = running_bond(2, 1)
+STEPS = METHODS["sequential"](build_network(WALL), ())
+DOCUMENTS = OTHERS | {"carried": json.loads(export_plan(WALL, STEPS, "compas_assembly"))}
 PLACES = {name: sorted(places(held), key=repr) for name, held in DOCUMENTS.items()}
 REMOVED = "removed"
 
