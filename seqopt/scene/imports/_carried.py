@@ -14,6 +14,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
+from seqopt.scene._checks import whole_between
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.imports._content import (
     Carried,
@@ -110,7 +111,8 @@ def own_scene(
     ``content``: in m, with z up; ``said``: gets why it is not used.
     """
     own = content.own
-    if own is None or given.detect or any((given.supports, given.law, given.gap)):
+    asked = (given.supports, given.law, given.gap)
+    if own is None or given.detect or any(value is not None for value in asked):
         return None
     try:
         scene = _scene_from_document(own.document, "it carries")
@@ -126,7 +128,7 @@ def own_scene(
         return None
     more: dict[str, Any] = {} if given.name is None else {"name": given.name}
     if given.robots is not None:
-        more["robots"] = mobile_robots(scene.bricks, given.robots)
+        more["robots"] = mobile_robots(scene.bricks, whole_between("robots", given.robots, 1))
     return replace(scene, **more)
 
 

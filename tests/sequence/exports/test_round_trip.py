@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from experiments.harness.scenes import running_bond
+from seqopt.errors import SceneError
 from seqopt.scene.boxes import as_vectors, block_brick, vertices_of
 from seqopt.scene.imports._content import Given
 from seqopt.scene.imports.formats import FORMATS, import_scene
@@ -219,3 +220,9 @@ def with_order(scene):
 def test_every_format_that_goes_both_ways_says_what_it_loses():
     assert {*LOST} == {*EXPORTS} & {*FORMATS} - {"compas_timber"}  # a plan there, a model here
     assert {*ENDS} == {*LOST}
+
+
+def test_no_robots_are_as_wrong_as_elsewhere(tmp_path):
+    path = written(running_bond(3, 2), "compas_assembly", tmp_path)
+    with pytest.raises(SceneError, match="robots"):
+        import_scene(path, given=Given(robots=0))
