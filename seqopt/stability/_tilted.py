@@ -50,7 +50,7 @@ class TiltedStates:
         ``pull``: over gravity; ``places``, ``payload`` (S, r): as of `HeldStates.bracket`.
         """
         survived, least = self._brackets(places, payload)
-        return hulls(survived)[0] >= pull, least < pull
+        return _hulls(survived)[0] >= pull, least < pull
 
     def survive(self, pull: float, places: Ints, payload: Floats) -> tuple[Bools, Bools]:
         """Return the same, of sets that stand without a pull, asking what is not known."""
@@ -58,12 +58,12 @@ class TiltedStates:
         asked = np.zeros(survived.shape, dtype=bool)
         rows = np.arange(len(places))
         while True:
-            safe, angle = hulls(survived[rows])
+            safe, angle = _hulls(survived[rows])
             open_ = ~(safe >= pull) & (least[rows] >= pull)
             rows, ways = rows[open_], self._next(angle[open_], asked[rows[open_]])
             rows, ways = rows[ways >= 0], ways[ways >= 0]
             if not len(rows):
-                return hulls(survived)[0] >= pull, least < pull
+                return _hulls(survived)[0] >= pull, least < pull
             for way in np.unique(ways).tolist():
                 own = rows[ways == way]
                 found = self._ask(way, pull, places[own], payload[own])
@@ -110,7 +110,7 @@ def _settled(pull: float, bracket: Floats) -> Bools:
     return np.asarray((high < pull) | (low >= _FAR * pull) | narrow | (low >= CAP))
 
 
-def hulls(survived: Floats) -> tuple[Floats, Floats]:
+def _hulls(survived: Floats) -> tuple[Floats, Floats]:
     """Return what is survived in every direction, and where that is least; NaN if it is unknown.
 
     ``survived`` (S, F): in directions evenly spread, NaN where unknown. Results (S,), (S,): as of
@@ -118,7 +118,7 @@ def hulls(survived: Floats) -> tuple[Floats, Floats]:
 
     Examples
     --------
-    >>> safe, angle = hulls(np.ones((1, 4)))
+    >>> safe, angle = _hulls(np.ones((1, 4)))
     >>> round(float(safe[0]), 4)
     0.7071
     """

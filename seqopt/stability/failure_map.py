@@ -138,8 +138,7 @@ def failure_map(
     holds : sequence of str, optional
         What is in the joints: ``dry``, ``bond=PASCAL`` or ``epoxy``.
     axis : str, optional
-        ``friction`` (coefficients), ``tilt`` (degrees, towards eight sides), or ``bricks placed``
-        (steps of at most so many).
+        ``friction``, ``tilt`` (degrees, to eight sides), or ``bricks placed`` (at most so many).
     values : sequence of float, optional
         On the axis.
     progress : callable, optional
@@ -173,7 +172,7 @@ def failure_map(
     return FailureMap(pd.DataFrame(rows), steps, motions, usual)
 
 
-def brick_map(
+def _brick_map(
     scenes: Mapping[int, tuple[Scene, Mapping[str, Sequence[Step]]]],
     usual: int,
     holds: Sequence[str] = ("dry", "epoxy"),

@@ -23,7 +23,7 @@ from seqopt.stability._prover import (
     sideways,
 )
 from seqopt.stability._screens import FALLS, STANDS, Screen
-from seqopt.stability._tilted import hulls
+from seqopt.stability._tilted import _hulls
 from seqopt.stability.assessment import Verdict, assess, bonded
 
 UP = (0.0, 0.0, 1.0)
@@ -164,7 +164,7 @@ def test_hulls_of_many_are_those_of_each(known):
         row[rng.choice(15, min(known, 15), replace=False)] = rng.uniform(0.2, 2.0, min(known, 15))
     angles = 2 * np.pi * np.arange(15) / 15
     each = np.array([in_every_direction(angles, row) for row in survived])
-    safe, angle = hulls(survived)
+    safe, angle = _hulls(survived)
     np.testing.assert_allclose(safe, each[:, 0], rtol=1e-12)
     np.testing.assert_allclose(np.cos(angle - each[:, 1]), np.where(np.isnan(safe), np.nan, 1.0))
     assert np.isfinite(safe).any() == (known > 2)
