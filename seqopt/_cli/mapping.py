@@ -21,7 +21,7 @@ from seqopt.report._pages import PAGE
 from seqopt.scene._checks import MOST_BRICKS
 from seqopt.scene._counts import scene_of_bricks
 from seqopt.scene.scene import Scene, in_order
-from seqopt.stability.failure_map import FailureMap, brick_map, failure_map
+from seqopt.stability.failure_map import FailureMap, _brick_map, failure_map
 
 MAP = {
     "--map AXIS": "map where builds fail, over what holds their joints and over friction, tilt "
@@ -129,7 +129,7 @@ def _over_bricks(
     if not scenes:
         raise ProblemError(f"--map {options.map}: {'; '.join(notes)}")
     ordered, usual = dict(sorted(scenes.items())), min(scenes, key=lambda n: abs(n - now))
-    return *scenes[usual], brick_map(ordered, usual, holds, options.tell), notes
+    return *scenes[usual], _brick_map(ordered, usual, holds, options.tell), notes
 
 
 def _asked_builds(options: argparse.Namespace, scene: Scene) -> tuple[Builds, list[str]]:

@@ -16,14 +16,13 @@ from seqopt.arrays import Bools, Floats, Ints, Vector
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import Mortar
 from seqopt.stability._held_states import CompileHeld, HeldStates
-from seqopt.stability._prover import FINE, in_every_direction, sideways
+from seqopt.stability._prover import FINE, sideways
 from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import CAP, GAP
 
 _FIRST = tuple(range(0, FINE, FINE // 4))
 _FAR = 1.5  # times the pull that must be survived: what is survived by so much is far enough
 _TURN = 2 * np.pi / FINE
-_ANGLES: Floats = 2 * np.pi * np.linspace(0.0, 1.0, FINE, endpoint=False)
 
 
 class TiltedStates:
@@ -51,46 +50,48 @@ class TiltedStates:
         ``pull``: over gravity; ``places``, ``payload`` (S, r): as of `HeldStates.bracket`.
         """
         survived, least = self._brackets(places, payload)
-        stands = np.array([_hull(row)[0] >= pull for row in survived], dtype=bool)
-        return stands, least < pull
+        return _hulls(survived)[0] >= pull, least < pull
 
     def survive(self, pull: float, places: Ints, payload: Floats) -> tuple[Bools, Bools]:
         """Return the same, of sets that stand without a pull, asking what is not known."""
-        stands, falls = self.known(pull, places, payload)
-        asked = np.zeros((len(places), FINE), dtype=bool)
+        survived, least = self._brackets(places, payload)
+        asked = np.zeros(survived.shape, dtype=bool)
+        rows = np.arange(len(places))
         while True:
-            survived, _ = self._brackets(places, payload)
-            rows = np.flatnonzero(~stands & ~falls)
-            ways = np.array([self._next(survived[i], asked[i]) for i in rows], dtype=np.int64)
+            safe, angle = _hulls(survived[rows])
+            open_ = ~(safe >= pull) & (least[rows] >= pull)
+            rows, ways = rows[open_], self._next(angle[open_], asked[rows[open_]])
             rows, ways = rows[ways >= 0], ways[ways >= 0]
             if not len(rows):
-                return stands, falls
+                return _hulls(survived)[0] >= pull, least < pull
             for way in np.unique(ways).tolist():
                 own = rows[ways == way]
+                found = self._ask(way, pull, places[own], payload[own])
                 asked[own, way] = True
-                self._ask(way, pull, places[own], payload[own])
-            found = self.known(pull, places[rows], payload[rows])
-            stands[rows], falls[rows] = found
+                survived[own, way] = np.where(found[:, 0] >= 0, found[:, 0], np.nan)
+                least[own] = np.minimum(least[own], found[:, 1])
 
-    def _next(self, survived: Floats, asked: Bools) -> int:
-        """Return the direction to ask next of a set, -1 if there is none that would help."""
-        first = [way for way in _FIRST if not asked[way]]
-        if first:
-            return max(first, key=lambda way: (self._fell[way], -way))
-        angle = _hull(survived)[1]
-        if np.isnan(angle):
-            return -1
-        off = np.abs((np.arange(FINE) - angle / _TURN + FINE / 2) % FINE - FINE / 2)
-        off[asked] = np.inf
-        way = int(np.argmin(off))
-        return way if off[way] <= 1.0 else -1
+    def _next(self, angle: Floats, asked: Bools) -> Ints:
+        """Return the directions to ask next, (S,): -1 where there is none that would help.
 
-    def _ask(self, way: int, pull: float, places: Ints, payload: Floats) -> None:
+        ``angle`` (S,): where their hulls are nearest; ``asked`` (S, F).
+        """
+        off = np.abs((np.arange(FINE) - angle[:, None] / _TURN + FINE / 2) % FINE - FINE / 2)
+        off = np.where(asked | np.isnan(off), np.inf, off)
+        near = off.argmin(axis=1)
+        out = np.where(off.min(axis=1, initial=np.inf) <= 1.0, near, -1)
+        for way in sorted(_FIRST, key=lambda way: (self._fell[way], -way)):
+            out[~asked[:, way]] = way  # the one that most fell by comes last, and stays
+        return out
+
+    def _ask(self, way: int, pull: float, places: Ints, payload: Floats) -> Floats:
+        """Return the brackets (S, 2) of what is survived in a direction."""
         if way not in self._states:
             case = self._cases[way]
             self._states[way] = HeldStates(self._assembly, case, self._compile)
         found = self._states[way].bracket(places, payload, partial(_settled, pull), pull)
         self._fell[way] += int((found[:, 1] < pull).sum())
+        return found
 
     def _brackets(self, places: Ints, payload: Floats) -> tuple[Floats, Floats]:
         """Return what is survived by direction (S, F), NaN where unknown, and the least bound."""
@@ -109,6 +110,32 @@ def _settled(pull: float, bracket: Floats) -> Bools:
     return np.asarray((high < pull) | (low >= _FAR * pull) | narrow | (low >= CAP))
 
 
-def _hull(survived: Floats) -> tuple[float, float]:
-    """Return what is survived in every direction, and where it is least; NaN if that is unknown."""
-    return in_every_direction(_ANGLES, survived)
+def _hulls(survived: Floats) -> tuple[Floats, Floats]:
+    """Return what is survived in every direction, and where that is least; NaN if it is unknown.
+
+    ``survived`` (S, F): in directions evenly spread, NaN where unknown. Results (S,), (S,): as of
+    `seqopt.stability._prover.in_every_direction` of every row.
+
+    Examples
+    --------
+    >>> safe, angle = _hulls(np.ones((1, 4)))
+    >>> round(float(safe[0]), 4)
+    0.7071
+    """
+    count = survived.shape[1]
+    known, way = np.isfinite(survived), np.arange(count)
+    after = np.where(np.hstack([known, known]), np.arange(2 * count), 2 * count)
+    after = np.minimum.accumulate(after[:, ::-1], axis=1)[:, ::-1][:, 1 : count + 1]
+    angle = 2 * np.pi * way / count
+    ends = np.where(known, survived, 0.0)[..., None] * np.stack([np.cos(angle), np.sin(angle)], 1)
+    along = np.take_along_axis(ends, (after % count)[..., None], axis=1) - ends
+    size = np.maximum(np.square(along).sum(axis=2), np.finfo(float).tiny)
+    nearest = ends + np.clip(-(ends * along).sum(axis=2) / size, 0.0, 1.0)[..., None] * along
+    distance = np.where(known, np.linalg.norm(nearest, axis=2), np.inf)
+    worst = distance.argmin(axis=1)[:, None]
+    wide = np.where(known, after - way, 0).max(axis=1, initial=0) >= count / 2
+    unsure = wide | (known.sum(axis=1) < 3)
+    x, y = np.take_along_axis(nearest, worst[..., None], axis=1)[:, 0].T
+    least = np.take_along_axis(distance, worst, axis=1)[:, 0]
+    where = np.arctan2(y, x) % (2 * np.pi)
+    return np.where(unsure, np.nan, least), np.where(unsure, np.nan, where)

@@ -138,7 +138,7 @@ def failure_map(
     holds : sequence of str, optional
         What is in the joints: ``dry``, ``bond=PASCAL`` or ``epoxy``.
     axis : str, optional
-        ``friction`` (coefficients), ``tilt`` (degrees, to eight sides) or ``bricks placed`` (most).
+        ``friction``, ``tilt`` (degrees, to eight sides), or ``bricks placed`` (at most so many).
     values : sequence of float, optional
         On the axis.
     progress : callable, optional
@@ -172,7 +172,7 @@ def failure_map(
     return FailureMap(pd.DataFrame(rows), steps, motions, usual)
 
 
-def brick_map(
+def _brick_map(
     scenes: Mapping[int, tuple[Scene, Mapping[str, Sequence[Step]]]],
     usual: int,
     holds: Sequence[str] = ("dry", "epoxy"),

@@ -19,7 +19,7 @@ from seqopt.stability._prover import Prover
 from seqopt.stability._screens import Screen
 from seqopt.stability._step_verdicts import step_verdicts
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
-from seqopt.stability.failure_map import brick_map, failure_map
+from seqopt.stability.failure_map import _brick_map, failure_map
 
 FRICTIONS = (0.15, 0.45)
 
@@ -163,7 +163,7 @@ def test_other_numbers_of_bricks_are_mapped_side_by_side():
         own = seqopt.build_network(scene)
         scenes[bricks] = scene, {"sequential": seqopt.sequential(own)}
     scenes[8][1]["cantilever"] = seqopt.cantilever(seqopt.build_network(scenes[8][0]))
-    found = brick_map(scenes, 12, ["dry", "epoxy"])
+    found = _brick_map(scenes, 12, ["dry", "epoxy"])
     cases = found.cases
     assert cases["build"].tolist() == ["sequential"] * 4 + ["cantilever"] * 2
     assert cases["value"].tolist() == [8, 12, 8, 12, 8, 8]

@@ -23,6 +23,7 @@ from seqopt.stability._prover import (
     sideways,
 )
 from seqopt.stability._screens import FALLS, STANDS, Screen
+from seqopt.stability._tilted import _hulls
 from seqopt.stability.assessment import Verdict, assess, bonded
 
 UP = (0.0, 0.0, 1.0)
@@ -153,3 +154,17 @@ def test_grip_sets_survive_no_more_however_a_scene_is_turned(arch25):
         assert least == pytest.approx(exact, rel=0.02)
         for tilt, verdicts in ((0.98 * least, {STANDS}), (1.02 * most, {FALLS})):
             assert set(Screen(network, DRY, tilt).stands(13, row[None]).tolist()) <= verdicts
+
+
+@pytest.mark.parametrize("known", [2, 3, 5, 9, 16])
+def test_hulls_of_many_are_those_of_each(known):
+    rng = np.random.default_rng(known)
+    survived = np.full((200, 15), np.nan)  # an odd number: no two are opposite
+    for row in survived:
+        row[rng.choice(15, min(known, 15), replace=False)] = rng.uniform(0.2, 2.0, min(known, 15))
+    angles = 2 * np.pi * np.arange(15) / 15
+    each = np.array([in_every_direction(angles, row) for row in survived])
+    safe, angle = _hulls(survived)
+    np.testing.assert_allclose(safe, each[:, 0], rtol=1e-12)
+    np.testing.assert_allclose(np.cos(angle - each[:, 1]), np.where(np.isnan(safe), np.nan, 1.0))
+    assert np.isfinite(safe).any() == (known > 2)

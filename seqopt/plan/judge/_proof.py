@@ -22,7 +22,7 @@ from seqopt.graph.paths import lexicographic, reached, tied
 from seqopt.graph.states._visits import move_amounts
 from seqopt.graph.states.states import States
 from seqopt.plan.judge._answers import ask
-from seqopt.plan.judge._rule_moves import Follows, RuleTables, ScheduleTables
+from seqopt.plan.judge._rule_moves import Follows, RuleTables, ScheduleTables, _alike
 from seqopt.plan.judge._standing_proof import StandingProof
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Measure
@@ -229,21 +229,6 @@ def _near(values: Floats, bounds: Floats) -> Bools:
     """Return the rows (n,) of which a value (n, k) is so close to a bound that digits decide."""
     finite = bounds[np.isfinite(bounds)]
     return np.asarray((np.abs(values[:, :, None] - finite) <= BAND * np.abs(finite)).any((1, 2)))
-
-
-def _alike(book: RuleBook, most: Mapping[int, float]) -> list[tuple[int, ...]]:
-    """Return the robots that could change places, group by group."""
-    scene, last = book.network.scene, len(book.network.inner)
-    groups: dict[object, list[int]] = {}
-    for r in book.team:
-        may = not book.rules.placers or scene.robots[r].name in book.rules.placers
-        nodes = [book.newest_nodes[r, b] for b in range(1, last + 1)]
-        own = scene.robots[r]
-        gives = (own.stiffness, own.rotational_stiffness)
-        arm = own.arm and r  # no other robot is where it is
-        key = (book.reached[r, last], tuple(nodes), may, most[r], gives, arm)
-        groups.setdefault(key, []).append(r)
-    return [tuple(group) for group in groups.values() if len(group) > 1]
 
 
 def _tables(problem: States, most: Mapping[int, float]) -> Tables:

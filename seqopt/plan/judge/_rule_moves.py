@@ -8,7 +8,7 @@ with a minus; then how many grips were taken since the last brick where that cou
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -352,3 +352,18 @@ def check_scheduled(schedule: Schedule, steps: Sequence[Step]) -> None:
                 same &= node == grip
         if not same:
             raise StepError(f"step {step.number} is none of schedule {schedule.method}")
+
+
+def _alike(book: RuleBook, most: Mapping[int, float]) -> list[tuple[int, ...]]:
+    """Return the robots that could change places, group by group."""
+    scene, last = book.network.scene, len(book.network.inner)
+    groups: dict[object, list[int]] = {}
+    for r in book.team:
+        may = not book.rules.placers or scene.robots[r].name in book.rules.placers
+        nodes = [book.newest_nodes[r, b] for b in range(1, last + 1)]
+        own = scene.robots[r]
+        gives = (own.stiffness, own.rotational_stiffness)
+        arm = own.arm and r  # no other robot is where it is
+        key = (book.reached[r, last], tuple(nodes), may, most[r], gives, arm)
+        groups.setdefault(key, []).append(r)
+    return [tuple(group) for group in groups.values() if len(group) > 1]
