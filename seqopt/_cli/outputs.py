@@ -56,9 +56,9 @@ def softness_files(table: pd.DataFrame) -> dict[str, bytes | str]:
     if figure_notes():
         return files
     from seqopt.report._style import picture_files  # noqa: PLC0415
-    from seqopt.report.charts import softness_chart  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report.charts import _softness_chart  # noqa: PLC0415  # matplotlib is an extra
 
-    return files | picture_files("grips", softness_chart(table, [*dict.fromkeys(table["build"])]))
+    return files | picture_files("grips", _softness_chart(table, [*dict.fromkeys(table["build"])]))
 
 
 def plan_files(

@@ -80,7 +80,7 @@ def comparison_figures(result: Comparison) -> dict[str, Figure]:
 
 
 @styled
-def softness_chart(
+def _softness_chart(
     table: pd.DataFrame, builds: Sequence[str], band: tuple[float, float] | None = None
 ) -> Figure:
     """Return the largest responses of builds over the stiffness of grips, from `held_softly`.

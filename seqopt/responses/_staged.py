@@ -28,7 +28,7 @@ from seqopt.errors import StepError
 from seqopt.network._mechanics import spring_maps
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
-from seqopt.responses.table import grips_of, response_table, step_named
+from seqopt.responses.table import _grips_of, response_table, step_named
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, check_sequence, require_steps
@@ -131,7 +131,7 @@ def next_state(parts: Ungripped, before: StagedState, step: Step, placing: Placi
         load[-2:] = network.inner_weight[2 * bricks - 2 : 2 * bricks]
         new = _fitted(network, before) if placing is Placing.FITTED else np.zeros(6)
         state = replace(state, twist=np.concatenate([before.twist, new]))
-    numbers = grips_of(network.scene, step)
+    numbers = _grips_of(network.scene, step)
     columns, turn = grip_columns(network, bricks, numbers), np.zeros((bricks, 3))
     held = columns[0].tolist()
     for grip in set(before.grips) - set(held):

@@ -273,10 +273,10 @@ def support_columns(scene: Scene) -> list[tuple[str, str]]:
 def step_fields(engine: Engine, step: Step, want: Want = Want.RESPONSES) -> Fields:
     """Return the full fields of one step, of one grip set; errors of the engine name the step."""
     with step_named(step):
-        return engine.solve(step.bricks, grips_of(engine.network.scene, step), want)
+        return engine.solve(step.bricks, _grips_of(engine.network.scene, step), want)
 
 
-def grips_of(scene: Scene, step: Step) -> Ints:
+def _grips_of(scene: Scene, step: Step) -> Ints:
     """Return the grips of a step as engines take them: one set, (1, r)."""
     return np.array([scene.grip_numbers(step.grips)], dtype=np.int64).reshape(1, -1)
 

@@ -11,7 +11,7 @@ import pytest
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.responses.table import grips_of
+from seqopt.responses.table import _grips_of
 from seqopt.sequence.two_robots import METHODS
 from tests.builders import block
 
@@ -27,7 +27,7 @@ def largest(network, method):
     """The largest force of a grip and displacement of a brick's node over the steps of a method."""
     engine, most = ComplianceEngine(network), np.zeros(2)
     for step in METHODS[method](network):
-        found = engine.solve(step.bricks, grips_of(network.scene, step), Want.DISPLACEMENTS)
+        found = engine.solve(step.bricks, _grips_of(network.scene, step), Want.DISPLACEMENTS)
         moved = found.displacement[0, network.inner[: step.bricks].ravel()]
         force = np.linalg.norm(found.grip_force[0], axis=1).max(initial=0.0)
         most = np.maximum(most, [force, 1e6 * np.linalg.norm(moved, axis=1).max()])
