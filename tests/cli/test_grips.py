@@ -26,7 +26,7 @@ def test_a_stiffness_is_that_of_all_robots(tmp_path, capsys):
     assert seqopt.load_scene(path) == wanted
     assert main(["scene", str(path), "--grips", "rigid", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
-    assert {*facts["grips_N_per_m"].values()} == {None}
+    assert {*facts["scene"]["grips_N_per_m"].values()} == {None}
 
 
 def test_a_file_may_say_one_number_or_three(tmp_path):
