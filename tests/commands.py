@@ -23,5 +23,5 @@ def run(name, *arguments):
 
 def beside_models(err):
     """Return standard error without what was enough, which every run says."""
-    said = ("enough: ", "left out: ", "proof: ")
+    said = ("enough: ", "left out: ", "proof: ", "grips: ")
     return "".join(line for line in err.splitlines(keepends=True) if not line.startswith(said))

@@ -16,7 +16,7 @@ from seqopt.plan.calling.formulation import Formulation, as_formulation
 from seqopt.problem.criteria import Among, Ranked, RankSum
 from seqopt.problem.requirements import NEVER, Criterion, Limit, payload_limits
 from seqopt.problem.standing import Standing
-from seqopt.report._softness import stiffnesses
+from seqopt.report.softness import _grip_range
 from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses.quantities import TOLERANCE
 from seqopt.responses.resources import Resources
@@ -108,7 +108,7 @@ def _parse_grip_range(text: str | None) -> tuple[float, ...]:
         raise SceneError(
             f"--grips {short(text)[1:-1]}: give the softest and the stiffest, 1e5..1e9"
         )
-    return stiffnesses(*ends)
+    return _grip_range(*ends)
 
 
 def parse_grips(text: str, scene: Scene) -> Scene:

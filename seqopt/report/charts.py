@@ -97,7 +97,7 @@ def _softness_chart(
             panel.axvspan(*band, color=GRAY, alpha=0.2, lw=0, zorder=0, label="industrial arms")
         for name, style in looks(builds).items():
             own = finite[finite["build"] == name].sort_values("stiffness")
-            line = style.line() | {"marker": "", "label": name}
+            line = style.line() | {"markevery": 4, "label": name}
             panel.plot(own["stiffness"], own[response], **line)
             last = rigid.loc[rigid["build"] == name, response]
             panel.plot([end] * len(last), last, style.marker, color=style.color)

@@ -28,8 +28,8 @@ from seqopt.errors import ProblemError
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, overloads
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
-from seqopt.responses.quantities import _number_text, length_text
 from seqopt.responses._tolerance import each_tolerance, held_in_steps, is_linear
+from seqopt.responses.quantities import _number_text, length_text
 from seqopt.responses.table import OUTSIDE, Departure, force_column, step_fields
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Brick

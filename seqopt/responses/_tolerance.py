@@ -268,7 +268,9 @@ def each_tolerance(engine: Engine, steps: Sequence[_Held]) -> Floats:
         mine = [*same]
         found = misfits(engine, bricks, np.array([held for *_, held in mine], dtype=np.int64))
         for key, misfit in zip(mine, found.tolist(), strict=True):
-            out[asked[key]] = np.inf if misfit == 0 else 0.0 if misfit >= NO_TOLERANCE else 1 / misfit
+            out[asked[key]] = (
+                np.inf if misfit == 0 else 0.0 if misfit >= NO_TOLERANCE else 1 / misfit
+            )
     return out
 
 

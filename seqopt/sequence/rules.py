@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import partial
 from numbers import Integral
 
 from seqopt.errors import StepError, did_you_mean
@@ -169,7 +170,8 @@ _LOOSEST = (
 def with_robots(scene: Scene, count: int) -> Scene:
     """Return a scene with two to five robots: its own first, then mobile ones.
 
-    Further robots reach every node and have the largest payload of the scene's own.
+    Further robots reach every node, have the largest payload of the scene's own, and give way as
+    the first of them does.
 
     Examples
     --------
@@ -183,7 +185,10 @@ def with_robots(scene: Scene, count: int) -> Scene:
     names = {robot.name for robot in robots}
     payload = max((robot.payload for robot in scene.robots), default=float("nan"))
     fresh = (f"rob{i}" for i in range(1, 2 * _MOST_ROBOTS + 1) if f"rob{i}" not in names)
-    robots += [Robot(name=next(fresh), payload=payload) for _ in range(count - len(robots))]
+    ways = [(robot.stiffness, robot.rotational_stiffness) for robot in scene.robots[:1]]
+    shift, turn = ways[0] if ways else (None, None)
+    more = partial(Robot, payload=payload, stiffness=shift, rotational_stiffness=turn)
+    robots += [more(name=next(fresh)) for _ in range(count - len(robots))]
     return replace(scene, robots=tuple(robots))
 
 

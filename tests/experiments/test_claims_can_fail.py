@@ -14,7 +14,7 @@ from experiments.__main__ import STORE
 from experiments.calibration import calibration, vault_loads
 from experiments.calibration.parts import arch_numbers, calibration_spread
 from experiments.discrete import contact_steps, discrete_arches
-from experiments.engines import engine_speed, fidelity_ladder, frame_contrast, parallel
+from experiments.engines import engine_speed, fidelity_ladder, frame_contrast, parallel, soft_grips
 from experiments.exchange import outside_assemblies
 from experiments.harness.claim import claims
 from experiments.harness.results import stored
@@ -133,6 +133,11 @@ CHECKS = {
         lambda table: frame_contrast.holds(table, 1e-11),
         ("frame_contrast",),
         *("displacement", 1e-5, {"contrast": 1e7}),
+    ),
+    "soft_grips": Check(
+        lambda table: soft_grips.holds(table, 1.0),
+        ("soft_grips",),
+        *("D_max", 200.0, {"build": "cantilever", "stiffness": 1e6}),
     ),
     "free_growth": Check(
         free_growth.holds, ("free_growth",), *("status", "feasible", {"bricks": 49, "robots": 4})

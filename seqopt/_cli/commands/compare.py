@@ -47,8 +47,8 @@ from seqopt.plan.calling.formulation import FormulationKind, formulations
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.requirements import Criterion
 from seqopt.report._pages import PAGE, comparison_page
-from seqopt.report._softness import held_softly, softness_lines, turning_points
 from seqopt.report.comparison import CLOSED, Comparison, compare
+from seqopt.report.softness import _softness_lines, held_softly, turning_points
 from seqopt.report.text import format_details
 from seqopt.responses.table import builds_in_words
 from seqopt.scene.scene import Scene
@@ -162,7 +162,7 @@ def run(options: argparse.Namespace) -> Answer:
 def _softly(table: pd.DataFrame, turns: Sequence[str]) -> list[str]:
     """Return what the builds come to as grips become softer, and where conclusions turn."""
     lines = [wrapped(line, first="- ") for line in turns or [NO_TURN]]
-    shown = softness_lines(table, [*dict.fromkeys(table["build"])])
+    shown = _softness_lines(table, [*dict.fromkeys(table["build"])])
     return ["\n".join([SOFTLY, *shown]), "\n".join([TURNS, *lines])]
 
 

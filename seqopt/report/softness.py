@@ -38,13 +38,13 @@ WORDS = {
 }
 
 
-def stiffnesses(softest: float, stiffest: float) -> tuple[float, ...]:
+def _grip_range(softest: float, stiffest: float) -> tuple[float, ...]:
     """Return stiffnesses of grips from the softest to the stiffest, evenly spaced, then rigid, N/m.
 
     Examples
     --------
-    >>> stiffnesses(1e6, 1e7)[:2], stiffnesses(1e6, 1e7)[-1]
-    ((1000000.0, 1778279.41...), inf)
+    >>> [f"{stiffness:.3g}" for stiffness in _grip_range(1e6, 1e7)]
+    ['1e+06', '1.78e+06', '3.16e+06', '5.62e+06', '1e+07', 'inf']
     """
     if not 0 < softest < stiffest < np.inf:
         raise SceneError(
@@ -214,7 +214,7 @@ def _crossing(values: pd.Series[float], level: float, stiff: float, soft: float)
     return f"{np.exp(np.log(stiff) + share * np.log(soft / stiff)):.2g}"
 
 
-def softness_lines(table: pd.DataFrame, builds: Sequence[str]) -> list[str]:
+def _softness_lines(table: pd.DataFrame, builds: Sequence[str]) -> list[str]:
     """Return a table of some builds in text: the largest responses at every decade, 80 columns."""
     shown = _decades(np.unique(table["stiffness"]))
     lines = []
