@@ -188,7 +188,13 @@ EQUIVALENT = (
         for new in (">", ">=")
     ),
     Equivalent(GRIPS, "worst_doubt", ">=", ">", "no doubt is it to the last bit"),
-    Equivalent(GRIPS, "@cache", "@cache", "", "what is kept is made anew, and the same"),
+    Equivalent(
+        "seqopt.engines.rigid._pairs",
+        "@cache",
+        "@cache",
+        "",
+        "what is kept is made anew, and the same",
+    ),
     Equivalent(GROWTH, "AT_ONCE = 2**17", "2", "1", "how many are changed at a time"),
     Equivalent(COSTS, "given.flat[0]", "0", "-1", "all of these entries are one"),
     Equivalent(

@@ -40,6 +40,7 @@ STARTS = (  # of lines on standard error
         "engine: ",
         "enough: ",
         "left out: ",
+        "grips: ",
         "proof: ",
         "robots: ",
         "payload: ",
