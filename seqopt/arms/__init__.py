@@ -9,6 +9,12 @@ reaches is then looked up in a table of postures, which pinocchio and coal compu
     table.table()                                      # every posture with its joints
     plan = seqopt.optimize(scene, "free")              # with postures in every step
     print(plan.arms)                                   # whether they are kept while robots hold
+
+Where no robot has an arm there is no table:
+
+>>> import seqopt
+>>> find_postures(seqopt.load_scene("arch25")) is None
+True
 """
 
 from seqopt.arms.reach import find_postures

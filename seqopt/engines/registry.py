@@ -60,11 +60,12 @@ class Recipe:
         """What answers depend on, condensed: equal for equal scenes, options and arithmetic.
 
         Names and provenance of a scene change no answer and are left out; of robots only how their
-        grips give way counts, and what they carry: that makes kinds of grips, and tolerances.
+        grips give way counts, and where these are of several kinds what each carries.
         """
         scene = {k: v for k, v in scene_to_dict(self.scene).items() if k not in _WITHOUT_EFFECT}
         ways = [(r.stiffness, r.rotational_stiffness, r.payload) for r in self.scene.robots]
-        scene["grips"] = [*dict.fromkeys(ways)] or None
+        kinds = [*dict.fromkeys(ways)]
+        scene["grips"] = kinds if len(kinds) > 1 else [way[:2] for way in kinds]
         built = json.dumps(scene, sort_keys=True)
         parts = (self.engine, repr(sorted(self.options.items())), built, _arithmetic())
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()

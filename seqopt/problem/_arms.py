@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 
-from seqopt.responses.quantities import steps_in_words
+from seqopt.responses.quantities import _steps_in_words
 from seqopt.scene.scene import Scene
 from seqopt.sequence._postures import PlanPostures, plan_postures
 from seqopt.sequence.steps import Step
@@ -22,4 +22,4 @@ def faults_in_words(found: PlanPostures) -> tuple[str, ...]:
     steps = defaultdict[str, list[int]](list)
     for each in found.unreached:
         steps[each.why].append(each.step)
-    return tuple(f"{why} ({steps_in_words(numbers)})" for why, numbers in steps.items())
+    return tuple(f"{why} ({_steps_in_words(numbers)})" for why, numbers in steps.items())

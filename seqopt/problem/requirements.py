@@ -21,9 +21,9 @@ from seqopt.responses._tolerance import Allowed, is_tolerance, misfits_along
 from seqopt.responses.quantities import (
     NO_TOLERANCE,
     RESPONSES,
+    _steps_in_words,
     length_text,
     robot_response,
-    steps_in_words,
 )
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene._checks import short
@@ -347,7 +347,7 @@ class Excess:
     robot: str = ""  # whose payload it is; empty for other limits
 
     def __str__(self) -> str:
-        bound, where = self.limit.bound, steps_in_words(self.steps)
+        bound, where = self.limit.bound, _steps_in_words(self.steps)
         if is_tolerance(self.limit.response):
             least = 1 / self.largest if self.largest < NO_TOLERANCE else 0.0
             return f"tolerance is only {length_text(least)} of {length_text(bound)} ({where})"

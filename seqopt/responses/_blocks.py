@@ -213,7 +213,14 @@ class Store:
 
     def path(self, block: Block) -> Path:
         """Return the file of a block."""
-        return self._folder / f"{block.bricks}-{block.key[:48]}.answers"
+        return self._folder / f"{block.bricks}-{self._key(block)[:48]}.answers"
+
+    def _key(self, block: Block) -> str:
+        """Return the key of a block; tolerances depend on payloads as well."""
+        if not any(map(is_tolerance, block.names)):
+            return block.key
+        payloads = self._recipe.scene.grip_kinds.payload.tolist()
+        return hashlib.sha256(f"{block.key} {payloads}".encode()).hexdigest()
 
     def find(self, block: Block) -> Answers | None:
         """Return the answers to a block, if they are there and whole."""
@@ -249,7 +256,7 @@ class Store:
 
     def _checksum(self, block: Block, content: bytes) -> bytes:
         """Return the checksum of what is to be known of a block."""
-        return hashlib.sha256(f"{self._recipe.key} {block.key} ".encode() + content).digest()
+        return hashlib.sha256(f"{self._recipe.key} {self._key(block)} ".encode() + content).digest()
 
 
 def open_store(folder: Path | str | None, engine: Engine) -> Store | None:

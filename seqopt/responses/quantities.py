@@ -44,12 +44,12 @@ def length_text(length: float) -> str:
     return f"{length * 1e3:.4g} mm"
 
 
-def steps_in_words(steps: Sequence[int]) -> str:
+def _steps_in_words(steps: Sequence[int]) -> str:
     """Return which steps these are, by their numbers; of many the first.
 
     Examples
     --------
-    >>> steps_in_words([3]), steps_in_words(range(1, 20))
+    >>> _steps_in_words([3]), _steps_in_words(range(1, 20))
     ('step 3', 'steps 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 and 7 more')
     """
     more = f" and {len(steps) - _LISTED} more" if len(steps) > _LISTED else ""

@@ -24,12 +24,12 @@ from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.network import Network
 from seqopt.responses.quantities import (
     RESPONSES,
+    _steps_in_words,
     grip_forces,
     length_text,
     lengths,
     require_finite,
     robot_response,
-    steps_in_words,
     support_forces,
     support_moments,
 )
@@ -62,7 +62,7 @@ class Departure:
     steps: tuple[int, ...]  # numbers of the steps
 
     def __str__(self) -> str:
-        return f"{self.what} of up to {self.said} ({steps_in_words(self.steps)})"
+        return f"{self.what} of up to {self.said} ({_steps_in_words(self.steps)})"
 
 
 class LinearRange:

@@ -194,6 +194,15 @@ def test_a_loop_keeps_to_a_tolerance_with_or_without_a_folder_of_answers(tmp_pat
         seqopt.optimize(scene, **asked)
 
 
+def test_answers_that_are_kept_are_those_of_the_payloads(tmp_path):
+    found = []
+    for payload in (150.0, 300.0, 150.0):
+        robots = [replace(robot, payload=payload) for robot in SCENE.robots]
+        plan = seqopt.optimize(SCENE.with_robots(*robots), "free", aim="tolerance", cache=tmp_path)
+        found.append(plan.objective["tolerance"])
+    assert found[0] == found[2] < found[1]
+
+
 def test_what_cannot_be_asked_is_a_line(engine):
     with pytest.raises(ProblemError, match="above zero"):
         seqopt.Limit("tolerance", 0.0)
