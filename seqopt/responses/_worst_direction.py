@@ -25,8 +25,8 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 
-_CLOSE = 1e-12  # share of itself by which a rate must grow for the search to go on
-_STEPS = 60  # of the search from one direction
+_CLOSE = 1e-11  # share of itself by which a rate must grow for the search to go on
+_STEPS = 25  # of the search from one direction
 _BEST = 4  # directions from which it begins
 _PROVEN = (1e-6, 1e-4, 1e-3, 1e-2, 1e-1)  # shares of itself within which a rate is proven
 _MOST = 20_000  # triangles that a proof may look at

@@ -37,7 +37,6 @@ PAGES = (
             "certificate",
             "infeasible",
             "driving",
-            "tolerance",
         )
     ),
 )
