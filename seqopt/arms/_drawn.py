@@ -11,7 +11,6 @@ from seqopt.arrays import Floats
 from seqopt.scene.arm import Arm
 
 _SAME = 1e-6  # m; points that are closer are one
-_STUMP = 3  # points of an arm that are drawn while it is idle: those that cannot go far
 
 _model = lru_cache(maxsize=16)(ArmModel)
 
@@ -35,5 +34,8 @@ def _arm_line(arm: Arm, posture: Floats) -> Floats:
 
 
 def _idle_line(arm: Arm) -> Floats:
-    """Return the points of an arm that holds nothing: its foot alone, as nobody knows the rest."""
-    return _arm_line(arm, np.zeros(_model(arm).joints))[:_STUMP]
+    """Return what is drawn of an arm that holds nothing, (3, 3), m: its foot, as nobody knows more.
+
+    The last point is there twice: there is no tool.
+    """
+    return _arm_line(arm, np.zeros(_model(arm).joints))[[0, 1, 1]]
