@@ -20,6 +20,7 @@ from seqopt.plan.plan import Plan
 from seqopt.report._pages import PAGE, plan_page
 from seqopt.report.comparison import Comparison
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
+from seqopt.sequence.exports._arm_tasks import _in_postures
 from seqopt.sequence.exports._tasks import plan_tasks, tasks_csv, tasks_json
 from seqopt.stability._builds import BuildProver
 
@@ -95,6 +96,8 @@ def _task_files(plan: Plan) -> dict[str, str]:
     """Return what robots do, for those who program them, by file name."""
     scene = plan.engine.network.scene
     tasks = [*plan_tasks(scene, plan.steps)]
+    if plan.arms is not None:
+        tasks = [*_in_postures(scene, tasks, plan.arms.postures)]
     return {"tasks.json": tasks_json(scene, tasks), "tasks.csv": tasks_csv(tasks)}
 
 

@@ -16,6 +16,7 @@ from seqopt.errors import FileError, ProblemError
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.front import Front
 from seqopt.problem.requirements import overloads
+from seqopt.report._robots import _known_arms
 from seqopt.report.comparison import (
     CLOSED,
     LARGEST,
@@ -62,7 +63,8 @@ def _builds(
         bounds = {"F_largest": max(payloads)} if over else {}
         steps = parse_plan(scene, csv_text(table), name)
         stands = verdicts.get(name, ())
-        out.append(Build(name, steps, table, stands, bounds, departures.get(name, ())))
+        left, arms = departures.get(name, ()), _known_arms(scene, steps)
+        out.append(Build(name, steps, table, stands, bounds, left, arms=arms))
     return out
 
 

@@ -11,11 +11,13 @@ from functools import cached_property
 
 import numpy as np
 
+from seqopt.arms._drawn import _arm_line, _idle_line
 from seqopt.arrays import Floats
-from seqopt.errors import ProblemError
+from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.scene.scene import Scene
+from seqopt.sequence._postures import plan_postures
 from seqopt.sequence.exports import hold
 from seqopt.sequence.steps import Step
 
@@ -151,6 +153,32 @@ class Cell:
         ahead = self._away(self.middle - shoulder)
         bent = [shoulder + self._link(reach) * (up * self.up + on * ahead) for up, on in _FOLDED]
         return np.array([self._on_ground(shoulder), shoulder, *bent])
+
+
+def _known_arms(scene: Scene, steps: Sequence[Step]) -> Arms:
+    """Return the lines of robots with arms in the steps of a plan, in postures that it allows.
+
+    Where a step has no posture the grip alone is drawn; none are known where nothing computes them.
+    """
+    try:
+        found = plan_postures(scene, steps)
+        idle = {robot.name: _idle_line(robot.arm) for robot in scene.robots if robot.arm}
+    except (ExtraError, SceneError):
+        return {}
+    if found is None:
+        return {}
+    table, cell, out = found.table, Cell(scene), dict[str, list[Floats | None]]()
+    for r, robot in enumerate(scene.robots):
+        if robot.arm is None:
+            continue
+        own = out.setdefault(robot.name, [])
+        for step, rows in zip(steps, found.steps, strict=True):
+            row, node = rows[r], step.grips[r]
+            if row is not None:
+                own.append(_arm_line(robot.arm, table.joints[row]))
+            else:
+                own.append(idle[robot.name] if node is None else cell.arm(robot, node))
+    return out
 
 
 def arm_data(scene: Scene, steps: Sequence[Step], given: Arms) -> dict[str, object]:

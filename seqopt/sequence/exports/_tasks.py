@@ -245,7 +245,9 @@ def tasks_csv(tasks: Iterable[Task]) -> str:
     )
     parts = [_places(name, [getattr(task, name) for task in held]) for name in FRAMES]
     most = max((len(task.posture or ()) for task in held), default=0)
-    joints = [[*(task.posture or [np.nan] * most)] for task in held]
+    joints = [
+        [*own, *[np.nan] * (most - len(own))] for own in (task.posture or () for task in held)
+    ]
     parts.append(pd.DataFrame(joints, columns=[f"joint_{i}" for i in range(1, most + 1)]))
     return csv_text(pd.concat([table, *parts], axis=1), _DIGITS)
 

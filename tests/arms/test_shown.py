@@ -1,0 +1,88 @@
+"""Postures of a plan where people see them: tasks of robots, and arms that are drawn."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt._cli.outputs import _task_files
+from seqopt.report._robots import _known_arms
+from seqopt.sequence.exports._arm_tasks import _in_postures
+from seqopt.sequence.exports._tasks import Action, plan_tasks
+from tests.arms.scenes import TOOL, two_arms
+
+pytest.importorskip("pinocchio")
+pytest.importorskip("coal")
+pytest.importorskip("compas_fab")
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return seqopt.optimize(two_arms(), "free", aim="minmax", least_grips=1)
+
+
+def test_tasks_have_the_joints_and_the_tool_of_the_posture(plan):
+    scene, found = plan.engine.network.scene, plan.arms.postures
+    table, names = found.table, [robot.name for robot in scene.robots]
+    proposed = [*plan_tasks(scene, plan.steps)]
+    tasks = [*_in_postures(scene, proposed, found)]
+    turned = 0
+    for old, task in zip(proposed, tasks, strict=True):
+        if task.robot not in table.robots:
+            assert task == old
+            continue
+        let_go = task.action is Action.RELEASE
+        row = found.steps[task.step - 1 - let_go][names.index(task.robot)]
+        assert table.nodes[table.node[row]] == task.node
+        if task.action is Action.PICK:
+            assert task.posture is None
+            continue
+        assert task.posture == tuple(table.joints[row])
+        assert np.allclose(task.grip.axes.T, table.axes[row], atol=1e-5)
+        tip = table.place[row] + TOOL["tool_length"] * table.axes[row][:, 2]
+        assert np.allclose(task.grip.point, tip, atol=1e-5)
+        inner = task.depth + 0.02 + table.tools[row]  # with the fingers: the whole tool
+        assert inner == pytest.approx(TOOL["tool_length"])
+        turned += not np.allclose(task.grip.axes, old.grip.axes)
+        if task.retreat is not None:
+            way = np.subtract(task.retreat.point, task.grip.point)
+            assert np.allclose(way / np.linalg.norm(way), -table.axes[row][:, 2], atol=1e-5)
+    assert turned  # some proposals were others
+    assert any(task.action is Action.RELEASE and task.posture for task in tasks)
+
+
+def test_files_beside_a_plan_have_postures(plan):
+    files = _task_files(plan)
+    told = [row for row in json.loads(files["tasks.json"])["tasks"] if row["posture"]]
+    rows = [row for row in csv.DictReader(io.StringIO(files["tasks.csv"])) if row["joint_6"]]
+    assert len(told) == len(rows) > 0
+    assert float(rows[0]["joint_1"]) == pytest.approx(told[0]["posture"][0])
+
+
+def test_arms_are_drawn_from_their_base_to_what_they_hold(plan):
+    scene, found = plan.engine.network.scene, plan.arms.postures
+    arms, held = _known_arms(scene, plan.steps), 0
+    assert set(arms) == set(found.table.robots)
+    for robot in (each for each in scene.robots if each.arm is not None):
+        r = scene.robots.index(robot)
+        foot = arms[robot.name][0][0]
+        for step, points in zip(plan.steps, arms[robot.name], strict=True):
+            assert np.allclose(points[0], foot)
+            assert np.allclose(foot, robot.arm.position)
+            node = step.grips[r]
+            if node is None:
+                assert np.array_equal(points[1], points[2])
+                assert np.linalg.norm(points[1] - foot) < 1.0
+                continue
+            held += 1
+            assert np.allclose(points[-1], scene.node_position(node), atol=1e-5)
+            assert np.allclose(
+                points[-2], found.table.place[found.steps[step.number - 1][r]], atol=1e-5
+            )
+    assert held
+    assert _known_arms(scene.with_robots(scene.robots[2]), ()) == {}
