@@ -50,6 +50,8 @@ OPTIMIZE = (
     "summary.json",
     "scene.json",
     "report.html",
+    "tasks.csv",
+    "tasks.json",
 )
 BLOCKS = tuple(f"block{i}" for i in range(24))
 WRITER = """

@@ -171,7 +171,7 @@ def _fault_of_text(case: Case, status: int, text: str) -> str:
 
 def _fault_of_table(text: str) -> str:
     """Return what is not finite in a table of steps."""
-    if not text.startswith("step,type"):
+    if not text.startswith("step,type") or text.startswith("step,type,action"):  # tasks
         return ""
     table = pd.read_csv(io.StringIO(text))
     if "verdict" in table:

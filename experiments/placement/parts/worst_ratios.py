@@ -89,7 +89,7 @@ def worst_ratio(steps: Steps, robots: int) -> float:
         scene = with_robots(scene, robots)
     engine = seqopt.make_engine(ENGINE, seqopt.build_network(scene))
     problem = build_states(engine, seqopt.FreeRules(), WORST_RATIO)
-    columns = _state_columns(problem, seqopt.analyze(engine, steps))
+    columns = _state_columns(problem, steps, seqopt.analyze(engine, steps))
     return float(np.max(WORST_RATIO.costs(columns, 1, len(steps))))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import warnings
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -22,7 +23,10 @@ def boxes_csv(scene: Scene) -> str:
     turns, sizes = ("roll", "pitch", "yaw"), ("length", "width", "height")
     writer.writerow(["name", "x", "y", "z", *sizes, *turns, "density", "course"])
     for brick in scene.bricks:
-        angles = Rotation.from_matrix(brick.frame.T).as_euler("xyz", degrees=True).tolist()
+        turn = Rotation.from_matrix(brick.frame.T)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of many angles for a turn one is enough
+            angles = turn.as_euler("xyz", degrees=True).tolist()
         numbers = [*brick.position, *brick.dimensions, *angles, brick.density]
         writer.writerow([brick.name, *map(repr, numbers), scene.since[brick.name]])
     return out.getvalue()
