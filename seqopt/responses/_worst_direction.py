@@ -61,7 +61,7 @@ def proven_rates(
     low, high = np.full((2, len(own)), np.inf)
     for i in np.flatnonzero(np.linalg.norm(own, axis=1) < most):
         one = _Vectors(own[i : i + 1], _side_by_side(influence[i : i + 1]), most[i : i + 1])
-        low[i], high[i] = _bracket(one, direction[i : i + 1])
+        low[i], high[i], _ = _bracket(one, direction[i : i + 1])
     return low, high
 
 
@@ -100,7 +100,7 @@ def _side_by_side(influence: Floats) -> Floats:
 def _search(vectors: _Vectors) -> tuple[Floats, Floats]:
     """Return rates (n,) and directions (n, 3): from one start where a proof says that it will do.
 
-    Elsewhere from several.
+    Elsewhere from several, and where no proof is close yet, by triangles.
     """
     sphere = np.unique(_triangles(2).reshape(-1, 3).round(12), axis=0)
     every = np.broadcast_to(sphere, (len(vectors.own), *sphere.shape))
@@ -111,6 +111,8 @@ def _search(vectors: _Vectors) -> tuple[Floats, Floats]:
         found, ends = _climb(vectors.some(rows), starts[rows, other])
         better = found > rate[rows]
         rate[rows[better]], direction[rows[better]] = found[better], ends[better]
+    for i in np.flatnonzero(~_below_quadratic(vectors, direction, rate * (1 + _PROVEN[0]))):
+        rate[i], _, direction[i] = _bracket(vectors.some(np.array([i])), direction[i : i + 1])
     return rate, direction
 
 
@@ -168,22 +170,25 @@ def _unit(vectors: Floats, otherwise: Floats) -> Floats:
     return np.where(size > _TINY, vectors / np.maximum(size, _TINY), otherwise)
 
 
-def _bracket(one: _Vectors, u: Floats) -> tuple[float, float]:
-    """Return between which values the rate of one vector lies, by the closest proof there is."""
+def _bracket(one: _Vectors, u: Floats) -> tuple[float, float, Floats]:
+    """Return between which values the rate of one vector lies, by the closest proof there is.
+
+    Last is the direction (1, 3) of the first: triangles may meet one that is worse than ``u``.
+    """
     low = float(one.rates(u[:, None])[0, 0])
     for share in _PROVEN:
         while True:
             high = low * (1 + share)
             if _below_quadratic(one, u, np.array([high]))[0]:
-                return low, high
+                return low, high, u
             found = None if share == _PROVEN[0] else _by_triangles(one, high)
             if not isinstance(found, np.ndarray):
                 break
             rate, u = _climb(one, found)  # a better one was met on the way
             low = float(rate[0])
         if found is True:
-            return low, high
-    return low, np.inf
+            return low, high, u
+    return low, np.inf, u
 
 
 def _floored(size: Floats) -> Floats:
