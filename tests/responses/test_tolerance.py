@@ -177,6 +177,19 @@ def test_no_plan_has_more_tolerance_than_the_best():
         seqopt.optimize(SCENE, "free", limits=[seqopt.Limit("tolerance", 1.01 * best)])
 
 
+def test_robots_of_other_payloads_are_not_taken_for_each_other():
+    """Also where no payload has to be kept: a tolerance is of the robot that holds."""
+    one, two, three = SCENE.robots
+    scene = SCENE.with_robots(one, replace(two, payload=2 * two.payload), three)
+    rules = seqopt.FreeRules(payload="ignored", least_grips=1)
+    plan = seqopt.optimize(scene, "free", aim="tolerance,steps", rules=rules)
+    along = [step_tolerance(plan.engine, step).distance for step in plan.steps]
+    assert plan.status == "optimal"
+    assert plan.objective["tolerance"] == pytest.approx(min(along), rel=1e-6)
+    alike = seqopt.optimize(SCENE, "free", aim="tolerance,steps", rules=rules)
+    assert plan.objective["tolerance"] > alike.objective["tolerance"] * (1 - 1e-9)
+
+
 def test_a_loop_keeps_to_a_tolerance_with_or_without_a_folder_of_answers(tmp_path):
     scene = SCENE
     free = seqopt.optimize(scene, formulation="minimax", criterion="worst-ratio")

@@ -362,7 +362,7 @@ def _alike(book: RuleBook, most: Mapping[int, float]) -> list[tuple[int, ...]]:
         may = not book.rules.placers or scene.robots[r].name in book.rules.placers
         nodes = [book.newest_nodes[r, b] for b in range(1, last + 1)]
         own = scene.robots[r]
-        gives = (own.stiffness, own.rotational_stiffness)
+        gives = (own.stiffness, own.rotational_stiffness, own.payload)  # tolerances are of these
         arm = own.arm and r  # no other robot is where it is
         key = (book.reached[r, last], tuple(nodes), may, most[r], gives, arm)
         groups.setdefault(key, []).append(r)
