@@ -12,12 +12,12 @@ from functools import lru_cache, partial
 import numpy as np
 import pandas as pd
 
+from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import Mortar
 from seqopt.errors import SceneError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.sequence.steps import Grips, Step
-from seqopt.stability._partial_assemblies import PartialAssemblies
 from seqopt.stability._prover import DIRECTIONS, Proven
 from seqopt.stability._verdict_chain import VerdictChain
 from seqopt.stability.assessment import (

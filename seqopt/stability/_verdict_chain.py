@@ -13,11 +13,11 @@ from itertools import islice
 import numpy as np
 
 from seqopt.arrays import Floats
+from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.assembly import Assembly
 from seqopt.network.network import GROUND
 from seqopt.sequence.steps import Grips
 from seqopt.stability._interior_point import approach
-from seqopt.stability._partial_assemblies import PartialAssemblies
 from seqopt.stability._prover import Proven, Prover
 from seqopt.stability.limit_analysis import EXACT, Answer, Case, Claim, Compile, bound, violation
 from seqopt.work._threads import one_thread

@@ -18,6 +18,7 @@ import pandas as pd
 
 from seqopt._showing import display
 from seqopt.arrays import Floats
+from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar, find_mortar
 from seqopt.errors import SceneError
@@ -25,7 +26,6 @@ from seqopt.network.build import build_network
 from seqopt.network.network import GROUND, Network
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
-from seqopt.stability._partial_assemblies import PartialAssemblies
 from seqopt.stability._step_verdicts import each_verdict
 from seqopt.stability.assessment import Stability, Verdict, assess
 from seqopt.work.progress import Tell, with_progress

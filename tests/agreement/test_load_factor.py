@@ -10,6 +10,7 @@ from scipy.optimize import linprog
 
 import seqopt
 from experiments.stability.parts.blocks import ring
+from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, Mortar
 from seqopt.errors import SceneError
@@ -19,7 +20,6 @@ from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability import Margins, Screen, Verdict, load_factor_table, load_factors
 from seqopt.stability._builds import BuildProver
 from seqopt.stability._load_factor import format_load_factors, load_factor
-from seqopt.stability._partial_assemblies import PartialAssemblies
 from seqopt.stability._step_verdicts import each_verdict
 from seqopt.stability.assessment import bonded
 from seqopt.stability.limit_analysis import CAP, EXACT, Sense, bound, compile_equilibrium, violation

@@ -15,6 +15,7 @@ from scipy.optimize import linprog
 
 from experiments.harness.scenes import running_bond
 from formulations.contact.limit_analysis import compile_equilibrium
+from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import Contacts, step_assembly
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
@@ -24,7 +25,6 @@ from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability import _verdict_chain as chain
-from seqopt.stability._partial_assemblies import PartialAssemblies
 from seqopt.stability._step_verdicts import each_verdict, step_verdicts
 from seqopt.stability.assessment import Verdict, bonded, verdict
 from seqopt.stability.limit_analysis import EXACT, Answer, Claim, bound, violation
