@@ -121,8 +121,12 @@ class Space(Protocol):
     """
 
     @property
+    def first(self) -> int:
+        """The level on which builds begin, from 0."""
+
+    @property
     def levels(self) -> int:
-        """How many levels follow the first, on the last of which builds may end."""
+        """The last level, on which builds may end."""
 
     @property
     def peaks(self) -> tuple[bool, ...]:
@@ -271,11 +275,13 @@ class Explorer:
         self._moves: dict[tuple[int, Key, Key], list[tuple[Rows, Rows, Floats]]] = defaultdict(list)
         self._shape = (states.shape[1], states.dtype, len(space.peaks))
         self._each = states[0].nbytes + 8 * len(space.peaks) + 14  # bytes of a state
-        part = self._part(0, key)
+        self._start = space.first, key
+        part = self._part(*self._start)
         part.add(space.codes(key, states), states)
         part.value(lambda _: (np.zeros((1, len(space.peaks))), np.ones(1, dtype=bool), np.inf))
         self.threshold = -np.inf
-        self.reached = self.level = self.passes = self.nbytes = 0
+        self.reached = self.level = space.first
+        self.passes = self.nbytes = 0
 
     @property
     def peaks(self) -> tuple[bool, ...]:
@@ -401,6 +407,8 @@ class Explorer:
         """Return the visited states and the moves among them, states in the order of codes."""
         keys = [(level, key) for level, parts in enumerate(self._parts) for key in parts]
         orders = [self._parts[level][key].order() for level, key in keys]
+        at = keys.index(self._start)  # the state in which builds begin is the first of its part
+        orders[at] = np.concatenate([orders[at][:0], [0], orders[at][orders[at] != 0]])
         firsts = dict(zip(keys, accumulate(map(len, orders), initial=0), strict=False))
         number = {}
         for (level, key), order in zip(keys, orders, strict=True):

@@ -150,7 +150,7 @@ def whole_bound(problem: AllOrders) -> float:
     sets = _sets(every, fewest, free.space.robots, len(numbers))
     if len(sets):
         least = float(_values(free, sets).min())
-    if free.free_rules.ending is not Ending.HELD:
+    if free.free_rules.how_it_ends is not Ending.HELD:
         least = max(least, float(_values(free, np.zeros((1, free.space.robots), int))[0]))
     return least
 

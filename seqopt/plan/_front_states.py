@@ -145,7 +145,7 @@ class StateFront:
         least = distances(graph, 1.0 + graph.states * regrips)
         least[np.isfinite(least)] //= graph.states
         last = np.flatnonzero(graph.ends)
-        if self._problem.free_rules.ending is not Ending.HELD:
+        if self._problem.free_rules.how_it_ends is not Ending.HELD:
             last = np.unique(graph.source[graph.ends[graph.target]])
         found, held = least[last], self._held[last]
         room = found < bounds[self._of(Measure.REGRIPS)]

@@ -65,7 +65,7 @@ def _solved(
     if proof and "progress" in options:
         options["progress"]("proving that no plan is better")
     steps = steps_of(twin.space, selection.states)
-    hint = dict(enumerate(selection.visited))
+    hint = dict(enumerate(selection.visited, start=twin.space.first))
     exact = formulation.kind is FormulationKind.EXACT
     certificate = judge_schedule(twin, selection, steps, hint, exact=exact) if proof else None
     problem.certified.update(twin.certified)

@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.responses.table import analyze
-from seqopt.sequence.steps import check_sequence, require_steps
+from seqopt.sequence.steps import check_part
 
 
 class ShownBuild(Shown):
@@ -205,7 +205,7 @@ class GivenSequence(ShownBuild):
         if not isinstance(getattr(self.engine, "network", None), Network):
             kind = type(self.engine).__name__
             raise SceneError(f"a {kind} is not an engine; give seqopt.make_engine('auto', scene)")
-        check_sequence(self.engine.network.scene, require_steps(self.steps))
+        check_part(self.engine.network.scene, self.steps)
 
     def __repr__(self) -> str:
         name = self.engine.network.scene.name

@@ -472,7 +472,7 @@ def _spent(plan: Plan) -> dict[str, dict[str, float | None]]:
 def _letting_go(plan: Plan) -> int:
     """Return how many steps at the end only let go."""
     rules = plan.graph.rules if isinstance(plan.graph, States) else None
-    if not isinstance(rules, FreeRules) or rules.ending is Ending.HELD:
+    if not isinstance(rules, FreeRules) or rules.how_it_ends is Ending.HELD:
         return 0
     count = 0
     for step in reversed(plan.steps):

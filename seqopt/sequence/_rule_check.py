@@ -32,6 +32,19 @@ class RuleBook:
         return self.rules.team(self.network.scene)
 
     @cached_property
+    def span(self) -> tuple[int, int]:
+        """How many bricks stand where the build begins, and where it ends."""
+        return self.rules.span(self.network.scene)
+
+    @property
+    def start(self) -> tuple[int, Grips, int]:
+        """Bricks, grips, and regrips since the last brick, where the build begins."""
+        site = self.rules.begin
+        if site is None:
+            return 0, (None,) * len(self.network.scene.robots), 0
+        return site.bricks, site.holds(self.network.scene), site.regrips
+
+    @cached_property
     def reached(self) -> dict[tuple[int, int], tuple[int, ...]]:
         """By robot and brick count, the nodes that it may hold."""
         scene = self.network.scene
@@ -79,9 +92,11 @@ class RuleBook:
         self, bricks: int, grips: Grips, regrips: int
     ) -> Iterator[tuple[StepKind, int, Grips, int]]:
         """Yield every step that is possible from a state; regrips count since the last brick."""
-        last = len(self.network.scene.placed)
+        first, last = self.span
         keeps = bricks > 0 and not self.fault(bricks, grips)
-        if keeps and (self.rules.regrips is None or regrips < self.rules.regrips):
+        begins = self.rules.begin is not None and 0 < bricks == first
+        able = keeps or begins  # what stands at first need not keep rules, and may be held
+        if able and (self.rules.regrips is None or regrips < self.rules.regrips):
             for after in self._held(bricks, grips):
                 yield StepKind.REPOSITION, bricks, after, regrips + 1
         for after in self._released(bricks, grips):
@@ -99,14 +114,14 @@ class RuleBook:
 
     def _released(self, bricks: int, grips: Grips) -> Iterator[Grips]:
         """Yield the grips after one is let go, or at the end all."""
-        ends = bricks == len(self.network.scene.placed)
-        letting_go = ends and self.rules.ending is Ending.ONE_BY_ONE
+        ends, ending = bricks == self.span[1], self.rules.how_it_ends
+        letting_go = ends and ending is Ending.ONE_BY_ONE
         for robot in self.team:
             if grips[robot] is not None:
                 after = _with(grips, robot, None)
                 if letting_go or not self.fault(bricks, after):
                     yield after
-        if ends and self.rules.ending is Ending.RELEASED and any(n is not None for n in grips):
+        if ends and ending is Ending.RELEASED and any(n is not None for n in grips):
             yield (None,) * len(grips)
 
     def _placed(self, bricks: int, grips: Grips) -> Iterator[Grips]:
@@ -121,17 +136,19 @@ class RuleBook:
 
     def ends(self, bricks: int, grips: Grips) -> bool:
         """Return whether a state ends the build."""
-        if bricks < len(self.network.scene.placed):
+        if bricks < self.span[1]:
             return False
-        if self.rules.ending is Ending.HELD:
+        if self.rules.how_it_ends is not Ending.HELD:
+            return all(node is None for node in grips)
+        if self.rules.finish is None or self.rules.finish.grips is None:
             return not self.fault(bricks, grips)
-        return all(node is None for node in grips)
+        return {*grips} - {None} == {*self.rules.finish.grips} - {None}
 
 
 def check_free(network: Network, rules: FreeRules, steps: Sequence[Step]) -> None:
     """Require that a checked sequence keeps the rules of a free schedule, payloads aside."""
     book = RuleBook(network, rules)
-    state: tuple[int, Grips, int] = (0, (None,) * len(network.scene.robots), 0)
+    state = book.start
     for step in steps:
         found = [
             (bricks, grips, regrips)

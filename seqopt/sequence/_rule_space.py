@@ -26,6 +26,7 @@ from seqopt.network.network import Network
 from seqopt.scene.parts import Robot
 from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload
 from seqopt.sequence.schedule import islands
+from seqopt.sequence.site import Site
 from seqopt.sequence.two_robots import placing_node
 
 
@@ -160,9 +161,23 @@ class FreeSpace(StateRows):
     parks: bool = False  # free robots stay where they were, for their travel
 
     @property
+    def first(self) -> int:
+        """With how many bricks the build begins."""
+        return self._span[0]
+
+    @property
     def levels(self) -> int:
-        """How many bricks there are: states of one brick count are a level."""
-        return len(self.network.inner)
+        """With how many bricks the build ends: states of one brick count are a level."""
+        return self._span[1]
+
+    @cached_property
+    def _span(self) -> tuple[int, int]:
+        return self.rules.span(self.network.scene)
+
+    @property
+    def held_first(self) -> int:
+        """How many grips are held where the build begins."""
+        return self.rules.begin.held if self.rules.begin else 0
 
     def bricks_at(self, level: int) -> int:
         """Return how many bricks stand on a level."""
@@ -171,14 +186,15 @@ class FreeSpace(StateRows):
     @property
     def ends_bare(self) -> bool:
         """Whether every build ends in the finished structure that nobody holds."""
-        return self.rules.ending is not Ending.HELD
+        return self.rules.how_it_ends is not Ending.HELD
 
     @property
     def fewest_steps(self) -> int:
         """How many steps a build has at least: all but a grip per robot are let go one by one."""
-        if self.rules.ending is Ending.ONE_BY_ONE:
-            return 2 * self.levels
-        return max(self.levels, 2 * self.levels - self.robots) + self.ends_bare
+        placed = self.levels - self.first
+        if self.rules.how_it_ends is Ending.ONE_BY_ONE:
+            return 2 * placed + self.held_first
+        return placed + max(0, placed + self.held_first - self.robots) + self.ends_bare
 
     def within(
         self, level: int, states: Ints, *, regrips: bool = True
@@ -200,12 +216,38 @@ class FreeSpace(StateRows):
         return frozen(out)
 
     def start(self) -> Ints:
-        """Return the one state before the first brick, (1, c).
+        """Return the one state in which the build begins, (1, c).
 
         It is of the smallest type that holds every node: there may be tens of millions of states.
         """
-        kind = np.min_scalar_type(-max(2 * self.levels, self.rules.regrips or 0) - 1)
-        return np.zeros((1, self.robots + (self.rules.regrips is not None)), dtype=kind)
+        most = max(2 * len(self.network.inner), self.rules.regrips or 0)
+        columns = self.robots + (self.rules.regrips is not None)
+        out = np.zeros((1, columns), dtype=np.min_scalar_type(-most - 1))
+        site = self.rules.begin
+        if site is not None:
+            out[0, : self.robots] = self._row(site)
+            out[0, self.robots :] = min(site.regrips, self.rules.regrips or 0)
+        return out
+
+    def _row(self, site: Site) -> Ints:
+        """Return the entries (robots,) of robots in a site."""
+        place = {node: i for i, node in enumerate(node_numbers(self.network), start=1)}
+        held, out = site.holds(self.network.scene), np.zeros((1, self.robots), dtype=np.int64)
+        for kind, (first, end) in zip(self.kinds, self.slots, strict=True):
+            for column, robot in enumerate(kind.robots, start=first):
+                node, stay = held[robot], site.stays[robot] if site.stays else None
+                if node is not None:
+                    out[0, column] = place[node]
+                elif stay is not None and self.parks:
+                    out[0, column] = -place[stay]
+            sort_entries(out, first, end)
+        return out[0]
+
+    def may_place(self, bricks: int, states: Ints) -> Bools:
+        """Return in which states (n, c) a brick may be placed: the first may break rules, (n,)."""
+        if self.rules.begin is None or bricks != self.first or not bricks:
+            return np.ones(len(states), dtype=bool)
+        return self.lawful(bricks, states)
 
     def places(self, bricks: int, states: Ints) -> Moves:
         """Return the moves that place the next brick; a free robot then holds it."""
@@ -216,7 +258,8 @@ class FreeSpace(StateRows):
 
     def holds(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which a free robot takes a grip on a brick that stands."""
-        able = self.lawful(bricks, states)
+        begins = self.rules.begin is not None and bricks == self.first
+        able = np.ones(len(states), dtype=bool) if begins else self.lawful(bricks, states)
         if self.rules.regrips is not None:
             able &= states[:, -1] < self.rules.regrips
         rows, near = np.flatnonzero(able), self._near(bricks)
@@ -236,9 +279,10 @@ class FreeSpace(StateRows):
                 sort_entries(new, first, end)
                 parts.append(Moves(rows, new, np.zeros(len(rows))))
         moves = _join_moves(parts, states)
-        if bricks < self.levels or self.rules.ending is not Ending.ONE_BY_ONE:
+        ending = self.rules.how_it_ends
+        if bricks < self.levels or ending is not Ending.ONE_BY_ONE:
             moves = self._lawful_only(bricks, moves)
-        if bricks < self.levels or self.rules.ending is Ending.HELD:
+        if bricks < self.levels or ending is Ending.HELD:
             return moves
         return self._let_go(states, moves)
 
@@ -259,13 +303,18 @@ class FreeSpace(StateRows):
 
     def ended(self, states: Ints) -> Bools:
         """Return which states with all bricks end the build, (n,)."""
-        if self.rules.ending is Ending.HELD:
+        if self.rules.how_it_ends is not Ending.HELD:
+            return np.asarray(self.grips(states) == 0)
+        if self.rules.finish is None or self.rules.finish.grips is None:
             return self.lawful(self.levels, states)
-        return np.asarray(self.grips(states) == 0)
+        held = states[:, : self.robots].clip(min=0)
+        for first, end in self.slots if self.parks else ():
+            sort_entries(held, first, end)
+        return np.asarray((held == self._row(self.rules.finish).clip(min=0)).all(axis=1))
 
     def _let_go(self, states: Ints, moves: Moves) -> Moves:
         """Return the moves and those in which all let go; who lets go forgets where it was."""
-        if self.rules.ending is Ending.RELEASED:
+        if self.rules.how_it_ends is Ending.RELEASED:
             rows = np.flatnonzero(self.grips(states))
             moves = _join_moves([moves, Moves(rows, states[rows], np.zeros(len(rows)))], states)
             moves.states[len(moves.source) - len(rows) :, : self.robots] = 0
@@ -350,10 +399,10 @@ def free_space(
     [[2, 0, 0], [0, 2, 0], [0, 0, 2]]
     """
     space = FreeSpace(network, rules, sort_robots(network, rules, caps), parks)
-    base = 1 + (2 if parks else 1) * 2 * space.levels
+    base = 1 + (2 if parks else 1) * 2 * len(network.inner)
     if base**space.robots * (1 + (rules.regrips or 0)) >= 2**62:
         raise StepError(
-            f"scene {network.scene.name}: {space.levels} bricks and {space.robots} robots have "
+            f"scene {network.scene.name}: {len(network.inner)} bricks and {space.robots} robots have "
             "more states than can be numbered; let fewer robots take part"
         )
     return space

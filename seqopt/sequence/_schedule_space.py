@@ -19,6 +19,7 @@ from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.sequence._rule_space import Moves, RobotKind, StateRows, node_numbers
 from seqopt.sequence.schedule import OpenGrip, Schedule
+from seqopt.sequence.site import begin_step
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 
@@ -39,6 +40,8 @@ class ScheduleSpace(StateRows):
                 "can be numbered; let fewer robots take part"
             )
 
+    first = 0  # the level before the first step
+
     @property
     def levels(self) -> int:
         """How many steps there are."""
@@ -56,7 +59,16 @@ class ScheduleSpace(StateRows):
 
     def bricks_at(self, level: int) -> int:
         """Return how many bricks stand after so many steps."""
-        return self.schedule.steps[level - 1].bricks if level else 0
+        return self.schedule.steps[level - 1].bricks if level else self._begin.bricks
+
+    @cached_property
+    def _begin(self) -> Step:
+        """What is before the first step."""
+        return begin_step(self.network.scene, self.schedule.begin)
+
+    def may_place(self, level: int, states: Ints) -> Bools:
+        """Return from which states the next step may be taken: from all, (n,)."""
+        return np.ones(len(states), dtype=bool)
 
     @cached_property
     def kinds(self) -> tuple[RobotKind, ...]:  # type: ignore[override]  # no field here
@@ -69,7 +81,10 @@ class ScheduleSpace(StateRows):
 
     def start(self) -> Ints:
         """Return the one state before the first step, (1, robots) int."""
-        return np.zeros((1, self.robots), dtype=np.int32)
+        held, site = self._begin.grips, self.schedule.begin
+        stays = site.stays if site and site.stays and self.parks else (None,) * self.robots
+        out = [self._place.get(n, -self._place.get(s, 0)) for n, s in zip(held, stays, strict=True)]
+        return np.array([out], dtype=np.int32)
 
     def within(
         self, level: int, states: Ints, *, regrips: bool = True
@@ -80,7 +95,7 @@ class ScheduleSpace(StateRows):
     def onward(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
         """Return the moves to the next step, and whether they are regrips."""
         step = self.schedule.steps[level]
-        before = self.schedule.steps[level - 1].grips if level else (None,) * self.robots
+        before = self.schedule.steps[level - 1].grips if level else self._begin.grips
         after, fresh = states.copy(), []
         for robot, grip in enumerate(step.grips):
             if grip is None:
@@ -113,7 +128,7 @@ class ScheduleSpace(StateRows):
         return np.pad(at, ((1, 0), (0, 0)))
 
     @cached_property
-    def _place(self) -> dict[int, int]:
+    def _place(self) -> dict[int | None, int]:
         return {node: i for i, node in enumerate(node_numbers(self.network), start=1)}
 
     @cached_property
@@ -133,4 +148,4 @@ class ScheduleSpace(StateRows):
             Step(s.number, s.kind, s.bricks, tuple(nodes))
             for s, nodes in zip(self.schedule.steps, grips, strict=True)
         ]
-        return check_sequence(self.network.scene, steps)
+        return check_sequence(self.network.scene, steps, self._begin)

@@ -13,6 +13,7 @@ from seqopt.scene._checks import short
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Near
+from seqopt.sequence.site import Site
 
 FREE = "free"  # the schedule that is no list of steps
 _MOST_ROBOTS = 5
@@ -64,6 +65,12 @@ class FreeRules:
     candidates : str
         Where bricks that stand may be taken hold of: ``near:6`` or ``within:1.5``, as of
         `seqopt.sequence.schedule.Near`; by default wherever robots reach.
+    begin : Site or None
+        Where the build begins; by default with the empty site. This state need not keep rules or
+        limits; until rules are kept for the first time, robots may only take grips.
+    finish : Site or None
+        Where it ends: with so many bricks, and grips, or as ``ending`` says; by default with all
+        bricks. Robots of one kind may have changed places.
 
     Raises
     ------
@@ -84,6 +91,8 @@ class FreeRules:
     regrips: int | None = None
     ending: Ending = Ending.RELEASED
     candidates: str = ""
+    begin: Site | None = None
+    finish: Site | None = None
 
     def __post_init__(self) -> None:
         for name, kind in (("newest", Newest), ("payload", Payload), ("ending", Ending)):
@@ -93,8 +102,37 @@ class FreeRules:
         for name in ("least_grips", "regrips"):
             if name == "least_grips" or self.regrips is not None:
                 object.__setattr__(self, name, _count(name, getattr(self, name)))
+        for name in ("begin", "finish"):
+            if not isinstance(getattr(self, name), Site | None):
+                raise StepError(f"rule {name}: {short(getattr(self, name))}; give a seqopt.Site")
         if self.candidates:
             object.__setattr__(self, "candidates", Near(self.candidates).rule)
+
+    def span(self, scene: Scene) -> tuple[int, int]:
+        """Return how many bricks stand where the build begins, and where it ends."""
+        first, last = 0, len(scene.placed)
+        if self.begin is not None:
+            held, first = self.begin.holds(scene), self.begin.bricks
+            for i, node in enumerate(held):
+                if node is not None and i not in self.team(scene):
+                    raise StepError(
+                        f"robot {scene.robots[i].name} holds node {node} where the build begins; "
+                        "let it take part, or let it go first"
+                    )
+        if self.finish is not None:
+            self.finish.holds(scene)
+            last = self.finish.bricks
+        if not max(first, 1) <= last:
+            raise StepError(f"a build from {first} bricks cannot end with {last}; give more")
+        return first, last
+
+    @property
+    def how_it_ends(self) -> Ending:
+        """How the build ends, where grips at its end are given too."""
+        if self.finish is None or self.finish.grips is None:
+            return self.ending
+        bare = self.ending if self.ending is not Ending.HELD else Ending.RELEASED
+        return Ending.HELD if self.finish.held else bare
 
     def near(self, scene: Scene, bricks: int) -> frozenset[int]:
         """Return the nodes of bricks that stand, of so many, that may be taken hold of."""
@@ -141,6 +179,11 @@ class FreeRules:
             "regrips": "any" if self.regrips is None else self.regrips,
             "ending": self.ending.value,
             "candidates": self.candidates or "all",
+            **{
+                name: site.described(scene)
+                for name, site in (("begin", self.begin), ("finish", self.finish))
+                if site is not None
+            },
         }
 
     def loosened(self) -> Iterator[tuple[str, FreeRules]]:

@@ -28,6 +28,7 @@ from seqopt.arrays import Ints, Terse
 from seqopt.errors import StepError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
+from seqopt.sequence.site import Site, begin_step
 from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
 
 if TYPE_CHECKING:
@@ -116,8 +117,10 @@ def holds(scene: Scene, steps: Sequence[AnyStep]) -> tuple[Hold, ...]:
                 first, last = during[0], during[-1].number
                 node = int(grip) if isinstance(grip, Integral) else None
                 move = getattr(grip, "move", None)  # an open grip names its move
-                is_placing = first.kind is StepKind.PLACE
-                places = scene.placed[first.bricks - 1].name if is_placing else None
+                newest = scene.placed[first.bricks - 1]
+                held_before = node is not None and node not in newest.nodes  # a part of a build
+                is_placing = first.kind is StepKind.PLACE and not held_before
+                places = newest.name if is_placing else None
                 out.append(Hold(robot, first.number, last, node, move, places))
     return tuple(out)
 
@@ -173,6 +176,8 @@ class Schedule(Shown):
         In the order in which they are made.
     left_out : str, optional
         How candidates were left out, in words; empty if all are open.
+    begin : Site, optional
+        What stands before the first step; by default nothing.
 
     Examples
     --------
@@ -190,6 +195,7 @@ class Schedule(Shown):
     steps: tuple[OpenStep, ...]
     moves: tuple[Move, ...]
     left_out: str = ""
+    begin: Site | None = None
 
     def require_pairs(self) -> None:
         """Raise a `StepError` if more than two moves, or two not neighboring, share a step.
@@ -265,7 +271,7 @@ class Schedule(Shown):
         for s in self.steps:
             grips = tuple(nodes[g.move] if isinstance(g, OpenGrip) else g for g in s.grips)
             steps.append(Step(s.number, s.kind, s.bricks, grips))
-        return check_sequence(self.scene, steps)
+        return check_sequence(self.scene, steps, begin_step(self.scene, self.begin))
 
 
 def thin(schedule: Schedule, rule: str) -> Schedule:

@@ -91,24 +91,37 @@ def require_steps(steps: Sequence[Step]) -> Sequence[Step]:
     return steps
 
 
-def check_sequence(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
-    """Return the steps, from the first brick on, if each is possible after the one before."""
+def check_sequence(
+    scene: Scene, steps: Sequence[Step], begin: AnyStep | None = None
+) -> tuple[Step, ...]:
+    """Return the steps if each is possible after the one before, the first one after ``begin``.
+
+    By default they go on from the empty site.
+    """
     if not steps:
         raise StepError("the sequence has no steps; give at least one")
-    for before, step in zip((None, *steps), steps, strict=False):
+    for before, step in zip((begin, *steps), steps, strict=False):
         check_step(scene, before, step)
+    return tuple(steps)
+
+
+def check_part(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
+    """Return the steps of a build or of a part of one, whatever stands before the first of them."""
+    for step in require_steps(steps)[:1]:
+        check_state(scene, step, f"step {step.number}")
+    if len(steps) > 1 or not steps:
+        check_sequence(scene, steps[1:], steps[0] if steps else None)
     return tuple(steps)
 
 
 def check_step(scene: Scene, before: AnyStep | None, step: AnyStep) -> None:
     """Require that a step is possible after the one before, whatever its open grips become."""
-    _check_state(scene, step)
+    check_state(scene, step, f"step {step.number}")
     _check_change(scene, before or Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots)), step)
 
 
-def _check_state(scene: Scene, step: AnyStep) -> None:
-    """Require grips that are possible whatever came before."""
-    where = f"step {step.number}"
+def check_state(scene: Scene, step: AnyStep, where: str) -> None:
+    """Require grips that are possible whatever came before; ``where``: what a message names."""
     if len(step.grips) != len(scene.robots):
         raise StepError(
             f"{where}: {len(step.grips)} grips for {len(scene.robots)} robots; give one each"
@@ -124,11 +137,11 @@ def _check_state(scene: Scene, step: AnyStep) -> None:
             raise StepError(
                 f"{where}: {robot.name} at node {node}: {holder[node]} holds it; hold another"
             )
-        _check_grip(scene, step, robot, node)
+        _check_grip(scene, step, robot, node, where)
         holder[node] = robot.name
 
 
-def _check_grip(scene: Scene, step: AnyStep, robot: Robot, node: int) -> None:
+def _check_grip(scene: Scene, step: AnyStep, robot: Robot, node: int, where: str) -> None:
     """Require a node that exists, is free and stands within reach."""
     if node not in scene.brick_of_node:
         reason = "there is no such node"
@@ -145,7 +158,7 @@ def _check_grip(scene: Scene, step: AnyStep, robot: Robot, node: int) -> None:
     if len(nodes) > 12:
         possible = f"{len(nodes)} nodes from {nodes[0]} to {nodes[-1]}"
     raise StepError(
-        f"step {step.number}: {robot.name} at node {node}: {reason}; it can hold {possible}"
+        f"{where}: {robot.name} at node {node}: {reason}; it can hold {possible}"
     )
 
 

@@ -17,6 +17,7 @@ from seqopt.sequence import _rule_space as free_space
 from seqopt.sequence._rule_space import FreeSpace, node_numbers
 from seqopt.sequence._schedule_space import ScheduleSpace
 from seqopt.sequence.rules import Ending
+from seqopt.sequence.site import begin_step
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 
@@ -30,9 +31,10 @@ def steps_of(space: FreeSpace | ScheduleSpace, states: Sequence[Sequence[int]]) 
     if isinstance(space, ScheduleSpace):
         return _scheduled_steps(space, states)
     numbers = [None, *node_numbers(space.network)]
-    grips: list[int | None] = [None] * len(space.network.scene.robots)
-    stays: dict[int, int] = {}  # where a robot was last, as a place from 1
-    before, out = 0, list[Step]()
+    begin = begin_step(space.network.scene, space.rules.begin)
+    grips: list[int | None] = [*begin.grips]
+    stays = _stays(space)  # where a robot was last, as a place from 1
+    before, out = begin.bricks, list[Step]()
     for bricks, *entries in states:
         if len(entries) < space.robots or not all(abs(n) < len(numbers) for n in entries):
             raise SolverError(f"the state {[bricks, *entries]} is none of this free schedule")
@@ -43,7 +45,17 @@ def steps_of(space: FreeSpace | ScheduleSpace, states: Sequence[Sequence[int]]) 
         step = StepKind.PLACE if bricks > before else StepKind.REPOSITION
         out.append(Step(len(out) + 1, step if took else StepKind.RELEASE, bricks, tuple(grips)))
         before = bricks
-    return check_sequence(space.network.scene, out)
+    return check_sequence(space.network.scene, out, begin)
+
+
+def _stays(space: FreeSpace) -> dict[int, int]:
+    """Return where robots hold, or held last, where a build begins: places from 1."""
+    site, numbers = space.rules.begin, node_numbers(space.network)
+    if site is None:
+        return {}
+    lasts = (site.grips or (), site.stays)
+    found = (pair for nodes in lasts for pair in enumerate(nodes) if pair[1] is not None)
+    return {robot: numbers.index(node) + 1 for robot, node in [*found][::-1]}
 
 
 def _scheduled_steps(space: ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
@@ -90,8 +102,10 @@ def steps_with(problem: States, regrips: Floats, held: Ints) -> Floats:
     ``regrips`` (n,): infinite where there is no plan; ``held`` (n,): how many grips are held at the
     end, or before the last step where that lets all go. Result (n,).
     """
-    released = problem.free_rules.ending is not Ending.HELD
-    return np.asarray(2 * problem.space.levels + 2 * regrips - held + released)
+    released = problem.free_rules.how_it_ends is not Ending.HELD
+    space = problem.space
+    placed = space.levels - space.first
+    return np.asarray(2 * placed + space.held_first + 2 * regrips - held + released)
 
 
 def with_held(problem: States, graph: Graph, held: Bools) -> Graph:
@@ -99,7 +113,7 @@ def with_held(problem: States, graph: Graph, held: Bools) -> Graph:
 
     ``held`` (n,): which states hold as many grips as wanted.
     """
-    if problem.free_rules.ending is Ending.HELD:
+    if problem.free_rules.how_it_ends is Ending.HELD:
         return replace(graph, ends=graph.ends & held)
     return graph.only(~graph.ends[graph.target] | held[graph.source])
 
@@ -124,13 +138,18 @@ class FreeStates:
         return self.problem.space.levels
 
     @property
+    def first(self) -> int:
+        """The level on which the build begins."""
+        return self.problem.space.first
+
+    @property
     def peaks(self) -> tuple[bool, ...]:
         """By goal, whether its worst counts."""
         return tuple(goal.measure is Measure.PEAK for goal in self.problem.goals)
 
     def start(self) -> tuple[int, Ints]:
-        """Return the empty site."""
-        return 0, self.problem.space.start()
+        """Return where the build begins."""
+        return self.first, self.problem.space.start()
 
     def codes(self, part: int, states: Ints) -> Ints:
         """Return a number for every state."""
@@ -142,7 +161,13 @@ class FreeStates:
 
     def onward(self, part: int, states: Ints) -> Iterator[tuple[int, Moves]]:
         """Yield the moves that place the next brick, or take the next step of a schedule."""
-        yield part + 1, self.placed(part, states)
+        rows = self.able(part, states)
+        moves = self.placed(part, states[rows])
+        yield part + 1, moves._replace(source=rows[moves.source])
+
+    def able(self, part: int, states: Ints) -> Ints:
+        """Return the rows of states from which a brick may be placed."""
+        return np.flatnonzero(self.problem.space.may_place(part, states))
 
     def placed(self, level: int, states: Ints) -> Moves:
         """Return the moves from a level to the next."""

@@ -157,9 +157,10 @@ def _where(problem: States, look: Look) -> str:
     stops = look(replace(problem, goals=STEPS)).reached
     if isinstance(problem.rules, Schedule):
         return f"step {stops + 1} of {problem.space.levels} has no state that is allowed"
-    if stops < len(placed):
+    last = problem.space.levels
+    if stops < last:
         return f"brick {placed[stops].name} ({stops + 1} of {len(placed)}) is never placed"
-    return f"after brick {placed[-1].name} the build cannot end"
+    return f"after brick {placed[last - 1].name} the build cannot end"
 
 
 def _what_helps(problem: States, look: Look) -> str:

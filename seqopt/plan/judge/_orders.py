@@ -116,7 +116,7 @@ def _of_the_whole(problem: AllOrders) -> float:
     least = -np.inf
     if sum(comb(len(nodes), count) for count in held) <= MOST_SETS:
         least = min((_least(free, nodes, count) for count in held), default=np.inf)
-    return least if free.free_rules.ending is Ending.HELD else max(least, _least(free, nodes, 0))
+    return least if free.free_rules.how_it_ends is Ending.HELD else max(least, _least(free, nodes, 0))
 
 
 def _least(free: States, nodes: list[int], count: int) -> float:

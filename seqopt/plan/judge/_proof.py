@@ -332,12 +332,14 @@ class Proof:
         known = np.zeros(graph.states, dtype=np.int64)
         known[0] = PASSES
 
-        def ask(level: int, rows: Ints) -> Ints:
-            states = levels.states[level][rows - starts[level]]
-            return np.where(passable.may_stand(level, states, margins), PASSES, FAILS)
+        def of(part: int, rows: Ints) -> tuple[int, Ints, Sequence[float]]:
+            return levels.levels[part], levels.states[part][rows - starts[part]], margins
 
-        def recall(level: int, rows: Ints) -> Ints:
-            return passable.recalled(level, levels.states[level][rows - starts[level]], margins)
+        def ask(part: int, rows: Ints) -> Ints:
+            return np.where(passable.may_stand(*of(part, rows)), PASSES, FAILS)
+
+        def recall(part: int, rows: Ints) -> Ints:
+            return passable.recalled(*of(part, rows))
 
         lazy_path(graph, parts, known, ask, recall)
         left = reached(graph, (known != FAILS)[graph.target])
@@ -361,7 +363,7 @@ class Proof:
             path = np.array(lexicographic(graph).path)
         except InfeasibleError:
             return out[0]
-        for level, rows in enumerate(levels.states):
+        for level, rows in zip(levels.levels, levels.states, strict=True):
             own = path[(path >= first) & (path < first + len(rows))]
             if len(own):
                 out.append(own[~passable.may_stand(level, rows[own - first], margins)])
@@ -379,11 +381,22 @@ class _Levels:
         self._ends: list[Bools] = []
         self._count = 0
         coming: list[tuple[Ints, Follows]] = []
-        fresh = start = passable.tables.start()
-        for level in range(passable.tables.last + 1):
-            entries = np.concatenate([fresh, told.get(level, start[:0])])
-            coming = self._close(level, entries, coming)
-            fresh = np.concatenate([start[:0], *(move.states for _, move in coming)])
+        tables, self.levels = passable.tables, list[int]()
+        start = tables.start()
+        coming = self._begin(tables.first, start)
+        for level in range(max(1, tables.first), tables.last + 1):
+            now = [pair for pair in coming if pair[1].level == level]
+            later = [pair for pair in coming if pair[1].level > level]
+            fresh = [start[:0], told.get(level, start[:0]), *(move.states for _, move in now)]
+            coming = [*later, *self._close(level, np.concatenate(fresh), now)]
+
+    def _begin(self, level: int, start: Ints) -> list[tuple[Ints, Follows]]:
+        """Add the state in which the build begins, whatever it takes; return what follows it."""
+        self.levels.append(level)
+        self.states.append(start)
+        self._ends.append(np.zeros(1, dtype=bool))
+        self._count += 1
+        return [(move.source, move) for move in self._passable.tables.follow(level, start)]
 
     def _close(
         self, level: int, entries: Ints, coming: list[tuple[Ints, Follows]]
@@ -402,6 +415,7 @@ class _Levels:
             amounts = self._passable.moved(part.values[target], taken)
             self._moves.append((source[kept], self._count + target, amounts))
         self._count += len(part.states)
+        self.levels.append(level)
         self.states.append(part.states)
         self._ends.append(tables.ends(level, part.states))
         return [pair for pair in moves if pair[1].level > level]

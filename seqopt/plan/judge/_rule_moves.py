@@ -60,7 +60,7 @@ class RuleTables:
         self, book: RuleBook, groups: Sequence[tuple[int, ...]], *, parks: bool = False
     ) -> None:
         self._rules, placed = book.rules, book.network.scene.placed
-        self.last, self._parks = len(placed), parks
+        (self.first, self.last), self._parks = book.span, parks
         at = [brick.node_position(node) for brick in placed for node in brick.nodes]
         self._at = np.array([[np.nan] * 3, *at])
         self.nodes = np.array([-1, *(node for brick in placed for node in brick.nodes)])
@@ -102,12 +102,21 @@ class RuleTables:
         return len(self._able)
 
     def start(self) -> Ints:
-        """Return the state before the first brick.
+        """Return the state in which the build begins.
 
         Result (1, c).
         """
-        columns = self.robots + (self._rules.regrips is not None)
-        return np.zeros((1, columns), dtype=np.int32)
+        limited = self._rules.regrips is not None
+        out = np.zeros((1, self.robots + limited), dtype=np.int32)
+        _, held, regrips = self._book.start
+        out[0, : self.robots] = [0 if held[r] is None else self._place[held[r]] for r in self.team]
+        out[0, self.robots :] = min(regrips, self._rules.regrips or 0)
+        stays = self._rules.begin.stays if self._rules.begin and self._parks else ()
+        for column, robot in enumerate(self.team if stays else ()):
+            node = stays[robot]
+            if held[robot] is None and node is not None:
+                out[0, column] = -self._place[node]
+        return self.in_order(out)
 
     def bricks_at(self, level: int) -> int:
         """Return how many bricks stand on a level."""
@@ -117,7 +126,8 @@ class RuleTables:
         """Yield what follows from states (n, c) by one step each, of those that the rules allow."""
         rows = np.arange(len(states))
         keeps = rows[self.keep(bricks, states)] if bricks else rows
-        able = keeps
+        begins = self._rules.begin is not None and bricks == self.first
+        able = rows if begins else keeps
         if bricks and self._rules.regrips is not None:
             able = able[states[able, -1] < self._rules.regrips]
         for robot in self._takers() if bricks else ():
@@ -168,7 +178,7 @@ class RuleTables:
 
     def _released(self, bricks: int, states: Ints) -> Iterator[tuple[Ints, Ints]]:
         """Yield the states after one robot let go, or at the end all, and those before."""
-        ending = self._rules.ending
+        ending = self._rules.how_it_ends
         for robot in range(self.robots):
             source = np.flatnonzero(states[:, robot] > 0)
             after = states[source]
@@ -185,7 +195,7 @@ class RuleTables:
 
     def only_end(self) -> Ints | None:
         """Return the places held (1, robots) in the one state that ends builds, if it is one."""
-        held = self._rules.ending is Ending.HELD
+        held = self._rules.how_it_ends is Ending.HELD
         return None if held else np.zeros((1, self.robots), dtype=np.int64)
 
     def least_steps(self) -> int:
@@ -194,9 +204,10 @@ class RuleTables:
         Each brick is placed by a robot that is free, so that others let go before, one in a step,
         of all that it is not holding at the end: there they let go together, one by one or never.
         """
-        together = self._rules.ending is not Ending.ONE_BY_ONE
-        kept = min(self.robots, self.last) if together else 0
-        return 2 * self.last - kept + (self._rules.ending is Ending.RELEASED)
+        ending, placed = self._rules.how_it_ends, self.last - self.first
+        held = int(np.count_nonzero(self.start()[:, : self.robots] > 0))
+        kept = min(self.robots, placed + held) if ending is not Ending.ONE_BY_ONE else 0
+        return 2 * placed + held - kept + (ending is Ending.RELEASED)
 
     def keep(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) keep the rules as long as the build goes on, from 1 brick."""
@@ -214,9 +225,15 @@ class RuleTables:
         """Return which states (n, c) end the build."""
         if bricks < self.last:
             return np.zeros(len(states), dtype=bool)
-        if self._rules.ending is Ending.HELD:
+        grips = states[:, : self.robots].clip(min=0)
+        if self._rules.how_it_ends is not Ending.HELD:
+            return np.asarray(~grips.any(axis=1))
+        site = self._rules.finish
+        if site is None or site.grips is None:
             return self.keep(bricks, states)
-        return np.asarray(~(states[:, : self.robots] > 0).any(axis=1))
+        wanted = [0 if site.grips[r] is None else self._place[site.grips[r]] for r in self.team]
+        both = self.in_order(np.concatenate([grips, [wanted]]))
+        return np.asarray((both[:-1] == both[-1]).all(axis=1))
 
     def codes(self, states: Ints) -> Ints:
         """Return a number for every state (n, c) that no other one of its brick count has."""
@@ -239,7 +256,7 @@ class ScheduleTables:
     """
 
     def __init__(self, schedule: Schedule, network: Network, *, parks: bool = False) -> None:
-        scene = network.scene
+        scene, self.first = network.scene, 0
         self._schedule, self._parks = schedule, parks
         self.last, self.robots = len(schedule.steps), len(scene.robots)
         self.team = tuple(range(self.robots))
@@ -256,11 +273,17 @@ class ScheduleTables:
 
     def start(self) -> Ints:
         """Return the state before the first step, (1, robots) int."""
-        return np.zeros((1, self.robots), dtype=np.int32)
+        site, out = self._schedule.begin, np.zeros((1, self.robots), dtype=np.int32)
+        for robot, node in enumerate(() if site is None else site.grips or ()):
+            stay = site.stays[robot] if site and site.stays and self._parks else None
+            if node is not None or stay is not None:
+                out[0, robot] = self._place[node] if node is not None else -self._place[stay]
+        return out
 
     def bricks_at(self, level: int) -> int:
         """Return how many bricks stand after so many steps."""
-        return max((step.bricks for step in self._schedule.steps[:level]), default=0)
+        begin = self._schedule.begin.bricks if self._schedule.begin else 0
+        return max((step.bricks for step in self._schedule.steps[:level]), default=begin)
 
     def follow(self, level: int, states: Ints) -> Iterator[Follows]:
         """Yield what follows from states (n, robots) by the next step, if there is one."""

@@ -233,8 +233,9 @@ def _travel_of(problem: States, steps: Sequence[Step]) -> float:
 
     Result: m; straight lines.
     """
-    scene, total = problem.network.scene, 0.0
-    for nodes in zip(*(step.grips for step in steps), strict=True):  # robot by robot
+    scene, site, total = problem.network.scene, problem.rules.begin, 0.0
+    before = () if site is None else (site.stays or site.holds(scene), site.holds(scene))
+    for nodes in zip(*before, *(step.grips for step in steps), strict=True):  # robot by robot
         held = [scene.node_position(node) for node in nodes if node is not None]
         for ends in pairwise(held):
             total += float(np.linalg.norm(np.subtract(*ends)))

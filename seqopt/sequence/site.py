@@ -1,0 +1,92 @@
+"""Where a build stands: which bricks, and who holds what; builds may begin and end anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from numbers import Integral
+
+from seqopt.errors import StepError
+from seqopt.scene._checks import short
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Grips, Step, StepKind, check_state
+
+
+@dataclass(frozen=True)
+class Site:
+    """Where a build stands.
+
+    Parameters
+    ----------
+    bricks : int
+        How many bricks stand, in build order.
+    grips : tuple of (int or None), optional
+        Node that each of the scene's robots holds. By default nobody holds anything where a build
+        begins; where it ends, the rule ``ending`` says who holds.
+    stays : tuple of (int or None), optional
+        Node that each robot that is free held last, from which its travel counts.
+    regrips : int
+        How many grips were taken since the last brick, besides that which placed it.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> steps = seqopt.sequential(seqopt.build_network(seqopt.load_scene("arch25")))
+    >>> Site.after(steps, 4)
+    Site(bricks=3, grips=(4, 2, None), stays=(1, None, None), regrips=0)
+    """
+
+    bricks: int
+    grips: Grips | None = None
+    stays: Grips = ()
+    regrips: int = 0
+
+    @classmethod
+    def after(cls, steps: Sequence[Step], count: int) -> Site:
+        """Return where a build stands after so many of its steps, from 0 for the empty site."""
+        if not isinstance(count, Integral) or not 0 <= count <= len(steps):
+            raise StepError(f"step {short(count)}: the plan has 0 to {len(steps)}")
+        done = steps[:count]
+        lasts: dict[int, int] = {r: n for s in done for r, n in enumerate(s.grips) if n is not None}
+        regrips = 0
+        for step in done:
+            regrips = 0 if step.kind is StepKind.PLACE else regrips
+            regrips += step.kind is StepKind.REPOSITION
+        if not done:
+            return cls(0)
+        free = (lasts.get(r) if node is None else None for r, node in enumerate(done[-1].grips))
+        return cls(done[-1].bricks, done[-1].grips, tuple(free), regrips)
+
+    @property
+    def held(self) -> int:
+        """How many grips are held."""
+        return sum(node is not None for node in self.grips or ())
+
+    def holds(self, scene: Scene) -> Grips:
+        """Return the node that each robot holds, if the site is possible in a scene."""
+        grips, most = self.grips, len(scene.placed)
+        if not isinstance(self.bricks, Integral) or not 0 <= self.bricks <= most:
+            raise StepError(f"site: {short(self.bricks)} bricks; scene {scene.name} has 0 to {most}")
+        if grips is None:
+            return (None,) * len(scene.robots)
+        if self.bricks:
+            check_state(scene, Step(0, StepKind.RELEASE, self.bricks, tuple(grips)), "site")
+        elif self.held:
+            raise StepError("site: a robot holds a brick, and none stands; give bricks")
+        return grips
+
+    def described(self, scene: Scene) -> dict[str, object]:
+        """Return what stands and who holds what by names, ready for JSON."""
+        pairs = zip(scene.robots, self.holds(scene), strict=True)
+        held = {robot.name: node for robot, node in pairs if node is not None}
+        return {
+            "bricks": [brick.name for brick in scene.placed[: self.bricks]],
+            "grips": held if self.grips is not None else "as the rule ending says",
+        }
+
+
+def begin_step(scene: Scene, site: Site | None) -> Step:
+    """Return the state before the first step of a build, as the step that led to it."""
+    if site is None:
+        return Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots))
+    return Step(0, StepKind.RELEASE, site.bricks, site.holds(scene))
