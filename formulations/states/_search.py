@@ -32,7 +32,6 @@ from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import Watch, find_formulation
 from seqopt.plan.search._margin_search import best_margin, bisected, with_margin
 from seqopt.problem.problem import Goal, Measure
-from seqopt.scene.scene import Order
 from seqopt.work._workers import free_memory
 from seqopt.work.progress import Stage, Tell
 
@@ -90,7 +89,7 @@ def _order_of_path(
     path, bounds, early = choose(_on_paths(visited.graph), watch)
     value, stopped = own, "time" * early
     if path and path_values(visited.graph, path)[0] < own:
-        value, order = path_values(visited.graph, path)[0], _order_of(visited, path)
+        value, order = path_values(visited.graph, path)[0], problem.order_of(visited.of(path))
     if not np.isfinite(value):
         raise TimeUpError("no order with a plan was found yet; give more")
     bound = min(bounds[0] if bounds else -np.inf, value)
@@ -101,10 +100,6 @@ def _own_value(problem: AllOrders) -> float:
     """Return the value of the scene's own order; infinite if it is none of those asked for."""
     own = problem.scene.build_order
     return order_value(problem, Trial(own, np.inf)) if problem.allows(own) else np.inf
-
-
-def _order_of(visited: Visited, path: Sequence[int]) -> Order:
-    return tuple(dict.fromkeys(part[1] for _, part, _ in visited.of(path)))
 
 
 def _order_of_margin(problem: AllOrders, tell: Watching) -> OrderSelection:
@@ -119,7 +114,7 @@ def _order_of_margin(problem: AllOrders, tell: Watching) -> OrderSelection:
 
     low, high = bisected(name, lambda value: demanding(value).whole)
     visited = demanding(high).graph()
-    order = _order_of(visited, fewest_moves(visited.graph))
+    order = problem.order_of(visited.of(fewest_moves(visited.graph)))
     value = find_formulation("schedule_search").solve(problem.at(order)).objective[0]
     return OrderSelection(order, value, min(low, value), 0)
 
@@ -127,7 +122,7 @@ def _order_of_margin(problem: AllOrders, tell: Watching) -> OrderSelection:
 def _order_within(found: Explorer, problem: AllOrders, evaluated: int) -> OrderSelection:
     """Return the order of a path within budgets that is good in the first goal."""
     visited, best = exact_best(found, problem.states.budgets)
-    order = _order_of(visited, best.path)
+    order = problem.order_of(visited.of(best.path))
     plan = find_formulation("schedule_search").solve(problem.at(order))
     value, bound = plan.objective[0], best.bounds[0] if isinstance(best, Within) else -np.inf
     return OrderSelection(order, value, min(bound, value), evaluated)
@@ -142,7 +137,7 @@ def _order_of_total(
         _on_paths(visited.graph), problem.states.over, _cheapest(choose, watch), watch
     )
     stopped, parts = "time" * watch.over, len({part for _, part, _ in visited.states})
-    order, weights = _order_of(visited, best.path), tuple(best.weights.tolist())
+    order, weights = problem.order_of(visited.of(best.path)), tuple(best.weights.tolist())
     return OrderSelection(order, best.value, best.bound, parts - 1, stopped, weights)
 
 

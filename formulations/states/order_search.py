@@ -190,9 +190,8 @@ def _take_best(search: _Search, found: Explorer) -> None:
     """Keep the best order below the threshold, if it is better than the one that is known."""
     visited, best = exact_best(found)
     if best.values[0] < search.value * (1 - BETTER):
-        keys = dict.fromkeys(part for _, part, _ in visited.of(_first_ending(visited)))
         search.value = best.values[0]
-        search.order = tuple(key[1] for key in keys)
+        search.order = search.problem.order_of(visited.of(_first_ending(visited)))
 
 
 def _first_ending(visited: Visited) -> tuple[int, ...]:

@@ -49,6 +49,13 @@ RULE = {
     "robots leave the finished structure), candidates=near:JOINTS|within:METERS|all (as "
     "--candidates)"
 }
+WHERE = {
+    "--from PLAN:STEP|STATE|N": "where the build begins: after a step of a plan (its folder or CSV "
+    "file); in a state of a JSON file (bricks that stand, by names or how many, grips by robot); "
+    "or with so many bricks that nobody holds",
+    "--to PLAN:STEP|STATE|N": "where it ends, said in the same ways; a number of bricks leaves "
+    "grips to the rule ending",
+}
 STANDING = {
     "--stands MORTAR": "every state must be proven to stand, robots within payload: dry, epoxy or "
     "bond=STRENGTH (Pa)",

@@ -19,6 +19,7 @@ from seqopt._cli.values import (
     parse_robots,
     parse_rules,
 )
+from seqopt._cli.where import Place, asked_place, between
 from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
@@ -64,6 +65,7 @@ class Asked:
 
     scene: Scene
     problem: Problem
+    whole: Problem | None = None  # the same from an empty site, if it begins elsewhere
     aim: RobustAim | None = None
     known: Scenarios | None = None
     unseen: Scenarios | None = None
@@ -86,6 +88,10 @@ def asked_problem(options: argparse.Namespace) -> Asked:
         scene = without_arms(scene)  # bases are chosen afterwards
     if options.robots.isdecimal():
         scene = with_robots(scene, int(options.robots))
+    scene, begin = asked_place(options, "from", scene)
+    later, end = asked_place(options, "to", scene)
+    if later != scene:
+        raise StepError(f"--to {options.to}: its bricks are not those that follow in this order")
     find_postures(scene, getattr(options, "cache", None), options.tell)
     words: dict[str, Any] = {"limits": parse_limits(options.limit, scene)}
     budgets = getattr(options, "budget", [])
@@ -100,11 +106,16 @@ def asked_problem(options: argparse.Namespace) -> Asked:
             words |= {"scenarios": known, "over": aim}
     require_out(options)
     engine = asked_engine(options, build_network(scene))
-    moves = _asked_moves(options, engine.network)
+    every = _asked_moves(options, engine.network)
+    moves = between(every, begin, end)
     words |= {"stands": asked_standing(options), "budgets": budgets}
     words |= {"orders": Orders.TIED} if sought else {}
     problem = posed(engine, moves, criterion, options.aim, **words)
-    return Asked(scene, problem, aim, known, unseen)
+    whole = None
+    if begin.site is not None:
+        start = between(every, Place(), end)
+        whole = posed(engine, start, criterion, options.aim, **words)
+    return Asked(scene, problem, whole, aim, known, unseen)
 
 
 def _wants_states(options: argparse.Namespace) -> bool:

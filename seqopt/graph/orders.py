@@ -40,9 +40,17 @@ class AllOrders(Shown):
 
     states: States
     among: Orders = Orders.TIED
+    stands: Order = field(init=False)  # names of the bricks with which builds begin
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "among", Orders.of(self.among))
+        first, last = self.states.free_rules.span(self.scene)
+        if last < len(self.scene.bricks):
+            raise ProblemError(
+                f"orders to {last} of {len(self.scene.bricks)} bricks: which of them is not said; "
+                "give an order, or go on to the last brick"
+            )
+        object.__setattr__(self, "stands", self.scene.build_order[:first])
         if recipe_of(self.states.engine) is None:
             raise ProblemError(
                 f"engine {type(self.states.engine).__name__}: orders need engines of their own; "
@@ -87,7 +95,14 @@ class AllOrders(Shown):
 
         ``order``: names of all bricks.
         """
-        return all(b in self.next_bricks(frozenset(order[:k])) for k, b in enumerate(order))
+        first = len(self.stands)
+        pairs = [*enumerate(order)][first:]
+        follow = all(b in self.next_bricks(frozenset(order[:k])) for k, b in pairs)
+        return follow and {*order[:first]} == {*self.stands}
+
+    def order_of(self, found: Sequence[tuple[int, Key, Ints]]) -> Order:
+        """Return the order of a path: level, part and state (c,) of all its states."""
+        return tuple(dict.fromkeys((*self.stands, *(part[1] for _, part, _ in found))))
 
     def judging(self, order: Order) -> States:
         """Return the free schedule of one order with the goal that orders are judged by alone."""
@@ -205,6 +220,11 @@ class OrderStates:
     parts: dict[Key, FreeStates] = field(default_factory=dict)
 
     @property
+    def first(self) -> int:
+        """How many bricks stand where builds begin."""
+        return len(self.problem.stands)
+
+    @property
     def levels(self) -> int:
         """How many bricks there are."""
         return len(self.problem.scene.bricks)
@@ -217,9 +237,10 @@ class OrderStates:
         return tuple(goal.measure is Measure.PEAK for goal in self._asked.goals)
 
     def start(self) -> tuple[Key, Ints]:
-        """Return the empty site."""
-        empty: Key = (frozenset(), 0)
-        return empty, self._of(empty).start()[1]
+        """Return where builds begin."""
+        stands = self.problem.stands
+        key: Key = (frozenset(stands), stands[-1] if stands else 0)
+        return key, self._of(key).start()[1]
 
     def codes(self, part: Key, states: Ints) -> Ints:
         """Return a number for every state."""
@@ -232,10 +253,12 @@ class OrderStates:
     def onward(self, part: Key, states: Ints) -> Iterator[tuple[Key, Moves]]:
         """Yield the moves that place one of the bricks that may come next."""
         old = self._of(part).problem
+        rows = self._of(part).able(len(part[0]), states)
         for brick in self.problem.next_bricks(part[0]):
             key = (part[0] | {brick}, brick)
             new = self._of(key)
-            yield key, new.placed(len(part[0]), _renumbered(old, new.problem, states))
+            moves = new.placed(len(part[0]), _renumbered(old, new.problem, states[rows]))
+            yield key, moves._replace(source=rows[moves.source])
 
     @property
     def floors(self) -> bool:
@@ -265,7 +288,7 @@ class OrderStates:
 
         ``found``: level, part and state (c,) of all its states.
         """
-        order = tuple(dict.fromkeys(part[1] for _, part, _ in found))
+        order = self.problem.order_of(found)
         new = self.problem.at(order)
         rows = ((self._of(part).problem, state[None]) for _, part, state in found)
         return order, tuple(_renumbered(old, new, state)[0] for old, state in rows)
@@ -286,7 +309,8 @@ class OrderStates:
             first = [name for name in own if name in part[0] and name != part[1]]
             rest = [name for name in own if name not in part[0]]
             newest = (part[1],) if part[0] else ()
-            order = (*first, *newest, *rest)
+            stand = [name for name in self.problem.stands if name in first]
+            order = (*stand, *(b for b in first if b not in stand), *newest, *rest)
             problem = (self.problem.at if self._all_count else self.problem.judging)(order)
             kind = ScenarioSums if problem.totals else FreeStates
             self.parts[part] = kind(problem, standing=bool(problem.demands))

@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.responses.table import analyze
-from seqopt.sequence.steps import check_part
+from seqopt.sequence.steps import _check_part
 
 
 class ShownBuild(Shown):
@@ -125,7 +125,7 @@ class ShownBuild(Shown):
         )
         return figure
 
-    def gantt(self, first: int = 1, last: int | None = None) -> Figure:
+    def gantt(self, first: int | None = None, last: int | None = None) -> Figure:
         """Draw the grips over the steps of the build: a lane per robot, a bar per grip.
 
         Every bar names its brick and its node, says whether the robot places the brick or holds it,
@@ -205,7 +205,7 @@ class GivenSequence(ShownBuild):
         if not isinstance(getattr(self.engine, "network", None), Network):
             kind = type(self.engine).__name__
             raise SceneError(f"a {kind} is not an engine; give seqopt.make_engine('auto', scene)")
-        check_part(self.engine.network.scene, self.steps)
+        _check_part(self.engine.network.scene, self.steps)
 
     def __repr__(self) -> str:
         name = self.engine.network.scene.name

@@ -151,7 +151,7 @@ def steps_picture(
             draw_grips(axes, engine.network, step.grips, VIEW)
         else:
             key |= _mark_grips(axes, scene, step.grips)
-        _frame(axes, scene, step, len(steps))
+        _frame(axes, scene, step, steps[-1].number)
     handles = [key[robot] for robot in sorted(key)]
     handles += [] if largest is None else force_key(largest)
     if handles:
@@ -211,10 +211,10 @@ def _frame(axes: Axes, scene: Scene, step: Step, count: int) -> None:
 
 def spread_steps(steps: Sequence[Step], most: int) -> tuple[int, ...]:
     """Return numbers of steps spread over a build, ascending: some that place, and the last one."""
-    placing = [i + 1 for i, step in enumerate(steps) if step.kind is StepKind.PLACE]
+    placing = [step.number for step in steps if step.kind is StepKind.PLACE]
     parts = range(1, most if placing else 1)
     picked = {placing[round(k * (len(placing) - 1) / most)] for k in parts}
-    return tuple(sorted({*picked, len(steps)}))
+    return tuple(sorted({*picked, steps[-1].number}))
 
 
 def _fields(engine: Engine, step: Step) -> Fields:
@@ -228,10 +228,11 @@ def _picked(steps: Sequence[Step], chosen: int | Sequence[int] | None) -> list[S
     numbers: list[Any] = [*chosen] if isinstance(chosen, tuple | list | range) else [chosen]
     if not 1 <= len(numbers) <= MOST:
         raise StepError(f"{len(numbers)} steps to draw: give 1 to {MOST}")
+    first, last = steps[0].number, steps[-1].number
     for number in numbers:
-        if not isinstance(number, Integral) or not 1 <= int(number) <= len(steps):
-            raise StepError(f"step {short(number)}: the build has steps 1 to {len(steps)}")
-    return [steps[int(number) - 1] for number in numbers]
+        if not isinstance(number, Integral) or not first <= int(number) <= last:
+            raise StepError(f"step {short(number)}: the build has steps {first} to {last}")
+    return [steps[int(number) - first] for number in numbers]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -274,7 +275,7 @@ class Film:
                     axes.clear()
                     _draw_step(axes, self.engine, step, forces=self.forces, magnify=self.magnify)
                     draw_grips(axes, self.engine.network, step.grips, VIEW)
-                    _frame(axes, scene, step, len(self.steps))
+                    _frame(axes, scene, step, self.steps[-1].number)
                     writer.grab_frame()
         except OSError as error:
             raise FileError(f"cannot write {path}: {error.strerror}; name another") from error
@@ -300,12 +301,14 @@ def gantt_picture(
     scene: Scene,
     steps: Sequence[AnyStep],
     responses: pd.DataFrame | None = None,
-    shown: tuple[int, int | None] = (1, None),
+    shown: tuple[int | None, int | None] = (None, None),
 ) -> Figure:
     """Return the grips of a build over its steps, a lane per robot and a bar per grip."""
-    first, last = shown[0], len(steps) if shown[1] is None else shown[1]
-    if not 1 <= first <= last <= len(steps):
-        raise StepError(f"steps {first} to {last}: the build has steps 1 to {len(steps)}")
+    begins, ends = steps[0].number, steps[-1].number
+    first = begins if shown[0] is None else shown[0]
+    last = ends if shown[1] is None else shown[1]
+    if not begins <= first <= last <= ends:
+        raise StepError(f"steps {first} to {last}: the build has steps {begins} to {ends}")
     width = float(np.clip(PER_STEP * (last - first + 1) + 1.6, NARROWEST, WIDEST))
     figure = new_picture(width, 0.62 * len(scene.robots) + 1.2)
     axes = figure.add_subplot()
@@ -317,19 +320,21 @@ def gantt_picture(
         shade = ScalarMappable(Normalize(0.0, most), colormaps[SHADES])
     for hold in holds(scene, steps):
         if hold.last >= first and hold.first <= last:
-            _bar(axes, hold, forces, shade)
+            _bar(axes, hold, forces, shade, begins)
             _label(axes, scene, hold, inch)
-    _lanes(axes, scene, (first, last), len(steps))
+    _lanes(axes, scene, (first, last), ends)
     _key(figure, axes, shade, is_open=any(getattr(step, "moves", ()) for step in steps))
     return figure
 
 
-def _bar(axes: Axes, hold: Hold, forces: Floats | None, shade: ScalarMappable | None) -> None:
+def _bar(
+    axes: Axes, hold: Hold, forces: Floats | None, shade: ScalarMappable | None, begins: int
+) -> None:
     """Draw a grip: shaded step by step, framed as a whole, marked where it places a brick."""
     low = hold.robot - LANE / 2
     if forces is not None and shade is not None:
         for number in range(hold.first, hold.last + 1):
-            color = shade.to_rgba(forces[number - 1, hold.robot])
+            color = shade.to_rgba(forces[number - begins, hold.robot])
             axes.add_patch(Rectangle((number - 0.5, low), 1, LANE, fc=color, lw=0))
     look: Any = {"fc": PALE if forces is None else "none", "ec": DARK, "lw": 0.9}
     look |= {"hatch": "//"} if hold.node is None else {}

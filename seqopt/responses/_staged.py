@@ -101,7 +101,12 @@ def staged_fields(
     network: Network, steps: Sequence[Step], placing: Placing | str = Placing.FITTED
 ) -> Iterator[Fields]:
     """Yield the full fields of every step, of one grip set each; see `analyze_staged`."""
-    check_sequence(network.scene, require_steps(steps))
+    if require_steps(steps) and steps[0].number > 1:
+        raise StepError(
+            f"steps from {steps[0].number} on: what was locked in before them is not known; give "
+            "the whole build, or --placing free"
+        )
+    check_sequence(network.scene, steps)
     try:
         placing = Placing(placing)
     except ValueError:

@@ -357,7 +357,9 @@ def grips_table(scene: Scene, steps: Sequence[Step], responses: pd.DataFrame) ->
     for hold in sorted(holds(scene, steps), key=lambda hold: (hold.first, hold.robot)):
         assert hold.node is not None  # steps have no open grips
         robot = scene.robots[hold.robot]
-        own = responses[force_column(robot)].to_numpy(float)[hold.first - 1 : hold.last]
+        before = steps[0].number - 1
+        forces = responses[force_column(robot)].to_numpy(float)
+        own = forces[hold.first - 1 - before : hold.last - before]
         row = {
             "robot": robot.name,
             "from_step": hold.first,

@@ -241,7 +241,7 @@ class FreeSpace(StateRows):
                 elif stay is not None and self.parks:
                     out[0, column] = -place[stay]
             sort_entries(out, first, end)
-        return out[0]
+        return np.asarray(out[0])
 
     def may_place(self, bricks: int, states: Ints) -> Bools:
         """Return in which states (n, c) a brick may be placed: the first may break rules, (n,)."""
@@ -402,7 +402,7 @@ def free_space(
     base = 1 + (2 if parks else 1) * 2 * len(network.inner)
     if base**space.robots * (1 + (rules.regrips or 0)) >= 2**62:
         raise StepError(
-            f"scene {network.scene.name}: {len(network.inner)} bricks and {space.robots} robots have "
-            "more states than can be numbered; let fewer robots take part"
+            f"scene {network.scene.name}: {len(network.inner)} bricks and {space.robots} robots "
+            "have more states than can be numbered; let fewer robots take part"
         )
     return space

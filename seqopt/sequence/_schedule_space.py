@@ -19,7 +19,7 @@ from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.sequence._rule_space import Moves, RobotKind, StateRows, node_numbers
 from seqopt.sequence.schedule import OpenGrip, Schedule
-from seqopt.sequence.site import begin_step
+from seqopt.sequence.site import _begin_step
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 
@@ -64,7 +64,7 @@ class ScheduleSpace(StateRows):
     @cached_property
     def _begin(self) -> Step:
         """What is before the first step."""
-        return begin_step(self.network.scene, self.schedule.begin)
+        return _begin_step(self.network.scene, self.schedule.begin)
 
     def may_place(self, level: int, states: Ints) -> Bools:
         """Return from which states the next step may be taken: from all, (n,)."""

@@ -28,7 +28,7 @@ from seqopt.arrays import Ints, Terse
 from seqopt.errors import StepError, did_you_mean
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.sequence.site import Site, begin_step
+from seqopt.sequence.site import Site, _begin_step
 from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
 
 if TYPE_CHECKING:
@@ -250,7 +250,7 @@ class Schedule(Shown):
         ]
         return pd.DataFrame(rows)
 
-    def gantt(self, first: int = 1, last: int | None = None) -> Figure:
+    def gantt(self, first: int | None = None, last: int | None = None) -> Figure:
         """Draw the grips over some steps, a lane per robot; those to be chosen are hatched."""
         figure: Figure = display("gantt_picture")(self.scene, self.steps, None, (first, last))
         return figure
@@ -271,7 +271,7 @@ class Schedule(Shown):
         for s in self.steps:
             grips = tuple(nodes[g.move] if isinstance(g, OpenGrip) else g for g in s.grips)
             steps.append(Step(s.number, s.kind, s.bricks, grips))
-        return check_sequence(self.scene, steps, begin_step(self.scene, self.begin))
+        return check_sequence(self.scene, steps, _begin_step(self.scene, self.begin))
 
 
 def thin(schedule: Schedule, rule: str) -> Schedule:

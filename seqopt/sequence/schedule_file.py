@@ -17,7 +17,7 @@ from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule, ScheduledGrips
-from seqopt.sequence.steps import Step, StepKind, check_sequence, check_step
+from seqopt.sequence.steps import Step, StepKind, _check_part, check_sequence, check_step
 from seqopt.sequence.three_robots import SCHEDULES, make_schedule, open_schedule, robot_loop
 
 _Row = dict[str, str]
@@ -62,7 +62,7 @@ def read_plan(scene: Scene, path: Path) -> tuple[Step, ...]:
 
 
 def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
-    """Return the checked steps of a plan, numbered from 1.
+    """Return the checked steps of a plan, numbered from 1, or of a part of one, numbered on.
 
     The text is CSV with the columns ``step``, ``type``, ``bricks`` and, for every robot,
     ``NAME_node`` and, if present, ``NAME_brick``; an empty cell means that the robot does not grip.
@@ -74,12 +74,13 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
         cells = _read_cells(row, where)
         grips = tuple(_read_grip(scene, robot, row, where) for robot in scene.robots)
         steps.append(Step(*cells, grips))
-    for expected, step in enumerate(steps, start=1):
+    first = max(1, steps[0].number) if steps else 1
+    for expected, step in enumerate(steps, start=first):
         if step.number != expected:
             raise StepError(
                 f"plan {source}: step {step.number} should be {expected}; number steps from 1"
             )
-    return check_sequence(scene, steps)
+    return check_sequence(scene, steps) if first == 1 else _check_part(scene, steps)
 
 
 def _read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, _Row]]:

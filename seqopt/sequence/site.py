@@ -9,7 +9,7 @@ from numbers import Integral
 from seqopt.errors import StepError
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Grips, Step, StepKind, check_state
+from seqopt.sequence.steps import Grips, Step, StepKind, _check_state
 
 
 @dataclass(frozen=True)
@@ -27,26 +27,37 @@ class Site:
         Node that each robot that is free held last, from which its travel counts.
     regrips : int
         How many grips were taken since the last brick, besides that which placed it.
+    step : int, optional
+        Number of the step that led there: steps are numbered on from it. By default 1, and 0 for
+        the empty site.
 
     Examples
     --------
     >>> import seqopt
     >>> steps = seqopt.sequential(seqopt.build_network(seqopt.load_scene("arch25")))
     >>> Site.after(steps, 4)
-    Site(bricks=3, grips=(4, 2, None), stays=(1, None, None), regrips=0)
+    Site(bricks=3, grips=(4, 2, None), stays=(None, None, None), regrips=0, step=4)
     """
 
     bricks: int
     grips: Grips | None = None
     stays: Grips = ()
     regrips: int = 0
+    step: int = -1
+
+    def __post_init__(self) -> None:
+        if self.step < 0:
+            object.__setattr__(self, "step", int(self.bricks != 0))
 
     @classmethod
     def after(cls, steps: Sequence[Step], count: int) -> Site:
         """Return where a build stands after so many of its steps, from 0 for the empty site."""
-        if not isinstance(count, Integral) or not 0 <= count <= len(steps):
-            raise StepError(f"step {short(count)}: the plan has 0 to {len(steps)}")
-        done = steps[:count]
+        first, last = (steps[0].number - 1, steps[-1].number) if steps else (0, 0)
+        if not isinstance(count, Integral) or not (first or 0) <= count <= last:
+            raise StepError(f"step {short(count)}: the plan has {first} to {last}")
+        done = steps[: count - first]
+        if first and not done:
+            raise StepError(f"step {count}: the plan begins after it; give {first + 1} to {last}")
         lasts: dict[int, int] = {r: n for s in done for r, n in enumerate(s.grips) if n is not None}
         regrips = 0
         for step in done:
@@ -55,7 +66,7 @@ class Site:
         if not done:
             return cls(0)
         free = (lasts.get(r) if node is None else None for r, node in enumerate(done[-1].grips))
-        return cls(done[-1].bricks, done[-1].grips, tuple(free), regrips)
+        return cls(done[-1].bricks, done[-1].grips, tuple(free), regrips, done[-1].number)
 
     @property
     def held(self) -> int:
@@ -66,11 +77,13 @@ class Site:
         """Return the node that each robot holds, if the site is possible in a scene."""
         grips, most = self.grips, len(scene.placed)
         if not isinstance(self.bricks, Integral) or not 0 <= self.bricks <= most:
-            raise StepError(f"site: {short(self.bricks)} bricks; scene {scene.name} has 0 to {most}")
+            raise StepError(
+                f"site: {short(self.bricks)} bricks; scene {scene.name} has 0 to {most}"
+            )
         if grips is None:
             return (None,) * len(scene.robots)
         if self.bricks:
-            check_state(scene, Step(0, StepKind.RELEASE, self.bricks, tuple(grips)), "site")
+            _check_state(scene, Step(0, StepKind.RELEASE, self.bricks, tuple(grips)), "site")
         elif self.held:
             raise StepError("site: a robot holds a brick, and none stands; give bricks")
         return grips
@@ -85,8 +98,8 @@ class Site:
         }
 
 
-def begin_step(scene: Scene, site: Site | None) -> Step:
+def _begin_step(scene: Scene, site: Site | None) -> Step:
     """Return the state before the first step of a build, as the step that led to it."""
     if site is None:
         return Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots))
-    return Step(0, StepKind.RELEASE, site.bricks, site.holds(scene))
+    return Step(site.step, StepKind.RELEASE, site.bricks, site.holds(scene))

@@ -105,10 +105,10 @@ def check_sequence(
     return tuple(steps)
 
 
-def check_part(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
+def _check_part(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
     """Return the steps of a build or of a part of one, whatever stands before the first of them."""
     for step in require_steps(steps)[:1]:
-        check_state(scene, step, f"step {step.number}")
+        _check_state(scene, step, f"step {step.number}")
     if len(steps) > 1 or not steps:
         check_sequence(scene, steps[1:], steps[0] if steps else None)
     return tuple(steps)
@@ -116,11 +116,11 @@ def check_part(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
 
 def check_step(scene: Scene, before: AnyStep | None, step: AnyStep) -> None:
     """Require that a step is possible after the one before, whatever its open grips become."""
-    check_state(scene, step, f"step {step.number}")
+    _check_state(scene, step, f"step {step.number}")
     _check_change(scene, before or Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots)), step)
 
 
-def check_state(scene: Scene, step: AnyStep, where: str) -> None:
+def _check_state(scene: Scene, step: AnyStep, where: str) -> None:
     """Require grips that are possible whatever came before; ``where``: what a message names."""
     if len(step.grips) != len(scene.robots):
         raise StepError(
@@ -157,9 +157,7 @@ def _check_grip(scene: Scene, step: AnyStep, robot: Robot, node: int, where: str
     possible = ", ".join(map(str, nodes)) or "no node"
     if len(nodes) > 12:
         possible = f"{len(nodes)} nodes from {nodes[0]} to {nodes[-1]}"
-    raise StepError(
-        f"{where}: {robot.name} at node {node}: {reason}; it can hold {possible}"
-    )
+    raise StepError(f"{where}: {robot.name} at node {node}: {reason}; it can hold {possible}")
 
 
 def _check_change(scene: Scene, before: AnyStep, step: AnyStep) -> None:

@@ -38,8 +38,8 @@ class BuildVerdicts:
     """Which steps of a build stand with a mortar, and what fails first where one falls.
 
     ``mortar``: what it is called; ``verdicts``: of every step; ``first``: number of the first step
-    that falls, zero if none does; ``brick``, ``joint``: the fastest one in its motion, and the one
-    that opens fastest; empty where none does.
+    that falls, zero if none does; ``begins``: number of the first step of all; ``brick``,
+    ``joint``: the fastest one in its motion, and the one that opens fastest; empty where none does.
     """
 
     mortar: str
@@ -47,14 +47,15 @@ class BuildVerdicts:
     first: int = 0
     brick: str = ""
     joint: str = ""
+    begins: int = 1
 
     def count(self, verdict: Verdict) -> int:
         """Return how many steps have a verdict."""
         return self.verdicts.count(verdict)
 
     def falls(self, number: int) -> bool:
-        """Return whether a step falls, by its number from 1."""
-        return self.verdicts[number - 1] is Verdict.FALLS
+        """Return whether a step falls, by its number."""
+        return self.verdicts[number - self.begins] is Verdict.FALLS
 
     @property
     def how(self) -> str:
@@ -145,8 +146,8 @@ class BuildProver:
         for step, verdict in zip(steps, verdicts, strict=True):
             if verdict is Verdict.FALLS:
                 failing = _failing(self._network, step, self._mortars[name])
-                return BuildVerdicts(name, verdicts, step.number, *failing)
-        return BuildVerdicts(name, verdicts)
+                return BuildVerdicts(name, verdicts, step.number, *failing, steps[0].number)
+        return BuildVerdicts(name, verdicts, begins=steps[0].number if steps else 1)
 
 
 def _one_by_one(

@@ -26,6 +26,7 @@ from seqopt._cli.options import (
     LIMIT,
     RULE,
     STANDING,
+    WHERE,
     criterion_options,
     declare,
     engine_options,
@@ -38,7 +39,7 @@ from seqopt._cli.posing import Asked, asked_problem
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import parse_options, parse_size, parse_time_limit
 from seqopt._files import csv_text
-from seqopt.errors import ProblemError
+from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.states.states import States
 from seqopt.plan._bases import FoundBases, choose_bases
 from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation, formulation_names
@@ -135,6 +136,7 @@ MEMORY = {
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``optimize``, those of a first use before those of an expert."""
     _basic(command)
+    declare(command.add_argument_group("a part of a build"), WHERE)
     declare(command.add_argument_group("what is allowed"), LIMIT | BUDGET)
     form_options(command, strict=True, builds=True)
     states = "what plans are compared by, state after state, with any schedule"
@@ -179,6 +181,7 @@ class _Found:
     assemble: float
     prover: BuildProver
     bases: FoundBases | None = None
+    whole: str = ""
 
     @cached_property
     def trial(self) -> Trial | None:
@@ -235,13 +238,33 @@ def run(options: argparse.Namespace) -> Answer:
 
     bases = None if options.bases is None else _bases(options, asked.problem, choose)
     plan = choose(asked.problem) if bases is None else bases.plan
-    found = _Found(asked, plan, assemble, asked_prover(options, plan.engine.network), bases)
+    prover = asked_prover(options, plan.engine.network)
+    found = _Found(asked, plan, assemble, prover, bases, _from_empty(asked.whole, plan, choose))
 
     def files() -> dict[str, bytes | str]:
         made = plan_files(plan, found.report, found.prover, found.trial)
         return made if bases is None else made | {"bases.csv": csv_text(bases.tried)}
 
     return _answer(options, found, write_outputs(options, files))
+
+
+def _from_empty(whole: Problem | None, plan: Plan, choose: Callable[[Problem], Plan]) -> str:
+    """Return what the best build from an empty site takes, beside one that goes on; in words."""
+    if whole is None or plan.certificate is None:
+        return ""
+    begin = plan.steps[0].number - 1
+    done = f"what is left after step {begin}: {_values(plan)}"
+    try:
+        return f"{done}; from an empty site the best is {_values(choose(whole))}"
+    except InfeasibleError:
+        return f"{done}; from an empty site there is no plan"
+
+
+def _values(plan: Plan) -> str:
+    """Return the values of a plan and how many steps it has, in words."""
+    values = [f"{name} {value_text(name, v)}" for name, v in plan.objective.items()]
+    steps = [] if "steps" in plan.objective else [f"{len(plan.steps)} steps"]
+    return ", ".join([*values, *steps])
 
 
 def _bases(
@@ -276,6 +299,7 @@ def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]
     lines = [f"{_said(found)}; {written_to(options.out)}"]
     lines += [f"stability, {each}" for each in found.own]
     lines += [] if found.bases is None else [wrapped(found.bases.said)]
+    lines += [wrapped(found.whole)] if found.whole else []
     facts: dict[str, object] = {
         "scene": scene_facts(scene),
         "summary": found.report,

@@ -14,6 +14,7 @@ from seqopt._cli.options import (
     LIMIT,
     RULE,
     STANDING,
+    WHERE,
     declare,
     engine_options,
     form_options,
@@ -78,7 +79,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     declare(basic, AIM, default=FOUR)
     declare(basic, SCHEDULE, default=FREE)
     declare(basic, ROBOTS, default="")
-    declare(basic, LIMIT)
+    declare(basic, LIMIT | WHERE)
     declare(basic, {"--out DIR": "folder to write"}, required=True)
     choice = command.add_argument_group("which plan is picked, and when the search ends")
     declare(choice, CHOICE)

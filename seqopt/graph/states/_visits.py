@@ -17,7 +17,7 @@ from seqopt.sequence import _rule_space as free_space
 from seqopt.sequence._rule_space import FreeSpace, node_numbers
 from seqopt.sequence._schedule_space import ScheduleSpace
 from seqopt.sequence.rules import Ending
-from seqopt.sequence.site import begin_step
+from seqopt.sequence.site import _begin_step
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 
@@ -31,7 +31,7 @@ def steps_of(space: FreeSpace | ScheduleSpace, states: Sequence[Sequence[int]]) 
     if isinstance(space, ScheduleSpace):
         return _scheduled_steps(space, states)
     numbers = [None, *node_numbers(space.network)]
-    begin = begin_step(space.network.scene, space.rules.begin)
+    begin = _begin_step(space.network.scene, space.rules.begin)
     grips: list[int | None] = [*begin.grips]
     stays = _stays(space)  # where a robot was last, as a place from 1
     before, out = begin.bricks, list[Step]()
@@ -43,7 +43,8 @@ def steps_of(space: FreeSpace | ScheduleSpace, states: Sequence[Sequence[int]]) 
             took |= _follow(kind.robots, entries[first:end], grips, stays, numbers)
         stays = stays if space.parks else {}
         step = StepKind.PLACE if bricks > before else StepKind.REPOSITION
-        out.append(Step(len(out) + 1, step if took else StepKind.RELEASE, bricks, tuple(grips)))
+        number = begin.number + len(out) + 1
+        out.append(Step(number, step if took else StepKind.RELEASE, bricks, tuple(grips)))
         before = bricks
     return check_sequence(space.network.scene, out, begin)
 
@@ -54,8 +55,8 @@ def _stays(space: FreeSpace) -> dict[int, int]:
     if site is None:
         return {}
     lasts = (site.grips or (), site.stays)
-    found = (pair for nodes in lasts for pair in enumerate(nodes) if pair[1] is not None)
-    return {robot: numbers.index(node) + 1 for robot, node in [*found][::-1]}
+    found = [(r, n) for nodes in lasts for r, n in enumerate(nodes) if n is not None]
+    return {robot: numbers.index(node) + 1 for robot, node in found}
 
 
 def _scheduled_steps(space: ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
@@ -103,9 +104,9 @@ def steps_with(problem: States, regrips: Floats, held: Ints) -> Floats:
     end, or before the last step where that lets all go. Result (n,).
     """
     released = problem.free_rules.how_it_ends is not Ending.HELD
-    space = problem.space
-    placed = space.levels - space.first
-    return np.asarray(2 * placed + space.held_first + 2 * regrips - held + released)
+    begin, space = problem.free_rules.begin, problem.space
+    at_first = 0 if begin is None else begin.held
+    return np.asarray(2 * (space.levels - space.first) + at_first + 2 * regrips - held + released)
 
 
 def with_held(problem: States, graph: Graph, held: Bools) -> Graph:

@@ -65,11 +65,11 @@ def _least_of_all(problem: AllOrders, below: float, most: int, end: float) -> fl
 
     Of a worst step it is said whether some order stays below a value: zero, or infinity.
     """
-    empty: Key = (frozenset(), 0)
-    entries: dict[Key, list[_Entries]] = {empty: []}
+    first: Key = (frozenset(problem.stands), problem.stands[-1] if problem.stands else 0)
+    entries, later = _begin(problem, first)
     looked, least = 0, np.inf
-    for bricks in range(len(problem.scene.bricks) + 1):
-        following: dict[Key, list[_Entries]] = {}
+    for bricks in range(len(first[0]), len(problem.scene.bricks) + 1):
+        following, later = later, {}
         for key, parts in entries.items():
             looked += 1
             if looked > most or time.perf_counter() > end:
@@ -85,6 +85,26 @@ def _least_of_all(problem: AllOrders, below: float, most: int, end: float) -> fl
     return least
 
 
+def _begin(problem: AllOrders, key: Key) -> tuple[_ByKey, _ByKey]:
+    """Return what follows where builds begin: with the bricks there, and with one more."""
+    tables = Passable(problem.judging(_order(problem, key))).tables
+    start, later = tables.start(), _ByKey()
+    found = _Reached(start, np.zeros(1), tables)
+    for after, placed in _placed(problem, key, found):
+        later.setdefault(after, []).append(placed)
+    counted = problem.states.goals[0].measure is Measure.REGRIPS
+
+    def before(move: Follows) -> Floats:
+        return np.full(len(move.states), float(counted and move.regrip))
+
+    parts = [
+        _Entries(_renumbered(problem, key, move.states), before(move), move.way)
+        for move in tables.follow(len(key[0]), start)
+        if move.level == len(key[0])
+    ]
+    return ({key: parts} if parts else {}), later
+
+
 class _Entries(NamedTuple):
     """States to which a brick is placed: places in the scene's own order, as rows of tables.
 
@@ -95,6 +115,9 @@ class _Entries(NamedTuple):
     states: Ints
     before: Floats
     way: Floats
+
+
+_ByKey = dict[Key, list[_Entries]]
 
 
 class _Reached(NamedTuple):
@@ -116,7 +139,9 @@ def _of_the_whole(problem: AllOrders) -> float:
     least = -np.inf
     if sum(comb(len(nodes), count) for count in held) <= MOST_SETS:
         least = min((_least(free, nodes, count) for count in held), default=np.inf)
-    return least if free.free_rules.how_it_ends is Ending.HELD else max(least, _least(free, nodes, 0))
+    return (
+        least if free.free_rules.how_it_ends is Ending.HELD else max(least, _least(free, nodes, 0))
+    )
 
 
 def _least(free: States, nodes: list[int], count: int) -> float:
@@ -133,8 +158,6 @@ def _closed(problem: AllOrders, key: Key, parts: list[_Entries], below: float) -
     if passable.margins:
         asked = Asked((), (below,) if np.isfinite(below) else ())
     start = tables.start()
-    if not key[0]:
-        parts = [_Entries(start, np.zeros(1), np.zeros(1))]
     states, before, way = map(np.concatenate, zip(*parts, strict=True))
     rows = tables.in_order(_renumbered(problem, key, states, back=True).astype(start.dtype))
     part = passable.closed(len(key[0]), rows, asked)
@@ -149,7 +172,7 @@ def _closed(problem: AllOrders, key: Key, parts: list[_Entries], below: float) -
         target = order[at]
         ok = part.codes[target] == wanted
         taken = found._replace(way=found.way[ok])
-        amounts = passable.moved(part.values[target[ok]], taken)[:, 0] if key[0] else cost[ok]
+        amounts = passable.moved(part.values[target[ok]], taken)[:, 0]
         return source[ok], target[ok] + 1, amounts + cost[ok]
 
     none = np.zeros(len(rows), dtype=np.int64)

@@ -107,7 +107,7 @@ class RuleTables:
         Result (1, c).
         """
         limited = self._rules.regrips is not None
-        out = np.zeros((1, self.robots + limited), dtype=np.int32)
+        out: Ints = np.zeros((1, self.robots + limited), dtype=np.int32)
         _, held, regrips = self._book.start
         out[0, : self.robots] = [0 if held[r] is None else self._place[held[r]] for r in self.team]
         out[0, self.robots :] = min(regrips, self._rules.regrips or 0)
@@ -259,6 +259,7 @@ class ScheduleTables:
         scene, self.first = network.scene, 0
         self._schedule, self._parks = schedule, parks
         self.last, self.robots = len(schedule.steps), len(scene.robots)
+        self._before = schedule.steps[0].number - 1
         self.team = tuple(range(self.robots))
         self.nodes = np.array([-1, *(node for brick in scene.placed for node in brick.nodes)])
         at = [scene.node_position(node) for node in self.nodes[1:].tolist()]
@@ -273,7 +274,7 @@ class ScheduleTables:
 
     def start(self) -> Ints:
         """Return the state before the first step, (1, robots) int."""
-        site, out = self._schedule.begin, np.zeros((1, self.robots), dtype=np.int32)
+        site, out = self._schedule.begin, np.zeros((1, self.robots), dtype=np.int64)
         for robot, node in enumerate(() if site is None else site.grips or ()):
             stay = site.stays[robot] if site and site.stays and self._parks else None
             if node is not None or stay is not None:
@@ -291,7 +292,8 @@ class ScheduleTables:
             return
         source, after, way = np.arange(len(states)), states, np.zeros(len(states))
         for robot in range(self.robots):
-            source, after, way = self._moved(robot, level + 1, (source, after, way))
+            number = self._before + level + 1
+            source, after, way = self._moved(robot, number, (source, after, way))
         ok = self._postures.allow(self.bricks_at(level + 1), after)
         source, after, way = source[ok], after[ok], way[ok]
         regrip = self._schedule.steps[level].kind is StepKind.REPOSITION

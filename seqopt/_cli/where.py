@@ -1,0 +1,77 @@
+"""Where a build begins and ends, in words: a step of a plan, a state in a file, a brick count."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from seqopt.errors import StepError
+from seqopt.scene.scene import Scene
+from seqopt.sequence._parts import read_site, what_is_left
+from seqopt.sequence.rules import FreeRules
+from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.schedule_file import read_plan
+from seqopt.sequence.site import Site
+from seqopt.sequence.steps import Step
+
+FORMS = "PLAN:STEP (a plan's folder or CSV file), a STATE.json, or a number of bricks"
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a build begins or ends, and the steps that led there, where they are known."""
+
+    site: Site | None = None
+    done: tuple[Step, ...] | None = ()
+
+
+def asked_place(options: argparse.Namespace, name: str, scene: Scene) -> tuple[Scene, Place]:
+    """Return where an option, ``from`` or ``to``, says that a build begins or ends.
+
+    The scene is returned in an order that begins with the bricks that stand.
+    """
+    text = getattr(options, name, None)
+    if text is None:
+        return scene, Place()
+    try:
+        return _read(scene, text, bare=name == "from")
+    except StepError as error:
+        raise StepError(f"--{name} {text}: {error}") from None
+
+
+def _read(scene: Scene, text: str, *, bare: bool) -> tuple[Scene, Place]:
+    if text.isdecimal():
+        grips = (None,) * len(scene.robots) if bare else None
+        site = Site(int(text), grips)
+        site.holds(scene)
+        return scene, Place(site, None if site.bricks else ())
+    file, _, step = text.rpartition(":")
+    if file and step.isdecimal():
+        return scene, _of_plan(scene, Path(file), int(step))
+    if not text.endswith(".json"):
+        raise StepError(f"give {FORMS}")
+    found, site = read_site(scene, Path(text))
+    return found, Place(site, None)
+
+
+def _of_plan(scene: Scene, path: Path, step: int) -> Place:
+    """Return where a plan stands after a step."""
+    steps = read_plan(scene, path / "plan.csv" if path.is_dir() else path)
+    site = Site.after(steps, step)
+    done = tuple(each for each in steps if each.number <= step)
+    return Place(site, done if steps[0].number == 1 else None)
+
+
+def between(moves: Schedule | FreeRules, begin: Place, end: Place) -> Schedule | FreeRules:
+    """Return the moves that are left between two places."""
+    if begin.site is None and end.site is None:
+        return moves
+    if isinstance(moves, FreeRules):
+        return replace(moves, begin=begin.site, finish=end.site)
+    if begin.done is None or end.done is None:
+        raise StepError(
+            f"schedule {moves.method}: it goes on, and ends, at a step of a plan of its own; give "
+            "PLAN:STEP, or --schedule free"
+        )
+    return what_is_left(moves, begin.done, end.site)

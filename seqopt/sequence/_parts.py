@@ -1,0 +1,136 @@
+"""Parts of builds: the state of a site from a file, and what is left of a schedule."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from seqopt._files import read_text
+from seqopt.errors import StepError, did_you_mean
+from seqopt.scene._checks import short
+from seqopt.scene.scene import Scene, in_order
+from seqopt.sequence.schedule import Move, OpenGrip, Schedule
+from seqopt.sequence.site import Site
+from seqopt.sequence.steps import Step
+
+KEYS = ("bricks", "grips", "last", "regrips", "step", "measured")
+
+
+def read_site(scene: Scene, path: Path) -> tuple[Scene, Site]:
+    """Return a site from a JSON file, and the scene in an order that begins with its bricks."""
+    where = f"state {path}"
+    try:
+        told = json.loads(read_text(path))
+    except ValueError as error:
+        raise StepError(f"{where}: not a readable JSON file: {error}") from None
+    if not isinstance(told, dict) or "bricks" not in told:
+        raise StepError(f"{where}: give an object with bricks, and grips by robot")
+    for key in told:
+        if key not in KEYS:
+            hint = did_you_mean(key, KEYS)
+            raise StepError(f"{where}: {key} is not known{hint}; give {', '.join(KEYS)}")
+    scene, count = _standing(scene, told["bricks"], where)
+    grips = _by_robot(scene, told.get("grips"), f"{where}, grips")
+    last = _by_robot(scene, told.get("last", {}), f"{where}, last") or ()
+    more = {key: told[key] for key in ("regrips", "step") if key in told}
+    if any(not isinstance(value, int) or value < 0 for value in more.values()):
+        raise StepError(f"{where}: {short(more)}; give whole numbers from 0")
+    site = Site(count, grips, last, **more)
+    try:
+        site.holds(scene)
+    except StepError as error:
+        raise StepError(f"{where}: {error}") from None
+    return scene, site
+
+
+def _standing(scene: Scene, told: object, where: str) -> tuple[Scene, int]:
+    """Return a scene in an order that begins with bricks that stand, and how many these are."""
+    if isinstance(told, int) and not isinstance(told, bool):
+        return scene, told
+    known = scene.build_order
+    if not isinstance(told, list) or any(name not in known for name in told):
+        raise StepError(f"{where}: bricks {short(told)}; give their number, or names of the scene")
+    if len({*told}) < len(told):
+        raise StepError(f"{where}: a brick of {short(told)} stands there twice; name it once")
+    if {*told} == {*known[: len(told)]}:
+        return scene, len(told)
+    return in_order(scene, (*told, *(name for name in known if name not in told))), len(told)
+
+
+def _by_robot(scene: Scene, told: object, where: str) -> tuple[int | None, ...] | None:
+    """Return nodes by robot; None where nothing is said."""
+    if told is None:
+        return None
+    names = [robot.name for robot in scene.robots]
+    if not isinstance(told, Mapping) or any(name not in names for name in told):
+        raise StepError(f"{where}: {short(told)}; give nodes by robot, of {', '.join(names)}")
+    return tuple(told.get(name) for name in names)
+
+
+def what_is_left(schedule: Schedule, done: Sequence[Step], to: Site | None = None) -> Schedule:
+    """Return what is left of a schedule after steps that were done; their grips stay chosen.
+
+    ``to``: where it ends before its last step; grips that last until then are its own. Raises
+    `StepError` if what was done is not the schedule, or nothing is left.
+    """
+    last = len(schedule.steps) if to is None else to.step
+    if not len(done) < last <= len(schedule.steps):
+        raise StepError(
+            f"schedule {schedule.method} has {len(schedule.steps)} steps: none is left from "
+            f"step {len(done)} to {last}"
+        )
+    _require_done(schedule, done)
+    given = {}
+    if done:
+        given = _held(schedule, len(done), done[-1].grips)
+    if to is not None and to.grips is not None:
+        given |= _held(schedule, last, to.grips)
+    rest = schedule.steps[len(done) : last]
+    left = sorted({move for step in rest for move in step.moves} - {*given})
+    number = {move: k for k, move in enumerate(left)}
+
+    def known(grip: object) -> int | OpenGrip | None:
+        if isinstance(grip, OpenGrip):
+            return given[grip.move] if grip.move in given else OpenGrip(number[grip.move])
+        return grip  # type: ignore[return-value]
+
+    steps = tuple(replace(step, grips=tuple(map(known, step.grips))) for step in rest)
+    held = [{g for s in steps if k in s.moves for g in s.grips} for k in range(len(left))]
+    moves = tuple(_apart(schedule.moves[move], held[k]) for k, move in enumerate(left))
+    begin = Site.after(done, done[-1].number) if done else None
+    return replace(schedule, steps=steps, moves=moves, begin=begin)
+
+
+def _held(schedule: Schedule, count: int, grips: Sequence[int | None]) -> dict[int, int | None]:
+    """Return the nodes of moves that are held after so many steps."""
+    planned = schedule.steps[count - 1].grips
+    pairs = zip(planned, grips, strict=True)
+    return {grip.move: node for grip, node in pairs if isinstance(grip, OpenGrip)}
+
+
+def _apart(move: Move, held: Collection[object]) -> Move:
+    """Return a move with the candidates that no given grip holds while it lasts."""
+    found = tuple(node for node in move.candidates if node not in held)
+    if not found:
+        raise StepError(f"step {move.step}: others hold every node that {move.robot} may hold")
+    return replace(move, candidates=found)
+
+
+def _require_done(schedule: Schedule, done: Sequence[Step]) -> None:
+    """Require that steps are the first ones of a schedule."""
+    for step, planned in zip(done, schedule.steps, strict=False):
+        same = (step.number, step.kind, step.bricks) == (
+            planned.number,
+            planned.kind,
+            planned.bricks,
+        )
+        for node, grip in zip(step.grips, planned.grips, strict=True):
+            open_ = isinstance(grip, OpenGrip) and node in schedule.moves[grip.move].candidates
+            same &= open_ or node == grip
+        if not same:
+            raise StepError(
+                f"step {step.number} of what was done is none of schedule {schedule.method}; go "
+                "on with the free schedule"
+            )
