@@ -33,6 +33,7 @@ _HOMES = {
     "sequence.schedule": ("Schedule",),
     "sequence.two_robots": ("sequential", "cantilever"),
     "sequence.three_robots": ("three_robot_loop", "modified_sequential"),
+    "sequence.site": ("Site",),
     "sequence.schedule_file": ("read_plan", "read_schedule"),
     "engines.interface": ("Engine",),
     "engines.registry": ("make_engine",),

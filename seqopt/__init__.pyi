@@ -28,6 +28,7 @@ from seqopt.sequence.rules import FreeRules as FreeRules
 from seqopt.sequence.schedule import Schedule as Schedule
 from seqopt.sequence.schedule_file import read_plan as read_plan
 from seqopt.sequence.schedule_file import read_schedule as read_schedule
+from seqopt.sequence.site import Site as Site
 from seqopt.sequence.steps import Step as Step
 from seqopt.sequence.three_robots import modified_sequential as modified_sequential
 from seqopt.sequence.three_robots import three_robot_loop as three_robot_loop

@@ -1,0 +1,325 @@
+"""The best next move from every state of a free schedule, as a table to look it up."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, NamedTuple
+from zipfile import BadZipFile
+
+import numpy as np
+
+from seqopt._files import read_bytes, write_bytes
+from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.errors import FileError, ProblemError, StepError
+from seqopt.graph._explore import Visited
+from seqopt.graph._to_go import to_go
+from seqopt.graph.states._visits import explore
+from seqopt.graph.states.states import States
+from seqopt.plan.judge._policy import check_policy
+from seqopt.plan.solving import states_of
+from seqopt.problem.problem import Problem
+from seqopt.sequence._rule_space import node_numbers
+from seqopt.sequence.site import Site
+from seqopt.sequence.steps import StepKind
+
+FILE = "policy.npz"
+
+
+class Advice(NamedTuple):
+    """The best next move from a state.
+
+    Attributes
+    ----------
+    kind : StepKind or None
+        What it does; None where the build has ended.
+    robots : tuple of str
+        Who moves; several where all let go at once.
+    nodes : tuple of int
+        The nodes that they take or let go.
+    site : Site
+        Where the build stands then.
+    values : mapping of str to float
+        The least that every goal takes of the rest of the build, this move included.
+    brick : int
+        The brick that is placed; zero where none is.
+    """
+
+    kind: StepKind | None
+    robots: tuple[str, ...]
+    nodes: tuple[int, ...]
+    site: Site
+    values: Mapping[str, float]
+    brick: int = 0
+
+    def __str__(self) -> str:
+        who, what = ", ".join(self.robots), ", ".join(map(str, self.nodes))
+        if self.kind is None:
+            return "the build has ended"
+        if self.kind is StepKind.RELEASE:
+            return f"{who} {'lets' if len(self.robots) == 1 else 'let'} go of node {what}"
+        if self.kind is StepKind.PLACE:
+            return f"{who} places brick {self.brick} and holds it at node {what}"
+        return f"{who} takes hold of node {what}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Policy(FrozenValue):
+    """What is best from every state that a free schedule reaches, whatever happened before.
+
+    Attributes
+    ----------
+    goals : tuple of str
+        What is to be small, the most important first.
+    robots : tuple of str
+        The scene's robots.
+    kinds : tuple of tuple of int
+        Indices of the robots of every column, by kind: robots of a kind could change places.
+    order : (B,) int
+        The bricks in build order.
+    nodes : (2B,) int
+        The nodes in build order; states have their places in it, from 1.
+    bricks : (n,) int
+        How many bricks stand in every state.
+    held : (n, c) int
+        Places of the nodes that robots hold, 0 for a robot that is free, -n for one that was last
+        at n where travel counts; then the grips since the last brick where a rule counts them.
+    values : (n, g) float
+        The least that goals take of the rest of a build; infinite where no end is reached.
+    following : (n,) int
+        The state that the best move leads to; -1 where the build has ended, or cannot end.
+    checked : int
+        How many moves the judge compared with the values of the first goal, which they prove.
+    """
+
+    goals: tuple[str, ...]
+    robots: tuple[str, ...]
+    kinds: tuple[tuple[int, ...], ...]
+    order: Ints
+    nodes: Ints
+    bricks: Ints
+    held: Ints
+    values: Floats
+    following: Ints
+    checked: int = 0
+
+    def __repr__(self) -> str:
+        stuck = f", {self.dead_ends} without an end" if self.dead_ends else ""
+        return f"<Policy: {len(self.bricks)} states{stuck}, {', '.join(self.goals)}>"
+
+    @property
+    def dead_ends(self) -> int:
+        """From how many states no end is reached: robots must not go there."""
+        return int(np.isinf(self.values[:, 0]).sum())
+
+    def best(self, site: Site) -> Advice:
+        """Return the best next move from a site.
+
+        Raises `StepError` if no build reaches it by the rules, or no end is reached from it.
+        """
+        row = self._row_of(site)
+        values = dict(zip(self.goals, self.values[row].tolist(), strict=True))
+        after = int(self.following[row])
+        if after < 0 and np.isinf(self.values[row, 0]):
+            raise StepError("site: no end is reached from it; let robots go elsewhere, or replan")
+        if after < 0:
+            return Advice(None, (), (), site, values)
+        return self._move(site, row, after, values)
+
+    def _move(self, site: Site, row: int, after: int, values: Mapping[str, float]) -> Advice:
+        """Return the move from a site to the state of a row."""
+        grips = list(site.grips or (None,) * len(self.robots))
+        stays = list(site.stays or (None,) * len(self.robots))
+        moved: list[tuple[int, int]] = []
+        taken = False
+        for kind, column in zip(self.kinds, self._columns, strict=True):
+            old, new = self.held[row, column], self.held[after, column]
+            for place in {*old[old > 0].tolist()} - {*new[new > 0].tolist()}:
+                node = int(self.nodes[place - 1])
+                robot = next(r for r in kind if grips[r] == node)
+                grips[robot], stays[robot] = None, node
+                moved.append((robot, node))
+            for place in {*new[new > 0].tolist()} - {*old[old > 0].tolist()}:
+                left = [*new[new <= 0].tolist()]
+                robot = self._taker(kind, (grips, stays), left)
+                grips[robot], taken = int(self.nodes[place - 1]), True
+                moved.append((robot, int(self.nodes[place - 1])))
+        bricks = int(self.bricks[after])
+        regrips = site.regrips + taken if bricks == site.bricks else 0
+        kept = tuple(s if g is None else None for s, g in zip(stays, grips, strict=True))
+        then = Site(bricks, tuple(grips), kept, regrips, site.step + 1)
+        kind_of = StepKind.PLACE if bricks > site.bricks else StepKind.REPOSITION
+        names, nodes = tuple(self.robots[r] for r, _ in moved), tuple(node for _, node in moved)
+        brick = int(self.order[bricks - 1]) if bricks > site.bricks else 0
+        return Advice(kind_of if taken else StepKind.RELEASE, names, nodes, then, values, brick)
+
+    def _taker(
+        self, kind: tuple[int, ...], now: tuple[list[Any], list[Any]], left: list[int]
+    ) -> int:
+        """Return which free robot of a kind takes a grip: one that is not seen to stay free."""
+        free = [r for r in kind if now[0][r] is None]
+        place = {int(n): i for i, n in enumerate(self.nodes, start=1)}
+        for robot in reversed(free):
+            stay = -place.get(now[1][robot], 0)
+            if stay in left and len(free) > 1:
+                left.remove(stay)
+                free.remove(robot)
+        return free[0]
+
+    @cached_property
+    def _columns(self) -> tuple[slice, ...]:
+        ends = np.cumsum([0, *map(len, self.kinds)]).tolist()
+        return tuple(slice(a, b) for a, b in pairwise(ends))
+
+    @cached_property
+    def _rows(self) -> dict[bytes, int]:
+        keys = np.column_stack([self.bricks, self.held]).astype(np.int32)
+        return {key.tobytes(): i for i, key in enumerate(keys)}
+
+    @cached_property
+    def _place(self) -> dict[int | None, int]:
+        return {int(node): i for i, node in enumerate(self.nodes, start=1)}
+
+    @cached_property
+    def _parks(self) -> bool:
+        """Whether it counts where free robots held last."""
+        return bool((self.held < 0).any())
+
+    def _row_of(self, site: Site) -> int:
+        """Return the row of a site."""
+        grips = site.grips or (None,) * len(self.robots)
+        stays = site.stays or (None,) * len(self.robots)
+        key = [site.bricks]
+        for kind in self.kinds:
+            places = [
+                self._place.get(grips[r], -self._place.get(stays[r], 0) if self._parks else 0)
+                for r in kind
+            ]
+            key += sorted(places, reverse=True)
+        if self.held.shape[1] > self._columns[-1].stop:
+            key.append(site.regrips)
+        row = self._rows.get(np.array(key, dtype=np.int32).tobytes())
+        if row is None:
+            raise StepError(
+                "site: no build by these rules and limits reaches it; plan from it with "
+                "optimize --from"
+            )
+        return row
+
+    def save(self, path: str | Path) -> Path:
+        """Write the table to an npz file; see `load`."""
+        names = ("goals", "robots", "kinds", "checked")
+        told = {name: getattr(self, name) for name in names}
+        arrays = {name: getattr(self, name) for name in ARRAYS}
+        arrays["held"] = _small(self.held)
+        buffer = io.BytesIO()
+        np.savez_compressed(buffer, allow_pickle=False, told=json.dumps(told), **arrays)
+        write_bytes(Path(path), buffer.getvalue())
+        return Path(path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Policy:
+        """Return the policy of a file."""
+        content = io.BytesIO(read_bytes(Path(path)))
+        try:
+            with np.load(content, allow_pickle=False) as found:
+                told, arrays = json.loads(str(found["told"])), [found[name] for name in ARRAYS]
+        except (ValueError, KeyError, OSError, BadZipFile) as error:
+            raise FileError(f"{path}: it is no policy ({error}); write one with --policy") from None
+        kinds = tuple(map(tuple, told["kinds"]))
+        names = tuple(told["goals"]), tuple(told["robots"])
+        order, nodes, bricks, held, values, following = arrays
+        return cls(*names, kinds, order, nodes, bricks, held, values, following, told["checked"])
+
+
+ARRAYS = ("order", "nodes", "bricks", "held", "values", "following")
+
+
+def _small(values: Ints) -> Ints:
+    """Return whole numbers in the smallest type that holds them."""
+    return values.astype(
+        np.min_scalar_type(min(int(values.min(initial=0)), -int(values.max()) - 1))
+    )
+
+
+def find_policy(
+    problem: Problem, tell: Callable[[object], object] = lambda _: None, *, proof: bool = True
+) -> Policy:
+    """Return what is best from every state that the builds of a free schedule reach.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of rules; its aims have at most one worst step, which totals may precede and follow.
+    tell : callable, optional
+        Told what is being done.
+    proof : bool, optional
+        Whether a second version of the rules and responses computed anew check every move.
+
+    Returns
+    -------
+    Policy
+
+    Raises
+    ------
+    ProblemError
+        If aims are margins or totals over scenarios, or there are budgets.
+    SolverError
+        If the check finds a move that leads to less than the table says.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> from seqopt.plan.policy import find_policy
+    >>> scene = seqopt.load_scene("arch:bricks=5")
+    >>> engine = seqopt.make_engine("compliance", scene)
+    >>> worst = seqopt.CRITERIA["worst-ratio"]
+    >>> problem = seqopt.pose(engine, seqopt.FreeRules(), worst, "minmax,steps")
+    >>> policy = find_policy(problem)
+    >>> str(policy.best(seqopt.Site(0)))
+    'rob1 places brick 1 and holds it at node 1'
+    """
+    states = states_of(problem)
+    why = {
+        "budgets": states.budgets,
+        "margins as aims": any(goal.of_margins for goal in states.goals),
+        "totals over scenarios": states.totals,
+        "all orders": problem.orders is not None,
+    }
+    for name in (name for name, asked in why.items() if asked):
+        raise ProblemError(f"a policy has no {name}: what is best depends on what was before")
+    states.free_rules  # noqa: B018  # a schedule has no policy, and says so
+    tell("looking at every state")
+    found = explore(states)
+    found.refine()
+    visited = found.graph()
+    policy = _of_graph(states, visited)
+    if not proof:
+        return policy
+    tell("proving that no move is better")
+    table = policy.bricks, policy.held, policy.values[:, 0], policy.following
+    return replace(policy, checked=check_policy(states, *table))
+
+
+def _of_graph(states: States, visited: Visited) -> Policy:
+    """Return the policy of all states of a graph."""
+    graph, space = visited.graph, states.space
+    left = to_go(graph)
+    after = np.where(left.move < 0, -1, graph.target[left.move])
+    levels = [np.full(len(rows), level) for level, _, rows in visited.states]
+    return Policy(
+        states.names,
+        tuple(robot.name for robot in states.network.scene.robots),
+        tuple(kind.robots for kind in space.kinds),
+        np.array(states.network.scene.build_order),
+        np.array(node_numbers(states.network)),
+        np.concatenate(levels).astype(np.int16),
+        np.concatenate([rows for *_, rows in visited.states]),
+        left.values,
+        after.astype(np.int32),
+    )
