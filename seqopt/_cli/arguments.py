@@ -93,6 +93,8 @@ class _Command:
 COMMANDS = {
     "compare": _Command("show all ways to build a scene side by side", "commands.compare"),
     "optimize": _Command("choose where robots hold, and write the plan", "commands.optimize"),
+    "replan": _Command("plan the rest of a build after a change", "commands.replan"),
+    "next": _Command("look up the best next move of a build", "commands.next"),
     "pareto": _Command("find all plans that no other one beats in every aim", "commands.pareto"),
     "analyze": _Command("compute forces and displacements in every step", "commands.analyze"),
     "assess": _Command("prove which steps stand, and with what margins", "commands.assess"),

@@ -88,10 +88,7 @@ def asked_problem(options: argparse.Namespace) -> Asked:
         scene = without_arms(scene)  # bases are chosen afterwards
     if options.robots.isdecimal():
         scene = with_robots(scene, int(options.robots))
-    scene, begin = asked_place(options, "from", scene)
-    later, end = asked_place(options, "to", scene)
-    if later != scene:
-        raise StepError(f"--to {options.to}: its bricks are not those that follow in this order")
+    scene, begin, end = _asked_ends(options, scene)
     find_postures(scene, getattr(options, "cache", None), options.tell)
     words: dict[str, Any] = {"limits": parse_limits(options.limit, scene)}
     budgets = getattr(options, "budget", [])
@@ -112,10 +109,21 @@ def asked_problem(options: argparse.Namespace) -> Asked:
     words |= {"orders": Orders.TIED} if sought else {}
     problem = posed(engine, moves, criterion, options.aim, **words)
     whole = None
-    if begin.site is not None:
+    if begin.site is not None and not hasattr(options, "change"):
         start = between(every, Place(), end)
         whole = posed(engine, start, criterion, options.aim, **words)
     return Asked(scene, problem, whole, aim, known, unseen)
+
+
+def _asked_ends(options: argparse.Namespace, scene: Scene) -> tuple[Scene, Place, Place]:
+    """Return where a build begins and ends, and the scene after what has changed."""
+    scene, begin = asked_place(options, "from", scene)
+    if hasattr(options, "change"):
+        scene, begin, options.robots = options.change(scene, begin)
+    later, end = asked_place(options, "to", scene)
+    if later != scene:
+        raise StepError(f"--to {options.to}: its bricks are not those that follow in this order")
+    return scene, begin, end
 
 
 def _wants_states(options: argparse.Namespace) -> bool:

@@ -6,6 +6,7 @@ import argparse
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from seqopt._files import read_text
 from seqopt.errors import StepError
 from seqopt.scene.scene import Scene
 from seqopt.sequence._parts import read_site, what_is_left
@@ -35,12 +36,16 @@ def asked_place(options: argparse.Namespace, name: str, scene: Scene) -> tuple[S
     if text is None:
         return scene, Place()
     try:
-        return _read(scene, text, bare=name == "from")
+        return read_place(scene, text, bare=name == "from")
     except StepError as error:
         raise StepError(f"--{name} {text}: {error}") from None
 
 
-def _read(scene: Scene, text: str, *, bare: bool) -> tuple[Scene, Place]:
+def read_place(scene: Scene, text: str, *, bare: bool = True) -> tuple[Scene, Place]:
+    """Return a place from words, and the scene in an order that begins with its bricks.
+
+    ``bare``: whether a number of bricks stands for these with nobody holding any.
+    """
     if text.isdecimal():
         grips = (None,) * len(scene.robots) if bare else None
         site = Site(int(text), grips)
@@ -56,8 +61,16 @@ def _read(scene: Scene, text: str, *, bare: bool) -> tuple[Scene, Place]:
 
 
 def _of_plan(scene: Scene, path: Path, step: int) -> Place:
-    """Return where a plan stands after a step."""
-    steps = read_plan(scene, path / "plan.csv" if path.is_dir() else path)
+    """Return where a plan stands after a step; robots that it does not know hold nothing."""
+    file = path / "plan.csv" if path.is_dir() else path
+    columns = read_text(file).partition("\n")[0].split(",")
+    known = [robot for robot in scene.robots if f"{robot.name}_node" in columns]
+    steps = read_plan(scene.with_robots(*known) if known else scene, file)
+    where = [known.index(robot) if robot in known else None for robot in scene.robots]
+    if known != [*scene.robots]:
+        steps = tuple(
+            replace(s, grips=tuple(None if k is None else s.grips[k] for k in where)) for s in steps
+        )
     site = Site.after(steps, step)
     done = tuple(each for each in steps if each.number <= step)
     return Place(site, done if steps[0].number == 1 else None)

@@ -213,14 +213,18 @@ class Policy(FrozenValue):
 
     def save(self, path: str | Path) -> Path:
         """Write the table to an npz file; see `load`."""
+        write_bytes(Path(path), self.content())
+        return Path(path)
+
+    def content(self) -> bytes:
+        """Return what `save` writes."""
         names = ("goals", "robots", "kinds", "checked")
         told = {name: getattr(self, name) for name in names}
         arrays = {name: getattr(self, name) for name in ARRAYS}
         arrays["held"] = _small(self.held)
         buffer = io.BytesIO()
         np.savez_compressed(buffer, allow_pickle=False, told=json.dumps(told), **arrays)
-        write_bytes(Path(path), buffer.getvalue())
-        return Path(path)
+        return buffer.getvalue()
 
     @classmethod
     def load(cls, path: str | Path) -> Policy:

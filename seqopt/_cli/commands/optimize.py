@@ -46,6 +46,7 @@ from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.out_of_sample import Trial, judge_unseen, worst_values
 from seqopt.plan.plan import Plan
+from seqopt.plan.policy import FILE, find_policy
 from seqopt.plan.solving import solve, usual
 from seqopt.problem._arms import faults_in_words
 from seqopt.problem.problem import Problem
@@ -121,6 +122,10 @@ WORKERS = {
     "--workers N": "processes to share the work among; pays from about ten seconds (default: "
     "%(default)s)"
 }
+POLICY = {
+    "--policy": "write policy.npz too: the best next move from every state that builds reach "
+    "(needs --out; seqopt next looks it up)"
+}
 BASES = {
     "--bases grid|FILE": "with --schedule free: where the bases of arms stand is chosen too, by "
     "the best plan that they allow: among places of a grid around the bricks (grid:METERS for its "
@@ -141,7 +146,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     form_options(command, strict=True, builds=True)
     states = "what plans are compared by, state after state, with any schedule"
     declare(command.add_argument_group(states), AIM | STANDING)
-    declare(command.add_argument_group("with --schedule free"), RULE | BASES)
+    declare(command.add_argument_group("with --schedule free"), RULE | BASES | POLICY)
     criterion_options(command)
     engine_options(command)
     declare(command.add_argument_group("how far the search goes (advanced)"), SEARCH)
@@ -173,7 +178,7 @@ def _basic(command: argparse.ArgumentParser) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class _Found:
+class Found:
     """A plan, what was asked, and how the plan does in scenarios that it was not chosen by."""
 
     asked: Asked
@@ -224,7 +229,14 @@ class _Found:
 
 def run(options: argparse.Namespace) -> Answer:
     """Choose every open grip of a build, or every step, and write the plan."""
+    return answered(options, find(options))
+
+
+def find(options: argparse.Namespace) -> Found:
+    """Choose every open grip of a build, or every step."""
     limit = parse_time_limit(options.time_limit)
+    if getattr(options, "policy", False) and options.out is None:
+        raise ProblemError("--policy: it is written to a folder; give --out DIR")
     require_out(options, *ALWAYS)
     start = time.perf_counter()
     asked = asked_problem(options)
@@ -239,10 +251,17 @@ def run(options: argparse.Namespace) -> Answer:
     bases = None if options.bases is None else _bases(options, asked.problem, choose)
     plan = choose(asked.problem) if bases is None else bases.plan
     prover = asked_prover(options, plan.engine.network)
-    found = _Found(asked, plan, assemble, prover, bases, _from_empty(asked.whole, plan, choose))
+    return Found(asked, plan, assemble, prover, bases, _from_empty(asked.whole, plan, choose))
+
+
+def answered(options: argparse.Namespace, found: Found) -> Answer:
+    """Write a plan, and return what it is worth."""
+    plan, bases = found.plan, found.bases
 
     def files() -> dict[str, bytes | str]:
         made = plan_files(plan, found.report, found.prover, found.trial)
+        if getattr(options, "policy", False):
+            made[FILE] = find_policy(found.asked.problem, options.tell).content()
         return made if bases is None else made | {"bases.csv": csv_text(bases.tried)}
 
     return _answer(options, found, write_outputs(options, files))
@@ -290,7 +309,7 @@ def _how(options: argparse.Namespace, formulation: Formulation) -> dict[str, Any
     return {"proof": not options.no_proof, "lazy": options.lazy, **how}
 
 
-def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]) -> Answer:
+def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...]) -> Answer:
     """Return what a plan is worth, once it is written."""
     plan = found.plan
     table, scene = plan.responses(), plan.engine.network.scene
@@ -330,7 +349,7 @@ def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]
     return strictly(answer, options, over, plan.departures, found.verdicts, unreached)
 
 
-def _said(found: _Found) -> str:
+def _said(found: Found) -> str:
     """Return what a plan is worth, in a line."""
     plan = found.plan
     how = f"{plan.formulation.name} ({plan.formulation.kind.value})"

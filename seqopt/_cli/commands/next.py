@@ -1,0 +1,62 @@
+"""The command ``next``: the best next move from a state, looked up in a policy."""
+
+from __future__ import annotations
+
+import argparse
+
+from seqopt._cli.answer import Answer
+from seqopt._cli.options import declare, form_options
+from seqopt._cli.where import read_place
+from seqopt.errors import StepError
+from seqopt.plan.policy import FILE, Advice, Policy
+from seqopt.responses._tolerance import value_text
+from seqopt.scene.scene_file import load_scene
+
+DESCRIPTION = (
+    "Print the best next move from a state of a build, whatever happened before, and what the rest "
+    "of the build then takes; looked up in the policy that optimize --policy writes."
+)
+EXAMPLES = ("seqopt next free:12 --policy free", "seqopt next state.json --policy free --json")
+PLACE = {
+    "state PLAN:STEP|STATE|N": "where the build stands: after a step of a plan, in a state of a "
+    "JSON file, or with so many bricks that nobody holds"
+}
+POLICY = {"--policy DIR": "folder that optimize --policy wrote"}
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``next``."""
+    basic = command.add_argument_group("where the build stands")
+    declare(basic, PLACE)
+    declare(basic, POLICY, required=True)
+    form_options(command)
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Print the best next move."""
+    scene = load_scene(options.policy / "scene.json")
+    policy = Policy.load(options.policy / FILE)
+    found, place = read_place(scene, options.state)
+    if found != scene or place.site is None:
+        raise StepError(f"state {options.state}: the policy is of another order; plan from there")
+    advice = policy.best(place.site)
+    facts = {
+        "move": str(advice),
+        "kind": advice.kind.value if advice.kind else None,
+        "robots": advice.robots,
+        "nodes": advice.nodes,
+        "rest": dict(advice.values),
+        "then": advice.site.described(scene),
+        "proven": policy.checked,
+    }
+    return Answer(facts=facts, text="\n".join(_lines(advice, policy)))
+
+
+def _lines(advice: Advice, policy: Policy) -> list[str]:
+    """Return a move and what is left, in words."""
+    values = ", ".join(f"{name} {value_text(name, v)}" for name, v in advice.values.items())
+    first = policy.goals[0]
+    proof = "the table was not checked"
+    if policy.checked:
+        proof = f"{policy.checked:,} moves prove that nothing has a lower {first}"
+    return [str(advice), f"the rest takes: {values}; {proof}"]

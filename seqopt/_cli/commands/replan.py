@@ -1,0 +1,186 @@
+"""The command ``replan``: the rest of a build, after something has changed."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from seqopt._cli.answer import Answer
+from seqopt._cli.arguments import parser
+from seqopt._cli.commands import optimize
+from seqopt._cli.options import (
+    LIMIT,
+    RULE,
+    STANDING,
+    criterion_options,
+    declare,
+    engine_options,
+    form_options,
+)
+from seqopt._cli.terminal import wrapped
+from seqopt._cli.values import number_word
+from seqopt._cli.where import Place
+from seqopt._files import read_text
+from seqopt.errors import FileError, InfeasibleError, StepError
+from seqopt.plan._replan import compared, without
+from seqopt.responses._tolerance import value_text
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.rules import FREE, with_robots
+from seqopt.sequence.schedule_file import read_plan
+from seqopt.study.published import CRITERIA
+
+DESCRIPTION = (
+    "Plan the rest of a build from one of its steps, after something has changed: a robot is lost, "
+    "carries less or is new, a brick is missing. Any robot may release, hold or place next; aims, "
+    "criterion and rules are those of the plan, if nothing else is said."
+)
+USAGE = ("PLAN_DIR --at STEP [what has changed] [--out DIR] [other options]",)
+EXAMPLES = (
+    "seqopt replan free --at 12 --lost rob3 --rule least_grips=1",
+    "seqopt replan free --at 12 --payload rob1=250 --out weaker",
+    "seqopt replan free --at 12 --robots 4 --missing 9",
+)
+PLACE = {"plan PLAN_DIR": "folder that optimize wrote: its plan, scene and summary"}
+CHANGES = {
+    "--lost ROBOT ...": "robot that lets go and takes no further part",
+    "--payload ROBOT=NEWTON ...": "what a robot may carry from now on",
+    "--grips STIFFNESS": "how stiff grips are, as of optimize",
+    "--robots N": "how many robots there are from now on: new ones reach every node",
+    "--missing BRICK ...": "brick that is not there: one that stood is placed again next, one that "
+    "was still to come waits until all are placed that do not hang on it",
+    "--to PLAN:STEP|STATE|N": "where the build ends, as of optimize",
+}
+ASKED = ("aim", "criteria", "limit", "rule", "stands", "friction", "tilt")
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``replan``."""
+    basic = command.add_argument_group("which plan, and where it stands")
+    declare(basic, PLACE)
+    declare(basic, {"--at STEP": "number of the last step that was done"}, required=True)
+    declare(basic, {"--out DIR": "folder to write the new plan to"})
+    declare(command.add_argument_group("what has changed"), CHANGES)
+    asked = command.add_argument_group("what is asked, if not as before")
+    declare(asked, optimize.AIM | LIMIT | RULE | STANDING)
+    form_options(command, strict=True, builds=True)
+    criterion_options(command)
+    engine_options(command)
+    declare(command.add_argument_group("time"), optimize.TIME)
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Plan the rest of a build, and say what changes."""
+    scene_file = options.plan / "scene.json"
+    scene = load_scene(scene_file)
+    steps = read_plan(scene, options.plan / "plan.csv")
+    for name in ("at", "robots"):
+        if not (getattr(options, name) or "0").isdecimal():
+            raise StepError(f"--{name} {getattr(options, name)}: give a number")
+    base = _as_optimize(options, scene_file)
+    try:
+        found = optimize.find(base)
+    except InfeasibleError as error:
+        asked = int(options.robots or 0)
+        raise InfeasibleError(f"{error}{_with_another(base, scene, asked)}") from None
+    answer = optimize.answered(base, found)
+    old = [step for step in steps if step.number > int(options.at)]
+    facts = compared(found.plan, old)
+    return replace(
+        answer,
+        facts={**answer.facts, "replanned": facts},
+        text="\n".join([*map(wrapped, _in_words(facts)), answer.text]),
+    )
+
+
+def _as_optimize(options: argparse.Namespace, scene_file: Path) -> argparse.Namespace:
+    """Return what is asked, as words of ``optimize`` that go on from the step."""
+    words = ["optimize", str(scene_file), "--schedule", FREE]
+    base = parser("optimize").parse_args(words)
+    told = _told(options.plan)
+    for name, value in vars(options).items():
+        usual = told.get(name) if name in ASKED and not value else None
+        setattr(base, name, usual or value)
+    base.rule = [*told.get("rule", []), *options.rule] if options.rule else base.rule
+    base.command, base.scene, base.schedule = "optimize", str(scene_file), FREE
+    base.robots = options.robots or ""
+    setattr(base, "from", f"{options.plan}:{options.at}")
+    base.change = partial(_changed, options)
+    return base
+
+
+def _told(folder: Path) -> dict[str, Any]:
+    """Return what was asked of a plan, as words, as far as words say it."""
+    try:
+        told = json.loads(read_text(folder / "summary.json"))
+    except (FileError, ValueError):
+        return {}
+    if told.get("schedule") != FREE:
+        return {}
+    rules = {**told.get("rules", {})}
+    names = ("least_grips", "newest", "payload", "regrips", "ending", "candidates")
+    limits = told.get("limits", {})
+    return {
+        "aim": ",".join(told.get("aims", ())),
+        "criteria": told["criterion"] if told.get("criterion") in CRITERIA else None,
+        "rule": [f"{name}={rules[name]}" for name in names if name in rules],
+        "limit": [f"{name}={value}" for name, value in limits.items()],
+    }
+
+
+def _changed(options: argparse.Namespace, scene: Scene, begin: Place) -> tuple[Scene, Place, str]:
+    """Return scene and place after what has changed, and the robots that take part, by name."""
+    assert begin.site is not None
+    for text in options.payload:
+        scene = _with_payload(scene, text)
+    bricks = [_brick(text) for text in options.missing]
+    scene, site = without(scene, begin.site, options.lost, bricks)
+    left = [robot.name for robot in scene.robots if robot.name not in options.lost]
+    return scene, Place(site, None), ",".join(left) if options.lost else ""
+
+
+def _with_payload(scene: Scene, text: str) -> Scene:
+    name, _, value = text.partition("=")
+    if name not in [robot.name for robot in scene.robots]:
+        known = ", ".join(robot.name for robot in scene.robots)
+        raise StepError(f"--payload {text}: give ROBOT=NEWTON, of {known}")
+    most = number_word(value, f"--payload {text}")
+    robots = (replace(r, payload=most) if r.name == name else r for r in scene.robots)
+    return scene.with_robots(*robots)
+
+
+def _brick(text: str) -> int:
+    if not text.isdecimal():
+        raise StepError(f"--missing {text}: give the number of a brick")
+    return int(text)
+
+
+def _with_another(base: argparse.Namespace, scene: Scene, asked: int) -> str:
+    """Return whether one more robot opens a way, as the end of a line."""
+    count = max(len(scene.robots), asked) + 1
+    try:
+        with_robots(scene, count)
+        base.robots = str(count)
+        found = optimize.find(base)
+    except (InfeasibleError, StepError):
+        return ""
+    return f"; or with one more robot that reaches every node: {found.plan.result}"
+
+
+def _in_words(facts: Mapping[str, Any]) -> Sequence[str]:
+    """Return what a new plan changes, in lines."""
+    was = facts["as_planned"]
+    if was is None:
+        line = f"as planned the build cannot go on: {facts['broken']}"
+    else:
+        values = ", ".join(f"{name} {value_text(name, value)}" for name, value in was.items())
+        line = f"as planned the rest takes: {values}"
+    if facts["differs"] is None:
+        return (line, "the new plan is the old one")
+    counts = f"{facts['steps']} steps instead of {facts['steps_before']}"
+    return (line, f"the new plan: {counts}, the same up to step {facts['differs'] - 1}")
