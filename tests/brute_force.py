@@ -92,7 +92,11 @@ def whole_graph(engine, rules, *, last=False, allow=None):
     allow = partial(allowed, engine, rules) if allow is None else allow
     book, scene = RuleBook(engine.network, rules), engine.network.scene
     none = (None,) * len(scene.robots)
-    start = (0, none, 0, none)
+    bricks, held, regrips = book.start
+    stays = rules.begin.stays if rules.begin and rules.begin.stays else none
+    lasts = tuple(h if h is not None else s for h, s in zip(held, stays, strict=True))
+    count = regrips if rules.regrips is not None else 0
+    start = (bricks, held, count, lasts if last else none)
     graph = nx.DiGraph([("ends", "end")], regrip=0.0)
     graph.add_node(start, worst=np.zeros(4))
     work, known = [start], {}

@@ -7,7 +7,7 @@ nothing with it, and judges what was found there.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from seqopt.arms._permits import reachable
@@ -142,7 +142,17 @@ class RuleBook:
             return all(node is None for node in grips)
         if self.rules.finish is None or self.rules.finish.grips is None:
             return not self.fault(bricks, grips)
-        return {*grips} - {None} == {*self.rules.finish.grips} - {None}
+        return self._holding(grips) == self._holding(self.rules.finish.grips)
+
+    def _holding(self, grips: Grips) -> dict[int, object]:
+        """Return what kind of robot holds each node: robots that are alike could change places."""
+        placers = self.rules.placers
+        pairs = zip(self.network.scene.robots, grips, strict=True)
+        return {
+            node: (replace(robot, name="-"), not placers or robot.name in placers)
+            for robot, node in pairs
+            if node is not None
+        }
 
 
 def check_free(network: Network, rules: FreeRules, steps: Sequence[Step]) -> None:

@@ -1,0 +1,144 @@
+"""Parts of builds, replanning and the next move on the command line."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+
+from seqopt._cli.main import main
+from seqopt.scene.scene_file import load_scene, save_scene
+from seqopt.sequence.schedule_file import read_plan
+from tests.builders import small_arch
+
+
+def run(capsys, *arguments):
+    try:
+        status = main([*arguments])
+    except SystemExit as stop:
+        status = int(stop.code or 0)
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The folder of a plan, with its policy."""
+    here = tmp_path_factory.mktemp("parts")
+    save_scene(small_arch(5), here / "arch.json")
+    words = ["--schedule", "free", "--aim", "minmax,steps", "--no-stability", "--policy", "--quiet"]
+    out = here / "plan"
+    assert main(["optimize", str(here / "arch.json"), *words, "--out", str(out)]) == 0
+    return out
+
+
+FREE = ("--schedule", "free", "--no-stability")
+
+
+def test_a_build_goes_on_from_a_step_and_reads_back(capsys, folder, tmp_path):
+    rest = tmp_path / "rest"
+    scene = str(folder / "scene.json")
+    status, said, _ = run(
+        capsys, "optimize", scene, *FREE, "--from", f"{folder}:4", "--out", str(rest)
+    )
+    assert status == 0
+    assert re.search(r"what is left after step 4: minmax .* from an empty site", said, re.S)
+    steps = read_plan(load_scene(scene), rest / "plan.csv")
+    assert steps[0].number == 5
+    for command in ("analyze", "assess"):
+        plan = str(rest / "plan.csv")
+        status, said, _ = run(capsys, command, scene, "--plan", plan)
+        assert status == 0
+        assert said.splitlines()[1].startswith("5,")
+    status, said, _ = run(capsys, "optimize", scene, *FREE, "--from", "2", "--to", "3")
+    assert status == 0
+
+
+def test_a_state_is_read_from_a_file(capsys, folder, tmp_path):
+    scene, state = str(folder / "scene.json"), tmp_path / "state.json"
+    node = load_scene(scene).placed[1].nodes[0]
+    state.write_text(json.dumps({"bricks": [1, 2], "grips": {"rob1": node}, "step": 7}))
+    out = tmp_path / "out"
+    status, *_ = run(capsys, "optimize", scene, *FREE, "--from", str(state), "--out", str(out))
+    assert status == 0
+    assert read_plan(load_scene(out / "scene.json"), out / "plan.csv")[0].number == 8
+    for told, said in (
+        ("[1", "not a readable JSON file"),
+        ("{}", "give an object with bricks"),
+        ('{"bricks": 1, "grip": {}}', "grip is not known (did you mean grips?)"),
+        ('{"bricks": [77]}', "give their number, or names"),
+        ('{"bricks": [1, 1]}', "stands there twice"),
+        ('{"bricks": 2, "grips": {"rob9": 1}}', "give nodes by robot"),
+        ('{"bricks": 2, "grips": {"rob1": 99}}', "there is no such node"),
+        ('{"bricks": 2, "step": "x"}', "give whole numbers"),
+    ):
+        state.write_text(told)
+        status, _, err = run(capsys, "optimize", scene, *FREE, "--from", str(state))
+        assert status == 2, told
+        assert said in err
+        assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--from", "PLAN:99"), "the plan has 0 to"),
+        (("--from", "nowhere"), "give PLAN:STEP"),
+        (("--from", "9"), "site: 9 bricks"),
+        (("--from", "3", "--to", "2"), "cannot end with 2"),
+        (("--to", "PLAN:x"), "give PLAN:STEP"),
+    ],
+)
+def test_a_wrong_place_is_one_line(capsys, folder, words, said):
+    words = [word.replace("PLAN", str(folder)) for word in words]
+    status, _, err = run(capsys, "optimize", str(folder / "scene.json"), *FREE, *words)
+    assert status == 2
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_the_next_move_is_looked_up(capsys, folder, tmp_path):
+    status, said, _ = run(capsys, "next", "0", "--policy", str(folder))
+    assert status == 0
+    assert re.match(r"rob\d places brick 1 and holds it at node \d+\n", said)
+    assert "moves prove that nothing has a lower minmax" in said
+    last = read_plan(load_scene(folder / "scene.json"), folder / "plan.csv")[-1].number
+    status, said, _ = run(capsys, "next", f"{folder}:{last}", "--policy", str(folder))
+    assert said.startswith("the build has ended")
+    status, said, _ = run(capsys, "next", f"{folder}:2", "--policy", str(folder), "--json")
+    assert {"move", "rest", "then", "proven"} <= {*json.loads(said)}
+    status, _, err = run(capsys, "next", "3", "--policy", str(folder))
+    assert status == 2
+    assert "no build by these rules and limits reaches it" in err
+    status, _, err = run(capsys, "next", "0", "--policy", str(tmp_path))
+    assert status == 2
+    status, _, err = run(capsys, "optimize", "arch25", *FREE, "--policy")
+    assert (status, "--policy: it is written to a folder; give --out DIR" in err) == (2, True)
+
+
+def test_the_rest_is_planned_anew(capsys, folder, tmp_path):
+    quiet = ("--no-stability",)
+    status, said, _ = run(capsys, "replan", str(folder), "--at", "3", *quiet)
+    assert status == 0
+    assert "the new plan is the old one" in said
+    out = tmp_path / "new"
+    words = ("--at", "3", "--robots", "4", "--payload", "rob1=60", "--out", str(out))
+    status, said, _ = run(capsys, "replan", str(folder), *words, *quiet)
+    assert status == 0
+    assert "the new plan:" in said
+    scene = load_scene(out / "scene.json")
+    assert [robot.payload for robot in scene.robots if robot.name == "rob1"] == [60.0]
+    status, _, err = run(capsys, "replan", str(folder), "--at", "3", "--lost", "rob1", *quiet)
+    assert status == 3
+    assert "or with one more robot that reaches every node" in err
+    for wrong, said in (
+        (("--at", "x"), "give a number"),
+        (("--at", "99"), "the plan has 0 to"),
+        (("--at", "3", "--lost", "rob8"), "robot rob8 does not exist"),
+        (("--at", "3", "--payload", "rob8=1"), "give ROBOT=NEWTON"),
+        (("--at", "3", "--missing", "x"), "give the number of a brick"),
+    ):
+        status, _, err = run(capsys, "replan", str(folder), *wrong, *quiet)
+        assert status == 2
+        assert said in err
