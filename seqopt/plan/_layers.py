@@ -25,7 +25,7 @@ from seqopt.plan.calling.formulation import (
     timed,
 )
 from seqopt.plan.judge._posture_rules import check_postures
-from seqopt.plan.judge.certificate import certify_partial, judge, require_anew
+from seqopt.plan.judge.certificate import _require_anew, certify_partial, judge
 from seqopt.plan.plan import Plan
 from seqopt.plan.search._pair_search import search_pairs
 from seqopt.plan.search._window_search import search_windows
@@ -110,7 +110,7 @@ def _solve_all(graph: PlacementProblem, formulation: Formulation, run: Run) -> P
         certificate = judge(graph, selection, formulation)
         steps = _checked(graph.steps(selection.choice), graph)
         for layers in _from_cache(graph):
-            require_anew(layers, selection.choice)
+            _require_anew(layers, selection.choice)
     stages = {**stages, **{stage: seconds[stage] for stage in ("compile", "solve", "verify")}}
     return Plan(graph, graph, formulation, selection, certificate, steps, stages)
 
@@ -138,7 +138,7 @@ def _solve_windows(graph: PlacementProblem, formulation: Formulation, run: Run) 
     respond = sum(part.evaluation.seconds for part in (found.alone, *found.shared))
     with timed(seconds, "verify"):
         steps = _checked(graph.steps(found.choice), graph)
-        require_anew(graph, found.choice, found.met)
+        _require_anew(graph, found.choice, found.met)
     stages = {"respond": respond, "rank": seconds["search"] - respond, "verify": seconds["verify"]}
     chosen = Selection(found.choice, np.nan)
     return Plan(graph, graph, formulation, chosen, None, steps, stages, found)
@@ -157,7 +157,7 @@ def _solve_lazily(graph: PlacementProblem, formulation: Formulation, run: Run) -
     with timed(seconds, "verify"):
         certificate = certify_partial(found.costs, chosen, found.objective)
         steps = _checked(graph.steps(chosen.choice), graph)
-        require_anew(graph, chosen.choice, along.met)
+        _require_anew(graph, chosen.choice, along.met)
     return Plan(graph, graph, formulation, chosen, certificate, steps, seconds, along, found.models)
 
 

@@ -288,16 +288,7 @@ def find_policy(
     >>> str(policy.best(seqopt.Site(0)))
     'rob1 places brick 1 and holds it at node 1'
     """
-    states = states_of(problem)
-    why = {
-        "budgets": states.budgets,
-        "margins as aims": any(goal.of_margins for goal in states.goals),
-        "totals over scenarios": states.totals,
-        "all orders": problem.orders is not None,
-    }
-    for name in (name for name, asked in why.items() if asked):
-        raise ProblemError(f"a policy has no {name}: what is best depends on what was before")
-    states.free_rules  # noqa: B018  # a schedule has no policy, and says so
+    states = _states_with_policy(problem)
     tell("looking at every state")
     found = explore(states)
     found.refine()
@@ -308,6 +299,21 @@ def find_policy(
     tell("proving that no move is better")
     table = policy.bricks, policy.held, policy.values[:, 0], policy.following
     return replace(policy, checked=check_policy(states, *table))
+
+
+def _states_with_policy(problem: Problem) -> States:
+    """Return the states of a problem, if what is best does not depend on what was before."""
+    states = states_of(problem)
+    why = {
+        "budgets": states.budgets,
+        "margins as aims": any(goal.of_margins for goal in states.goals),
+        "totals over scenarios": states.totals,
+        "all orders": problem.orders is not None,
+    }
+    for name in (name for name, asked in why.items() if asked):
+        raise ProblemError(f"a policy has no {name}: what is best depends on what was before")
+    _ = states.free_rules  # a schedule has no policy, and says so
+    return states
 
 
 def _of_graph(states: States, visited: Visited) -> Policy:

@@ -359,7 +359,7 @@ class Excess:
         )
 
 
-def excesses(scene: Scene, table: pd.DataFrame, limits: Sequence[Limit]) -> tuple[Excess, ...]:
+def _excesses(scene: Scene, table: pd.DataFrame, limits: Sequence[Limit]) -> tuple[Excess, ...]:
     """Return the limits that steps of a table of `seqopt.analyze` exceed, in their order.
 
     A limit on ``F_move``, which only open steps have, is left out.
@@ -375,9 +375,9 @@ def excesses(scene: Scene, table: pd.DataFrame, limits: Sequence[Limit]) -> tupl
 
 
 def overloads(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
-    """Return the payloads that steps exceed, in the order of the robots; see `excesses`."""
+    """Return the payloads that steps exceed, in the order of the robots; see `_excesses`."""
     names = {robot_response(robot.name): robot.name for robot in scene.robots}
-    found = excesses(scene, table, payload_limits(scene))
+    found = _excesses(scene, table, payload_limits(scene))
     return tuple(replace(excess, robot=names[excess.limit.response]) for excess in found)
 
 

@@ -28,7 +28,7 @@ from seqopt.report._style import (
     plain,
     styled,
 )
-from seqopt.report.comparison import LARGEST, Comparison, in_shown_unit, worst_of
+from seqopt.report.comparison import LARGEST, Comparison, _in_shown_unit, worst_of
 from seqopt.report.page import Build
 from seqopt.report.text import in_words, typed
 from seqopt.study.published import PUBLISHED
@@ -264,9 +264,9 @@ def front_figure(
     marks = {name: worst_of(rows) | {"steps": len(rows)} for name, rows in methods.items()}
     for axes, name in zip(panels, others, strict=False):
         for label, other in (beside or {}).items():
-            ways = (in_shown_unit(other[c], c) for c in (first, name))
+            ways = (_in_shown_unit(other[c], c) for c in (first, name))
             axes.plot(*ways, "o", ms=4, mfc="none", mec=GRAY, mew=0.8, label=f"{label}, its set")
-        x, y = (in_shown_unit(table[c], c) for c in (first, name))
+        x, y = (_in_shown_unit(table[c], c) for c in (first, name))
         dots = axes.scatter(x, y, c=table["steps"], cmap="viridis", s=18, zorder=2)
         _mark(axes, marks, (first, name))
         axes.set(xlabel=LABELS.get(first, first), ylabel=LABELS.get(name, name))
@@ -291,7 +291,7 @@ def _mark(axes: Axes, marks: Mapping[str, Mapping[str, float]], names: tuple[str
     look: dict[str, Any] = {"color": VERMILION, "mfc": "none", "ms": 8, "ls": "none", "mew": 2}
     for marker, (method, worst) in zip(MARKERS, marks.items(), strict=False):
         if all(name in worst for name in names):
-            at = [in_shown_unit(worst[name], name) for name in names]
+            at = [_in_shown_unit(worst[name], name) for name in names]
             axes.plot(*at, marker, label=in_words(method), zorder=3, **look)
 
 

@@ -393,7 +393,7 @@ def worst_of(table: pd.DataFrame) -> dict[str, float]:
     return out
 
 
-def in_shown_unit(value: pd.Series[float] | float, name: str) -> pd.Series[float] | float:
+def _in_shown_unit(value: pd.Series[float] | float, name: str) -> pd.Series[float] | float:
     """Return a number of a Pareto set, SI units, in the unit in which it is shown."""
     if name == "tilt":
         return value * (-180.0 / np.pi) + 90.0
@@ -409,6 +409,6 @@ def shown_table(table: pd.DataFrame) -> pd.DataFrame:
     out = table.copy()
     for name in [str(name) for name in table]:
         if name == "tilt" or is_tolerance(name):
-            out[name] = in_shown_unit(table[name], name)
+            out[name] = _in_shown_unit(table[name], name)
             out = out.rename(columns={name: "tilt_survived_deg" if name == "tilt" else COLUMN})
     return out

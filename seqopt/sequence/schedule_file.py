@@ -74,7 +74,9 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
         cells = _read_cells(row, where)
         grips = tuple(_read_grip(scene, robot, row, where) for robot in scene.robots)
         steps.append(Step(*cells, grips))
-    first = max(1, steps[0].number) if steps else 1
+    first = 1
+    if steps and (steps[0].kind, steps[0].bricks) != (StepKind.PLACE, 1):  # a part of a plan
+        first = max(1, steps[0].number)
     for expected, step in enumerate(steps, start=first):
         if step.number != expected:
             raise StepError(

@@ -94,6 +94,7 @@ class Ladder:
     table: np.ndarray
     peaks: tuple[bool, ...] = (True, False)
     floors: bool = False
+    first = 0
 
     @property
     def levels(self):

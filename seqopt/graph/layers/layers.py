@@ -26,8 +26,8 @@ from seqopt.problem.requirements import (
     Limit,
     ResponsesAsked,
     SceneFacts,
+    _excesses,
     as_limits,
-    excesses,
     robots_of,
 )
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, StepChoices
@@ -64,7 +64,7 @@ def window(
     return replace(schedule, steps=tuple(steps), moves=(schedule.moves[move],))
 
 
-def possible_after(schedule: Schedule, move: int, before: int) -> Bools:
+def _possible_after(schedule: Schedule, move: int, before: int) -> Bools:
     """Return which candidates (C_k,) of a move are possible after a candidate of the one before.
 
     Responses do not tell where all candidates are impossible: then nothing is known of any.
@@ -104,7 +104,7 @@ def _after(choices: StepChoices, before: int) -> StepChoices:
     return replace(choices, responses=responses)
 
 
-def pairs_as_moves(
+def _pairs_as_moves(
     schedule: Schedule, asked: Sequence[tuple[int, int]], wanted: Sequence[Ints]
 ) -> Schedule:
     """Return the steps of pairs as a schedule with a move for every row.
@@ -241,7 +241,7 @@ class Layers(Shown):
             faced = self.faced(choices, before)
             if len(faced.moves) == 2:
                 out = out + self.step_costs(faced)
-        return np.where(possible_after(self.schedule, move, before), out, np.inf)
+        return np.where(_possible_after(self.schedule, move, before), out, np.inf)
 
     def window_choices(self, move: int, before: int) -> tuple[StepChoices, ...]:
         """Return the steps that a move decides, for its candidates alone.
@@ -291,7 +291,7 @@ class Layers(Shown):
         table = analyze(self.engine, fixed)
         for name in {each.response for each in self.limits if is_tolerance(each.response)}:
             table = with_tolerances(self.engine, fixed, table, name)
-        for excess in excesses(self.schedule.scene, table, self.limits):
+        for excess in _excesses(self.schedule.scene, table, self.limits):
             raise InfeasibleError(
                 f"{excess}, where no grip is left to choose; relax the limit or change the schedule"
             )

@@ -89,13 +89,13 @@ def _least_among_least(first: LayeredCosts, second: LayeredCosts) -> float:
 
     ``first``, ``second``: of the same choices. Result: infinite if no choice is allowed.
     """
-    total, kept = np.zeros(1), on_a_least_path(first.arcs())
+    total, kept = np.zeros(1), _on_a_least_path(first.arcs())
     for single, shared, mask in zip(second.single, second.shared, kept, strict=True):
         total = np.where(mask, total[:, None] + shared + single, np.inf).min(axis=0)
     return float(total.min())
 
 
-def on_a_least_path(arcs: Sequence[Floats], size: float = TINY) -> list[Bools]:
+def _on_a_least_path(arcs: Sequence[Floats], size: float = TINY) -> list[Bools]:
     """Return which pairs (C_{k-1}, C_k) lie on a path of least cost, move by move.
 
     ``arcs`` (sequence of (C_{k-1}, C_k) float): what a pair and its later choice cost together;

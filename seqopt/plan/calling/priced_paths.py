@@ -176,7 +176,7 @@ def stopped(
     for choice in _choices(problem, costs):
         if all(budget.slack(choice) >= 0 for budget in problem.budgets):
             value = aim.value_of(costs, choice)
-            return Selection(choice, value, max(bound, at_least(costs, aim)), end=End.STOPPED)
+            return Selection(choice, value, max(bound, _at_least(costs, aim)), end=End.STOPPED)
     known = f" (no choice is below {bound:.6g})" if np.isfinite(bound) else ""
     if why:
         raise SolverError(
@@ -185,7 +185,7 @@ def stopped(
     raise TimeUpError(f"no choice within all budgets was found yet{known}; give more")
 
 
-def at_least(costs: LayeredCosts, aim: Aim) -> float:
+def _at_least(costs: LayeredCosts, aim: Aim) -> float:
     """Return what each move costs at least, together: a bound that takes no search."""
     if aim is Aim.SUM:
         return sum(float(arc.min()) for arc in costs.arcs())

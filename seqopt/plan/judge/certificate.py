@@ -33,7 +33,7 @@ from seqopt.responses.quantities import CHOSEN_BY
 SAME = 1e-5  # over its largest, that a response may differ: ten times what a screen may err
 
 
-def require_anew(
+def _require_anew(
     problem: Layers, choice: Sequence[int], met: Sequence[tuple[Layers, Sequence[int]]] = ()
 ) -> None:
     """Raise an error if a choice leads to other responses than its problem has from a cache.
@@ -275,7 +275,7 @@ def judge(
     formulation = as_formulation(formulation)
     if formulation.aim is None:
         assert isinstance(problem, ScenarioLayers)  # others have no totals in scenarios
-        return certify_scenarios(problem, selection)
+        return _certify_scenarios(problem, selection)
     certificate = certify(problem, selection, formulation.aim)
     promises = formulation.kind is not FormulationKind.HEURISTIC and selection.end is End.DONE
     if promises and not problem.budgets and certificate.gap > TOLERANCE:
@@ -286,7 +286,7 @@ def judge(
     return certificate
 
 
-def certify_scenarios(problem: ScenarioLayers, selection: Selection) -> Certificate:
+def _certify_scenarios(problem: ScenarioLayers, selection: Selection) -> Certificate:
     """Check a choice by its totals in every scenario, and the bound that its weights prove.
 
     ``selection``: its prices are the weights of scenarios. Raises `SolverError` if the choice is

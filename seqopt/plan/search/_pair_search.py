@@ -24,7 +24,7 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpErro
 from seqopt.graph.layers._partial_costs import PartialCosts, floor_of
 from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.layers.layers import Layers, pairs_as_moves, possible_after
+from seqopt.graph.layers.layers import Layers, _pairs_as_moves, _possible_after
 from seqopt.plan.calling._guard import select
 from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection, Watch
 from seqopt.plan.search._window_search import (
@@ -185,7 +185,7 @@ class _Pairs:
     def _look(self, asked: Sequence[tuple[int, int]], watch: Watch) -> None:
         """Solve rows of pairs, and learn from those that were done before time was over."""
         wanted = [self._wanted(k, before) for k, before in asked]
-        schedule = pairs_as_moves(self._schedule, asked, wanted)
+        schedule = _pairs_as_moves(self._schedule, asked, wanted)
         problem = posed_anew(self._problem, schedule)
         joined = Joined([len(move.candidates) for move in schedule.moves], self.costs.join)
         left = Counter(step.moves[0] for step in schedule.steps)
@@ -207,13 +207,13 @@ class _Pairs:
 
     def _allowed(self, move: int, before: int, row: Floats) -> Floats:
         """Return a row of pairs, infinite where both would be one node."""
-        return np.where(possible_after(self._schedule, move, before), row, np.inf)
+        return np.where(_possible_after(self._schedule, move, before), row, np.inf)
 
     def _wanted(self, move: int, before: int) -> Ints:
         """Return the candidates of a move that are looked at after one of the move before."""
         if not self._each:  # what one costs depends on the others
             return np.arange(len(self._schedule.moves[move].candidates))
-        possible = possible_after(self._schedule, move, before)
+        possible = _possible_after(self._schedule, move, before)
         return np.flatnonzero(possible & self.costs.worth_a_look(move, before))
 
     def along(self, choice: tuple[int, ...]) -> WindowSearch:

@@ -19,7 +19,7 @@ import numpy as np
 from seqopt.arrays import Floats, Terse
 from seqopt.errors import MemoryShortError, SolverError, TimeUpError
 from seqopt.graph.layers.costs import Joined
-from seqopt.graph.layers.layers import Layers, possible_after, window
+from seqopt.graph.layers.layers import Layers, _possible_after, window
 from seqopt.plan.calling.formulation import Watch
 from seqopt.responses._choices import StepChoices
 from seqopt.sequence.schedule import Schedule
@@ -119,7 +119,7 @@ class _Walk:
         move = self._schedule.moves[k]
         costs = self._own.single(k) + self.shared[k].sums.single[0]
         if k:
-            costs = np.where(possible_after(self._schedule, k, self.choice[-1]), costs, np.inf)
+            costs = np.where(_possible_after(self._schedule, k, self.choice[-1]), costs, np.inf)
         if not np.isfinite(costs).any():
             raise SolverError(
                 f"move {k + 1}, step {move.step}: {move.robot} has no allowed grip after the "

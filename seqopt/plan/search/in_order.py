@@ -20,7 +20,7 @@ from seqopt.errors import ProblemError
 from seqopt.graph.layers.costs import TINY, Joined, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.layers.ranking import on_a_least_path
+from seqopt.graph.layers.ranking import _on_a_least_path
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.problem.problem import Aim
 from seqopt.scene._checks import short
@@ -88,7 +88,7 @@ def _allowed(layers: Sequence[LayeredCosts]) -> list[Bools]:
     arcs = zip(*(costs.arcs() for costs in layers), strict=True)
     shut = [np.where(np.isfinite(each).all(axis=0), 0.0, np.inf) for each in arcs]
     LayeredCosts(tuple(np.zeros(len(s)) for s in layers[0].single), tuple(shut)).continuable()
-    return on_a_least_path(shut)
+    return _on_a_least_path(shut)
 
 
 def _best(costs: LayeredCosts, aim: Aim, masks: Sequence[Bools]) -> list[Bools]:
@@ -98,11 +98,11 @@ def _best(costs: LayeredCosts, aim: Aim, masks: Sequence[Bools]) -> list[Bools]:
     arcs = [np.where(mask, join(a, b), np.inf) for mask, a, b in parts]
     if aim is Aim.SUM:
         size = sum(float(np.abs(arc[mask]).max()) for arc, mask in zip(arcs, masks, strict=True))
-        return on_a_least_path(arcs, max(TINY, 1e-6 * size))
+        return _on_a_least_path(arcs, max(TINY, 1e-6 * size))
     reached = np.full(1, -np.inf)
     for arc in arcs:
         reached = np.maximum(reached[:, None], arc).min(axis=0)
-    return on_a_least_path([np.where(arc <= reached.min(), 0.0, np.inf) for arc in arcs])
+    return _on_a_least_path([np.where(arc <= reached.min(), 0.0, np.inf) for arc in arcs])
 
 
 StepCosts = Sequence[tuple[tuple[int, ...], Floats]]
