@@ -112,9 +112,9 @@ class _Search:
         """Return all ways to hold in a step by itself; if there are none, why."""
         options = [self._options(step, hold) for hold in now]
         names = [f"{self._scene.robots[h.robot].name} at node {h.node}" for h in now]
-        for name, rows in zip(names, options, strict=True):
+        for name, hold, rows in zip(names, now, options, strict=True):
             if not rows:
-                return [], f"{name} has no posture"
+                return [], f"{name} {self._lacking(hold)}"
         ways: list[_Way] = [()]
         for k, rows in enumerate(options):
             longer = [(*way, row) for way in ways for row in rows if self._free(way, row)]
@@ -122,6 +122,13 @@ class _Search:
                 return [], f"{self._in_the_way(names, options, k)} are in each other's way"
             ways = longer[:_MOST_WAYS]
         return ways, ""
+
+    def _lacking(self, hold: Hold) -> str:
+        """Return why a hold has no posture, in words."""
+        assert hold.node is not None
+        row = None if self._held is None else self._held.row(hold.robot, hold.node)
+        one = row is not None and row >= 0
+        return "hits a brick in its one posture" if one else "has no posture"
 
     def _options(self, step: Step, hold: Hold) -> list[int]:
         """Return the postures of a hold that hit no brick that stands."""

@@ -19,6 +19,7 @@ from seqopt.errors import GripError, StepError
 from seqopt.plan.judge._posture_rules import check_postures
 from seqopt.plan.solving import layers_of
 from seqopt.problem.criteria import WorstRatio
+from seqopt.report.softness import held_softly
 from seqopt.responses.table import force_column
 from seqopt.scene.arm import Arm
 from seqopt.scene.scene import in_order
@@ -240,7 +241,7 @@ def test_the_judge_finds_grips_that_give_way_in_another_way(monkeypatch):
     for jacobian in changed:
         jacobian[:, :, 1] *= 1.1
     monkeypatch.setitem(vars(scene), _held._KEY, replace(found, jacobians=tuple(changed)))
-    with pytest.raises(StepError, match=r"the grip of .* is another one"):
+    with pytest.raises(StepError, match=r"the grip of .* in another way than its joints"):
         check_postures(scene, plan.steps)
 
 
@@ -252,7 +253,7 @@ def test_the_judge_finds_an_arm_that_is_not_at_its_node(monkeypatch):
     one = [model[-1:].repeat(len(model), axis=0) for model in found.jacobians]
     wrong = replace(found, rows=elsewhere, jacobians=tuple(one))
     monkeypatch.setitem(vars(scene), _held._KEY, wrong)
-    with pytest.raises(StepError, match=r"is another one|arms cannot hold"):
+    with pytest.raises(StepError, match=r"in another way than its joints|arms cannot hold"):
         check_postures(scene, plan.steps)
 
 
@@ -309,3 +310,21 @@ def test_the_formula_is_that_of_the_table():
     grips = (3, 6)
     for one, two in zip(compliances(scene, grips), by_joints(scene, grips), strict=True):
         assert one == pytest.approx(two, rel=1e-9)
+
+
+def test_comparisons_of_stiffnesses_have_these_instead_of_joints():
+    scene = soft()
+    engine = make_engine("compliance", scene)
+    tables = {"one": seqopt.analyze(engine, seqopt.optimize(scene, "free", FORCE).steps)}
+    found = held_softly(engine, tables, [1e5, np.inf])
+    bare = make_engine("compliance", scene.with_grips(None))
+    assert found["F_rob"].tolist()[1] == held_softly(bare, tables, [np.inf])["F_rob"].tolist()[0]
+    assert found["F_rob"][0] != pytest.approx(found["F_rob"][1], rel=1e-2)
+
+
+def test_it_is_not_said_that_robots_are_rigid():
+    scene = soft()
+    rigid = scene.with_grips(None)
+    plans = [seqopt.optimize(each, "three-robot", FORCE) for each in (scene, rigid)]
+    said = ["that robots give way" in plan.enough.lines[1] for plan in plans]
+    assert said == [False, True]

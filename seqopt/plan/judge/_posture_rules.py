@@ -8,7 +8,6 @@ is found by moving every joint a little, from places of the flange, without the 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
 
 import numpy as np
 
@@ -99,7 +98,7 @@ def check_postures(scene: Scene, steps: Sequence[Step]) -> None:
         held = np.array([[place[node] for node in step.grips]])
         if not rules.allow(step.bricks, held)[0]:
             raise StepError(f"step {step.number}: arms cannot hold {list(step.held)} together")
-    _check_grips(scene, steps)
+    _check_grips(scene)
 
 
 _LITTLE = 1e-4  # by which joints are moved, rad or m
@@ -109,29 +108,28 @@ _REACHED = (
 )
 
 
-def _check_grips(scene: Scene, steps: Sequence[Step]) -> None:
-    """Raise a `StepError` if a grip of a plan gives way in another way than the joints of its arm.
+def _check_grips(scene: Scene) -> None:
+    """Raise a `StepError` if a grip gives way in another way than the joints of its arm.
 
-    Or if an arm is not at its node.
+    Or if an arm is not at its node. A proof uses all nodes, so all are looked at.
     """
     held, table = held_postures(scene), find_postures(scene)
     if held is None or table is None:
         return
-    given = held.compliance(scene)
-    models = [ArmModel(arm) for r in held.robots.tolist() if (arm := scene.robots[r].arm)]
-    for step, (own, robot) in product(steps, enumerate(held.robots.tolist())):
-        node, model = step.grips[robot], models[own]
-        if node is None:
-            continue
-        joints = table.joints[held.row(robot, node), : model.joints]
-        way, at = _moved(model, joints)
-        compliance = way / np.array(model.arm.joint_stiffness) @ way.T
-        found = given[own, np.searchsorted(held.nodes, node)]
-        off = np.linalg.norm(at - np.array(scene.node_position(node)))
-        apart = np.abs(compliance - found).max() / np.abs(compliance).max()
-        if not (apart <= _SAME and off <= _REACHED * model.arm.tool_length):
-            name = scene.robots[robot].name
-            raise StepError(f"step {step.number}: the grip of {name} at node {node} is another one")
+    for own, robot in enumerate(held.robots.tolist()):
+        arm, name = scene.robots[robot].arm, scene.robots[robot].name
+        assert arm is not None
+        model, given = ArmModel(arm), held.compliance(scene)[own]
+        for place in np.flatnonzero(held.rows[own] >= 0).tolist():
+            node = int(held.nodes[place])
+            way, at = _moved(model, table.joints[held.rows[own, place], : model.joints])
+            compliance = way / np.array(arm.joint_stiffness) @ way.T
+            off = np.linalg.norm(at - np.array(scene.node_position(node)))
+            apart = np.abs(compliance - given[place]).max() / np.abs(compliance).max()
+            if not (apart <= _SAME and off <= _REACHED * arm.tool_length):
+                raise StepError(
+                    f"the grip of {name} at node {node} gives way in another way than its joints"
+                )
 
 
 def _moved(model: ArmModel, joints: Floats) -> tuple[Floats, Floats]:
