@@ -59,7 +59,7 @@ class HeldPostures(FrozenValue):
 
 
 def held_postures(scene: Scene) -> HeldPostures | None:
-    """Return the postures in which arms hold whose joints give way; None if no scene's arm's do.
+    """Return the postures in which arms hold whose joints give way; None if there are no such arms.
 
     They are computed once, and go along with a scene to other processes.
     """
@@ -83,16 +83,18 @@ def can_hold(scene: Scene, kind: int, node: int) -> bool:
     return held.row([*scene.grip_kinds.of_robot].index(kind), node) != -1
 
 
-def hold_alike(nominal: Scene, scene: Scene) -> None:
-    """Let robots hold in a variation of a scene in the postures of the nominal one.
+def hold_alike(nominal: Scene, scene: Scene) -> Scene:
+    """Return a variation of a scene in which robots hold in the postures of the nominal one.
 
-    Nothing is done where it has other arms: joints may have other stiffnesses.
+    It is as it was where it has other arms: joints may have other stiffnesses.
     """
     arms = [[_bare(robot.arm) for robot in each.robots] for each in (nominal, scene)]
     if arms[0] == arms[1] and {*nominal.brick_of_node} == {*scene.brick_of_node}:
         found = held_postures(nominal)
         if found is not None:
+            scene = replace(scene)
             vars(scene)[_KEY] = found
+    return scene
 
 
 def _bare(arm: Arm | None) -> object:

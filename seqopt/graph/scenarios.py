@@ -43,8 +43,7 @@ def _recipe_for(engine: Engine, scene: Scene) -> Recipe:
             f"engine {type(engine).__name__}: scenarios need engines of their own; take "
             "one of seqopt.make_engine"
         )
-    hold_alike(engine.network.scene, scene)
-    return Recipe(recipe.engine, scene, recipe.options)
+    return Recipe(recipe.engine, hold_alike(engine.network.scene, scene), recipe.options)
 
 
 def engine_for(engine: Engine, scene: Scene) -> Engine:

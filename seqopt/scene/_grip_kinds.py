@@ -40,7 +40,7 @@ class GripKinds(FrozenValue):
     @property
     def rigid(self) -> bool:
         """Whether all hands are rigid and let their nodes turn."""
-        return not (self.gives.any() or self.turns.any())
+        return not (self.compliance.any() or self.turns.any() or self.arms.any())
 
     @property
     def gives(self) -> Bools:

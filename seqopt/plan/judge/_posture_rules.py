@@ -103,9 +103,7 @@ def check_postures(scene: Scene, steps: Sequence[Step]) -> None:
 
 _LITTLE = 1e-4  # by which joints are moved, rad or m
 _SAME = 1e-6  # difference of compliances, over the largest
-_REACHED = (
-    1e-3  # of the length of a tool: what the inverse kinematics of arms leaves open, and more
-)
+_REACHED = 1e-3  # how far a node may be off the tip of the tool, over its length
 
 
 def _check_grips(scene: Scene) -> None:
