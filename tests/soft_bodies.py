@@ -61,18 +61,22 @@ class SoftBodies:
     def solve(self, nodes, hands, moved):
         """Return forces and moments of grips (r, 6), and displacements of inner nodes.
 
-        ``hands``: stiffness along or about each of six axes, for every node; zero where there is
-        none. ``moved`` (r, 3).
+        ``hands``: stiffness along or about each of six axes, for every node, zero where there is
+        none; or, as matrices (6, 6) or (3, 3), compliances, of those three that bear no moment.
+        ``moved`` (r, 3).
         """
         maps, stiffness, stretch = [*self.maps], [*self.stiffness], [np.zeros(6)] * len(self.maps)
-        for node, hand, far in zip(nodes, hands, moved, strict=True):
+        turned = []
+        for node, given, far in zip(nodes, hands, moved, strict=True):
             body = self.body[node]
+            hand, axes = _principal(given)
             own = np.zeros((6, len(self.load)), dtype=LONG)
             own[:3, 6 * body : 6 * body + 6] = _reach(self.at[node] - self.center[body])
             own[3:, 6 * body + 3 : 6 * body + 6] = np.eye(3)
-            maps.append(own)
+            maps.append(axes.T @ own)
             stiffness.append(hand)
-            stretch.append([*far, 0, 0, 0])
+            stretch.append(axes.T @ [*far, 0, 0, 0])
+            turned.append(axes)
         rows = np.concatenate(maps)
         stiff = np.concatenate([np.array(s, dtype=LONG) for s in stiffness])
         apart = np.concatenate([np.array(s, dtype=LONG) for s in stretch])
@@ -88,4 +92,18 @@ class SoftBodies:
             _reach(self.at[n] - self.center[i]) @ answer[6 * i : 6 * i + 6]
             for n, i in self.body.items()
         ]
-        return force[len(self.maps) :].astype(float), np.array(shifts, dtype=float)
+        pairs = zip(turned, force[len(self.maps) :], strict=True)
+        borne = np.array([axes @ own for axes, own in pairs]).reshape(-1, 6)
+        return borne.astype(float), np.array(shifts, dtype=float)
+
+
+def _principal(hand):
+    """Stiffness (6,) of a hand along directions of its own, and these (6, 6), as columns."""
+    hand = np.array(hand, dtype=float)
+    if hand.ndim == 1:
+        return hand, np.eye(6)
+    give, axes = np.linalg.eigh(hand)
+    stiffness, whole = np.zeros(6), np.eye(6)
+    stiffness[: len(give)] = 1 / give
+    whole[: len(give), : len(give)] = axes
+    return stiffness, whole

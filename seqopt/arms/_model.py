@@ -151,7 +151,8 @@ class ArmModel:
         axes, _ = self.flange_pose(posture)
         pin.computeJointJacobians(self.model, self.data, posture)
         frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        own = pin.getFrameJacobian(self.model, self.data, self.flange, frame)
+        found = pin.getFrameJacobian(self.model, self.data, self.flange, frame)
+        own = np.asarray(found).reshape(6, self.joints)  # of one joint it has one axis
         turned = np.vstack([self.base.rotation @ own[:3], self.base.rotation @ own[3:]])
         away = self.arm.tool_length * axes[:, 2]
         turned[:3] += np.cross(turned[3:], away, axis=0)

@@ -1,7 +1,8 @@
 """What arms allow in the build order of a scene: who reaches which node, and who together.
 
 Of a state it is asked whether there are postures that go together; with one posture of every robot
-at every node this is the one that a robot keeps while it holds.
+at every node this is the one that a robot keeps while it holds. An arm whose joints give way has
+one, whose stiffness is that of its grip.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from seqopt.arms._choice import choose
+from seqopt.arms._held import held_postures
 from seqopt.arms.reach import find_postures
 from seqopt.arms.table import PostureTable
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
@@ -108,15 +110,17 @@ def _permits(scene: Scene) -> Permits:
     at = np.array([place[node] for node in table.nodes])[table.node]
     number = [r for r, robot in enumerate(scene.robots) if robot.arm is not None]
     collide = np.pad(table.collide, ((0, 1), (0, 1)))
-    most = max(arm.postures for arm in (robot.arm for robot in scene.robots) if arm is not None)
+    most = max(r.arm.choices for r in scene.robots if r.arm is not None)
     rows = np.full((len(scene.robots), len(nodes) + 1, most), -1)
-    best = _chosen(table, at, ends, len(nodes))
+    best, held = _chosen(table, at, ends, len(nodes)), held_postures(scene)
     for own, r in enumerate(number):
         arm = scene.robots[r].arm
         assert arm is not None
         for p in np.unique(at[table.robot == own]).tolist():
             some = np.flatnonzero((table.robot == own) & (at == p))
-            order = np.lexsort((-ends[some], some != best[own, p]))[: arm.postures]
+            first = None if held is None else held.row(r, nodes[p - 1])
+            first = best[own, p] if first is None else first
+            order = np.lexsort((-ends[some], some != first))[: arm.choices]
             rows[r, p, : len(order)] = some[order]
     return Permits(rows, np.append(ends, 0.0), collide, tuple(number))
 

@@ -36,6 +36,8 @@ _SEED = 4600  # with the number of the node, of what is drawn for it
 class Site:
     """What postures depend on: bricks and nodes, arms and what is up; not the build order.
 
+    Nor on how stiff anything is.
+
     ``bricks``: by their names, ascending; ``blocked``: nodes that nobody may hold.
     """
 
@@ -49,7 +51,13 @@ class Site:
         """Return that of a scene; robots without an arm are in no one's way."""
         bricks = tuple(sorted(scene.bricks, key=lambda brick: brick.name))
         robots = tuple(
-            replace(robot, payload=1.0, arm=replace(robot.arm, postures=MOST))
+            replace(
+                robot,
+                payload=1.0,
+                stiffness=None,
+                rotational_stiffness=None,
+                arm=replace(robot.arm, postures=MOST, joint_stiffness=()),
+            )
             for robot in scene.robots
             if robot.arm is not None
         )

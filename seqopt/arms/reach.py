@@ -7,7 +7,8 @@ from pathlib import Path
 
 from seqopt.arms._reached import Site
 from seqopt.arms._stored import stored_table
-from seqopt.arms.table import PostureTable, _compute_table
+from seqopt.arms.table import PostureTable, _compute_table, _with_compliance
+from seqopt.scene.arm import Arm
 from seqopt.scene.scene import Scene
 from seqopt.work.progress import Tell
 
@@ -51,10 +52,16 @@ def find_postures(
         known.setdefault(None, known[Path(cache)])
     if None not in known:
         known[None] = compute()
-    return known[None]
+    arms = tuple((robot.name, robot.arm) for robot in scene.robots if robot.arm is not None)
+    if any(arm.joint_stiffness for _, arm in arms) and arms not in known:
+        known[arms] = _with_compliance(known[None], arms)
+    return known.get(arms, known[None])
+
+
+_Arms = tuple[tuple[str, Arm], ...]
 
 
 @lru_cache(maxsize=_SITES)
-def _known(site: Site) -> dict[Path | None, PostureTable]:  # noqa: ARG001  # kept by site
-    """Return the table of a site, if it is known, and under the folders that have it."""
+def _known(site: Site) -> dict[Path | _Arms | None, PostureTable]:  # noqa: ARG001  # kept by site
+    """Return the table of a site, if it is known, under the folders and soft arms that have it."""
     return {}

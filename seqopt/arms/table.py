@@ -6,18 +6,20 @@ hits a brick is usable as long as that brick does not stand.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import pandas as pd
 
 from seqopt.arms._collisions import collide_pairs
+from seqopt.arms._model import ArmModel
 from seqopt.arms._reached import Reached, Site, beside_others, reached_alone
 from seqopt.arms._stiffness import _compliance
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import SceneError
-from seqopt.scene.arm import MOST
+from seqopt.scene.arm import MOST, Arm
 from seqopt.work.progress import Tell
 
 _MOST_ROWS = 6000  # postures that are kept in all, where that leaves one for every node
@@ -135,7 +137,7 @@ def _compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
         tools=np.concatenate([each.placed.tools for each in reached]),
         hits=np.concatenate([each.hits for each in reached]),
         collide=_collisions(site, reached, robot_of),
-        compliance=np.concatenate([_compliances(each) for each in reached]),
+        compliance=np.full((len(node), 6, 6), np.nan),
         found=found,
     )
 
@@ -166,9 +168,19 @@ def _collisions(site: Site, reached: list[Reached], robot: Ints) -> Bools:
     return out
 
 
-def _compliances(reached: Reached) -> Floats:
-    """Return how grips give way in all postures, (P, 6, 6); NaN where no stiffness is known."""
-    if not reached.model.arm.joint_stiffness:
-        return np.full((len(reached.node), 6, 6), np.nan)
-    found = [_compliance(reached.model, posture) for posture in reached.joints]
-    return np.array(found).reshape(-1, 6, 6)
+def _with_compliance(table: PostureTable, arms: Sequence[tuple[str, Arm]]) -> PostureTable:
+    """Return a table with how grips give way by the joints of the arms, as far as it is known.
+
+    Raises `SceneError` if an arm does not give a stiffness for every joint.
+    """
+    found = table.compliance.copy()
+    for name, arm in arms:
+        if arm.joint_stiffness:
+            rows = np.flatnonzero(table.robot == table.robots.index(name))
+            try:
+                model = ArmModel(arm)
+            except SceneError as error:
+                raise SceneError(f"robot {name}: {str(error).removeprefix('arm: ')}") from error
+            for row in rows.tolist():
+                found[row] = _compliance(model, table.joints[row, : model.joints])
+    return replace(table, compliance=found)

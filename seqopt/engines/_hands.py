@@ -9,14 +9,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from seqopt.arms._held import held_postures
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import GripError
 from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
 
 _Number = TypeVar("_Number", np.float64, np.bool_)
 
@@ -29,7 +31,8 @@ class Hands(FrozenValue):
     ``give`` (K, w, w): how hands of each kind give way, m/N, first of forces in d directions, then
     of moments over the lever if any hand of the scene bears any; None if all are rigid and turn.
     ``turns`` (K,): which kinds bear moments; None if none of the scene does. ``kind`` (S, r): of
-    every hand; (1, 1) if all are of one. ``lever``: m. ``directions``: of forces, d.
+    every hand; (1, 1) if all are of one: that of its robot, or of its robot at its node where it
+    has an arm whose joints give way. ``lever``: m. ``directions``: of forces, d.
     """
 
     moved: Floats | None = None
@@ -119,14 +122,87 @@ def _giving(network: Network, grips: ArrayLike) -> Hands:
     """Return hands that give way as their kinds do, and are not moved."""
     kinds, lever = network.scene.grip_kinds, _lever_of(network)
     scale = np.repeat([1.0, lever], 3)
-    give = kinds.compliance * np.outer(scale, scale)
-    turns = kinds.turns if kinds.turns.any() else None
+    kind, compliance, bears = np.zeros((1, 1), dtype=np.int64), kinds.compliance, kinds.turns
+    if kinds.arms.any():
+        kind, found = _of_arms(network.scene, np.asarray(grips))
+        compliance, bears = found.compliance, found.turns
+    elif len(compliance) > 1:
+        _, kind = kinds.split(np.asarray(grips))
+    give = compliance * np.outer(scale, scale)
+    turns = bears if bears.any() else None
     if turns is None:
         give = give[:, :3, :3]
-    kind = np.zeros((1, 1), dtype=np.int64)
-    if len(give) > 1:
-        _, kind = kinds.split(np.asarray(grips))
     return Hands(None, give, turns, kind, lever)
+
+
+class _ArmGrips(NamedTuple):
+    """How hands of a scene give way where joints of arms do, M ways in all.
+
+    ``compliance`` (M, 6, 6); ``turns`` (M,); ``kind`` (K, N): which of these each kind of the
+    scene's has at each node, -1 where an arm has no posture; ``nodes`` (N,): ascending.
+    """
+
+    compliance: Floats
+    turns: Bools
+    kind: Ints
+    nodes: Ints
+
+
+_KEY = "_arm_grips"  # of what is kept with a scene
+
+
+def _arm_grips(scene: Scene) -> _ArmGrips:
+    """Return how hands give way beside, or before, the joints of arms."""
+    held, (of, known) = held_postures(scene), vars(scene).get(_KEY, (None, None))
+    assert held is not None
+    if of is held and isinstance(known, _ArmGrips):
+        return known
+    kinds = scene.grip_kinds
+    compliance, turns = [kinds.compliance], [kinds.turns]
+    kind = np.repeat(np.arange(len(kinds.turns))[:, None], len(held.nodes), axis=1)
+    count = len(kinds.turns)
+    for robot, rows, joints in zip(held.robots, held.rows, held.compliance(scene), strict=True):
+        own, there = kinds.of_robot[robot], rows >= 0
+        kind[own] = -1
+        kind[own, there] = count + np.arange(there.sum())
+        compliance.append(kinds.compliance[own] + joints[there])
+        turns.append(np.repeat(kinds.turns[own], there.sum()))
+        count += int(there.sum())
+    found = _ArmGrips(np.concatenate(compliance), np.concatenate(turns), kind, held.nodes)
+    vars(scene)[_KEY] = held, found
+    return found
+
+
+def _of_arms(scene: Scene, grips: Ints) -> tuple[Ints, _ArmGrips]:
+    """Return which way (S, r) each hand of a scene with such arms gives way.
+
+    Raises `GripError` if an arm has no posture at a node.
+    """
+    found, (node, kind) = _arm_grips(scene), scene.grip_kinds.split(grips)
+    ways = found.kind[kind, np.searchsorted(found.nodes, node)]
+    if (ways < 0).any():
+        at = tuple(np.argwhere(ways < 0)[0])
+        name = scene.robots[[*scene.grip_kinds.of_robot].index(kind[at])].name
+        raise GripError(
+            f"robot {name} has no posture at node {node[at]}, so nobody knows how its grip gives "
+            "way; move its base, or leave out joint_stiffness"
+        )
+    return ways, found
+
+
+_RIGID = 1e-9  # compliance of a hand in a direction, over its largest, that stands for none
+
+
+def invertible(give: Floats) -> Floats:
+    """Return how a hand gives way, (w, w), by a little also where too few joints of an arm move it.
+
+    For those who need its inverse. Hands that give way along each axis by itself stay as they are.
+    """
+    values, axes = np.linalg.eigh(give)
+    least = _RIGID * values[-1]
+    if values[0] >= least or (values[0] > 0 and not (give - np.diag(np.diag(give))).any()):
+        return give
+    return np.asarray(axes * np.maximum(values, least) @ axes.T)
 
 
 def _lengths(columns: Ints, moved: ArrayLike) -> Floats:

@@ -18,7 +18,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._hands import Hands
+from seqopt.engines._hands import Hands, invertible
 from seqopt.engines.interface import Fields, SerialEngine
 from seqopt.engines.rigid._mechanism import require_resistance
 from seqopt.errors import SolverError
@@ -125,7 +125,7 @@ def _hold(network: Network, columns: Ints, hands: Hands | None, size: int) -> _H
         if ways:
             scale = np.where(np.array(ways) < 3, 1.0, hands.lever)
             give = hands.each_give(1, grips)[0, g][np.ix_(ways, ways)] / np.outer(scale, scale)
-            values, axes = np.linalg.eigh(give)
+            values, axes = np.linalg.eigh(invertible(give))
             own = np.zeros((len(ways), size))
             own[:, at[g, ways]] = axes.T
             spring.append(own)

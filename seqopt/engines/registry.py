@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import scipy
 
+from seqopt.arms._held import held_postures
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines._auto import AutoEngine
 from seqopt.engines._planar import PlanarEngine
@@ -60,12 +61,16 @@ class Recipe:
         """What answers depend on, condensed: equal for equal scenes, options and arithmetic.
 
         Names and provenance of a scene change no answer and are left out; of robots only how their
-        grips give way counts, and where these are of several kinds what each carries.
+        grips give way counts, and where these are of several kinds what each carries; of arms whose
+        joints give way, how they do at every node.
         """
         scene = {k: v for k, v in scene_to_dict(self.scene).items() if k not in _WITHOUT_EFFECT}
         ways = [(r.stiffness, r.rotational_stiffness, r.payload) for r in self.scene.robots]
         kinds = [*dict.fromkeys(ways)]
         scene["grips"] = kinds if len(kinds) > 1 else [way[:2] for way in kinds]
+        if (held := held_postures(self.scene)) is not None:
+            give = (self.scene.grip_kinds.of_robot, held.robots, held.compliance(self.scene))
+            scene["arms"] = [np.asarray(each).tobytes().hex() for each in give]
         built = json.dumps(scene, sort_keys=True)
         parts = (self.engine, repr(sorted(self.options.items())), built, _arithmetic())
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()
@@ -132,6 +137,7 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
     if name not in ENGINES:
         raise SceneError(f"engine {name} does not exist; known are {', '.join(ENGINES)}")
     network, options = network_of(network), dict[str, object]()
+    held_postures(network.scene)  # goes along with it to other processes
     if mortar is not None and name in LIMITED:
         options["mortar"] = find_mortar(mortar)
     elif mortar is not None:

@@ -11,6 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from seqopt._showing import Shown
+from seqopt.arms._held import can_hold
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine, recipe_of
@@ -159,8 +160,13 @@ def whole_bound(problem: AllOrders) -> float:
     numbers = node_numbers(free.network)
     places = [i for i, n in enumerate(numbers, 1) if n not in problem.scene.blocked_nodes]
     least = -np.inf
-    kinds = [k * len(numbers) for k in range(len(problem.scene.grip_kinds.turns))]
-    every = [place + more for more in kinds for place in places]  # whoever holds them
+    kinds = range(len(problem.scene.grip_kinds.turns))
+    every = [  # whoever holds them
+        place + k * len(numbers)
+        for k in kinds
+        for place in places
+        if can_hold(problem.scene, k, numbers[place - 1])
+    ]
     fewest = max(1, free.free_rules.least_grips)
     sets = _sets(every, fewest, free.space.robots, len(numbers))
     if len(sets):

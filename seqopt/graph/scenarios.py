@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from seqopt._showing import Shown
+from seqopt.arms._held import hold_alike
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
@@ -32,14 +33,17 @@ from seqopt.work.progress import Progress
 
 
 def _recipe_for(engine: Engine, scene: Scene) -> Recipe:
-    """Return how to make an engine for another scene; a `ProblemError` where nobody knows."""
+    """Return how to make an engine for another scene; a `ProblemError` where nobody knows.
+
+    Arms hold in it in the postures of the engine's own scene.
+    """
     recipe = recipe_of(engine)
     if recipe is None:
         raise ProblemError(
             f"engine {type(engine).__name__}: scenarios need engines of their own; take "
             "one of seqopt.make_engine"
         )
-    return Recipe(recipe.engine, scene, recipe.options)
+    return Recipe(recipe.engine, hold_alike(engine.network.scene, scene), recipe.options)
 
 
 def engine_for(engine: Engine, scene: Scene) -> Engine:

@@ -3,7 +3,8 @@
 Three bounds on the plans of a set of bases are asked before it is computed which arms are in each
 other's way: that of robots without arms, which holds for all sets; that no brick lacks a robot that
 reaches it; and the best plan of the same arms if none were in another's way. Each of these plans
-is proven, so what they skip cannot be better.
+is proven, so what they skip cannot be better. Where joints of arms give way, robots without arms
+and arms in other postures hold otherwise, and the second bound alone is asked.
 """
 
 from __future__ import annotations
@@ -230,7 +231,8 @@ class _Search:
 
     def found(self, sets: Sequence[tuple[dict[str, Base], Scene]]) -> FoundBases:
         """Return the best plan of sets of bases."""
-        floor = _bound(self._solved(self._problem))  # of robots without arms
+        soft = any(scene.grip_kinds.arms.any() for _, scene in sets)
+        floor = (-inf,) if soft else _bound(self._solved(self._problem))  # of robots without arms
         for number, (_, bases, scene) in enumerate(self._by_promise(sets), start=1):
             self._tell(f"bases, set {number} of {len(sets)}")
             if self._plan is not None and not _is_below(floor, self._best):
@@ -257,8 +259,9 @@ class _Search:
 
     def _covered(self, scene: Scene) -> float:
         """Return the share of robots, nodes and brick counts with a posture; -1 if it is none."""
+        apart = _with_arms(scene, lambda arm: replace(arm, keeps_apart=False, joint_stiffness=()))
         try:
-            found = permits(_with_arms(scene, lambda arm: replace(arm, keeps_apart=False)))
+            found = permits(apart)
         except SceneError:  # a base stands in a brick
             return -1.0
         assert found is not None
@@ -266,12 +269,13 @@ class _Search:
 
     def _outcome(self, scene: Scene) -> tuple[str, tuple[float, ...]]:
         """Return what is known of a set, in words, and what its plans do not stay below."""
-        apart = _with_arms(scene, lambda arm: replace(arm, keeps_apart=False))
+        apart = _with_arms(scene, lambda arm: replace(arm, keeps_apart=False, joint_stiffness=()))
+        soft = scene.grip_kinds.arms.any()
         try:
             lacking = _lacking(apart)
             if lacking is not None:
                 return f"no plan: nobody reaches brick {lacking}", (inf,)
-            alone = _bound(self._solved(moved(self._problem, apart)))
+            alone = (-inf,) if soft else _bound(self._solved(moved(self._problem, apart)))
             if self._plan is not None and not _is_below(alone, self._best):
                 return "skipped: by reach alone no better", alone
             find_postures(scene, self._problem.resources.cache, self._tell)

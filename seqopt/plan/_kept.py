@@ -32,7 +32,7 @@ def with_postures(problem: Problem, plan: Plan, solved: Callable[[Problem], Plan
     if not scene.has_arms:
         return plan
     first = _found(plan)
-    most = max(robot.arm.postures for robot in scene.robots if robot.arm is not None)
+    most = max(robot.arm.choices for robot in scene.robots if robot.arm is not None)
     floor, bounds = _floor(plan)
     if not first.unreached or recipe_of(problem.engine) is None:
         proven = bool(floor) and not first.unreached

@@ -70,7 +70,8 @@ def held_softly(
     tables : mapping of str to pandas.DataFrame
         The builds, as `seqopt.analyze` tells of them, by name.
     stiffness : sequence of float
-        Of the grips of all robots, N/m, infinite if rigid; how they resist turning stays.
+        Of the grips of all robots, N/m, infinite if rigid, instead of that of hands and joints of
+        arms; how they resist turning stays.
     progress : callable, optional
         Told how far it is.
 
@@ -90,11 +91,13 @@ def held_softly(
     [380.6, 15.7]
     """
     scene = engine.network.scene
-    rows = []
+    rows, robots = [], scene.robots
     for size in with_progress("grips", stiffness, progress):
         own = None if size == np.inf else size
-        robots = (replace(robot, stiffness=own) for robot in scene.robots)
-        softer = engine_for(engine, scene.with_robots(*robots))
+        ways = ((robot, robot.arm and replace(robot.arm, joint_stiffness=())) for robot in robots)
+        softer = engine_for(
+            engine, scene.with_robots(*(replace(r, stiffness=own, arm=arm) for r, arm in ways))
+        )
         found = _largest(softer, tables)
         rows += [{"build": name, "stiffness": size, **each} for name, each in found.items()]
     return pd.DataFrame(rows)

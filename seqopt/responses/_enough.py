@@ -102,7 +102,9 @@ def _left_out(
 ) -> Iterator[str]:
     """Yield what the model has not, as far as it could matter in these builds."""
     every, moved = within.engine.network.scene.robots, RESPONSES["D_max"]
-    robots = [robot for robot in every if robot.stiffness is None]
+    kinds = within.engine.network.scene.grip_kinds
+    rigid = ~kinds.gives[kinds.of_robot]
+    robots = [robot for robot, is_rigid in zip(every, rigid, strict=True) if is_rigid]
     tables = builds.values()
     if any(table[f"{robot.name}_node"].notna().any() for table in tables for robot in robots):
         yield f"that robots give way{_off(within, builds)}"

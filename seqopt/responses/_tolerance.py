@@ -205,10 +205,9 @@ def _payloads(network: Network, grips: Ints) -> Floats:
 def _tied(engine: Engine, bricks: int, grips: Ints) -> Bools:
     """Return which sets (S,) hold one brick with two rigid grips."""
     kinds = engine.network.scene.grip_kinds
-    gives: Bools = np.asarray(kinds.compliance[:, :3, :3].any(axis=(1, 2)))
     brick = grip_columns(engine.network, bricks, grips) // 2
     apart = -1 - np.arange(grips.shape[1])  # soft grips are on no brick together
-    brick = np.where(gives[kinds.split(grips)[1]], apart, brick)
+    brick = np.where(kinds.gives[kinds.split(grips)[1]], apart, brick)
     return np.asarray((np.diff(np.sort(brick, axis=1), axis=1) == 0).any(axis=1))
 
 

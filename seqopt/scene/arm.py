@@ -82,7 +82,8 @@ class Arm(Terse):
     keeps_apart : bool
         Whether it must not touch other arms that keep apart; False for what reach alone allows.
     joint_stiffness : tuple of float
-        Of every joint, N m/rad; empty where it is not known.
+        Of every joint, N m/rad; N/m if it slides; empty for joints that do not give way. Where it
+        is given, an arm holds each node in one posture, which makes its grip as stiff as it is.
 
     Raises
     ------
@@ -120,6 +121,11 @@ class Arm(Terse):
                 f"arm: fingers stand out {self.fingers:g} m from a brick, and the whole tool is "
                 f"{self.tool_length:g} m long; give a longer tool"
             )
+
+    @property
+    def choices(self) -> int:
+        """With how many postures at each node plans are made, as it is: one if joints give way."""
+        return 1 if self.joint_stiffness else self.postures
 
     @property
     def in_package(self) -> bool:

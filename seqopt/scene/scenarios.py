@@ -51,7 +51,11 @@ def _gripped(scene: Scene, factors: Floats) -> Scene:
             None if each is None else as_vector(factor * np.array(each))
             for each in (robot.stiffness, robot.rotational_stiffness)
         )
-        return replace(robot, stiffness=shift, rotational_stiffness=turn)
+        arm = robot.arm
+        if arm is not None:
+            joints = tuple(factor * each for each in arm.joint_stiffness)
+            arm = replace(arm, joint_stiffness=joints)
+        return replace(robot, stiffness=shift, rotational_stiffness=turn, arm=arm)
 
     own = factors[scene.grip_kinds.of_robot].tolist()
     return replace(scene, robots=tuple(map(stiffer, scene.robots, own)))
@@ -137,7 +141,8 @@ class Scenarios:
         """Return the same scenarios with grips that vary as well.
 
         ``factors``: the least and the largest by which the stiffness of grips is multiplied, the
-        same for all robots that give way alike; log-uniform. Rigid grips stay rigid.
+        same for all robots that give way alike, joints of arms with them; log-uniform. Rigid grips
+        stay rigid.
 
         Examples
         --------

@@ -284,6 +284,8 @@ class Scene(Shown):
     ) -> Scene:
         """Return the same scene with grips of all robots as stiff as said.
 
+        Joints of arms give way no more: what is given stands for them as well.
+
         ``stiffness``, ``rotational_stiffness``: as of `Robot`; None for rigid grips, and for such
         as let their nodes turn.
 
@@ -297,8 +299,10 @@ class Scene(Shown):
         True
         """
         ways = {"stiffness": stiffness, "rotational_stiffness": rotational_stiffness}
-        robots = tuple(replace(robot, **ways) for robot in self.robots)  # type: ignore[arg-type]
-        return replace(self, robots=robots)
+        arms = (r.arm and replace(r.arm, joint_stiffness=()) for r in self.robots)
+        pairs = zip(self.robots, arms, strict=True)
+        robots = (replace(robot, arm=arm, **ways) for robot, arm in pairs)  # type: ignore[arg-type]
+        return replace(self, robots=tuple(robots))
 
     @cached_property
     def grip_kinds(self) -> GripKinds:

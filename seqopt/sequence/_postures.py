@@ -2,7 +2,8 @@
 
 A robot keeps its posture from the step in which it takes a node to the last in which it holds it.
 In every step no arm may hit a brick that stands, and no two arms each other. All postures of the
-table are tried, not only those with which plans are made here.
+table are tried, not only those with which plans are made here; of arms whose joints give way that
+one alone in which it is known how.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
+from seqopt.arms._held import held_postures
 from seqopt.arms.reach import find_postures
 from seqopt.arms.table import PostureTable
 from seqopt.arrays import Terse
@@ -82,6 +84,7 @@ class _Search:
 
     def __init__(self, scene: Scene, table: PostureTable, steps: Sequence[Step]) -> None:
         self._scene, self._table, self._steps = scene, table, steps
+        self._held = held_postures(scene)
         self._holds = [h for h in holds(scene, steps) if scene.robots[h.robot].arm is not None]
         self._since = [scene.since[name] for name in table.bricks]
 
@@ -109,9 +112,9 @@ class _Search:
         """Return all ways to hold in a step by itself; if there are none, why."""
         options = [self._options(step, hold) for hold in now]
         names = [f"{self._scene.robots[h.robot].name} at node {h.node}" for h in now]
-        for name, rows in zip(names, options, strict=True):
+        for name, hold, rows in zip(names, now, options, strict=True):
             if not rows:
-                return [], f"{name} has no posture"
+                return [], f"{name} {self._lacking(hold)}"
         ways: list[_Way] = [()]
         for k, rows in enumerate(options):
             longer = [(*way, row) for way in ways for row in rows if self._free(way, row)]
@@ -120,10 +123,20 @@ class _Search:
             ways = longer[:_MOST_WAYS]
         return ways, ""
 
+    def _lacking(self, hold: Hold) -> str:
+        """Return why a hold has no posture, in words."""
+        assert hold.node is not None
+        row = None if self._held is None else self._held.row(hold.robot, hold.node)
+        one = row is not None and row >= 0
+        return "hits a brick in its one posture" if one else "has no posture"
+
     def _options(self, step: Step, hold: Hold) -> list[int]:
         """Return the postures of a hold that hit no brick that stands."""
         assert hold.node is not None
         rows = self._table.rows(self._scene.robots[hold.robot].name, hold.node)
+        only = None if self._held is None else self._held.row(hold.robot, hold.node)
+        if only is not None:
+            rows = rows[rows == only]
         standing = [since <= step.bricks for since in self._since]
         return [int(row) for row in rows if not (self._table.hits[row] & standing).any()]
 

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 import seqopt
+from seqopt.arms._held import held_postures
+from seqopt.engines.registry import make_engine
+from seqopt.responses.table import force_column
 from seqopt.scene.arm import Arm
 from seqopt.sequence._postures import plan_postures
 from seqopt.study.published import published_plan
@@ -73,3 +79,71 @@ def test_the_free_plan_is_as_good_as_without_arms(third):
     assert len(plan.steps) == 48
     assert plan.arms.best
     assert contacts(scene, plan.steps, plan.arms.postures) == []
+
+
+@pytest.fixture(scope="module")
+def soft():
+    """Arms whose joints give way, as on the page about arms."""
+    scene, joints = around("beside"), (1e6, 1e6, 1e6, 1e5, 1e5, 1e5)
+    arms = (replace(robot.arm, joint_stiffness=joints) for robot in scene.robots)
+    pairs = zip(scene.robots, arms, strict=True)
+    return scene.with_robots(*(replace(robot, arm=arm) for robot, arm in pairs))
+
+
+def principal(scene):
+    """Stiffnesses of all grips in three directions of their own, the stiffest first, N/m."""
+    held = held_postures(scene)
+    own = held.compliance(scene)[held.rows >= 0][:, :3, :3]
+    return 1 / np.linalg.eigvalsh(own)
+
+
+def worst(scene, steps):
+    """The largest force of a grip, N, and the largest displacement, 0.001 mm."""
+    table = seqopt.analyze(make_engine("compliance", scene), steps)
+    forces = table[[force_column(robot) for robot in scene.robots]]
+    return float(forces.max().max()), float(table["D_max_1e-3mm"].max())
+
+
+def test_grips_are_as_stiff_as_the_page_says(soft):
+    found = principal(soft)
+    assert len(found) == 147
+    ends = [found[:, 2].min(), found[:, 2].max(), found[:, 0].min(), found[:, 0].max()]
+    assert ends == pytest.approx([0.930e5, 2.231e5, 4.272e5, 23.93e5], rel=1e-3)
+    assert np.median(3 / (1 / found).sum(axis=1)) == pytest.approx(2.672e5, rel=1e-3)
+
+
+def test_builds_come_to_what_the_page_says(soft):
+    each = {"rigid": soft.with_grips(None), "soft": soft, "alike": soft.with_grips(2.67e5)}
+    said = {
+        "sequential": {"rigid": (406, 306), "soft": (282, 1301), "alike": (293, 1160)},
+        "cantilever": {"rigid": (409, 16), "soft": (272, 1684), "alike": (303, 1190)},
+        "minmax,steps": {"rigid": (295, 12), "soft": (189, 881), "alike": (175, 667)},
+        "D_max,steps": {"rigid": (366, 12), "soft": (270, 736), "alike": (170, 637)},
+    }
+    plans = {}
+    for build, rows in said.items():
+        for name, (force, far) in rows.items():
+            if "steps" in build:
+                plans[name] = seqopt.optimize(each[name], "free", aim=build)
+                assert plans[name].arms.best
+                steps = plans[name].steps
+            else:
+                steps = getattr(seqopt, build)(each[name])
+            found = worst(each[name], steps)
+            if build == "minmax,steps":  # there may be several plans that are as good
+                assert found[1] == pytest.approx(far, rel=0.3)
+            elif build == "D_max,steps":
+                assert found[1] == pytest.approx(far, rel=2e-3, abs=0.6)
+            else:
+                assert found == pytest.approx((force, far), rel=2e-3, abs=0.6)
+    held = [worst(soft, plans[name].steps)[1] for name in ("rigid", "alike", "soft")]
+    assert held[0] > 1.5 * held[2]
+    assert held[1] > 1.2 * held[2]
+
+
+def test_one_posture_at_a_node_costs_nothing_here(soft):
+    stiff = [replace(r.arm, joint_stiffness=(1e14,) * 6) for r in soft.robots]
+    pairs = zip(soft.robots, stiff, strict=True)
+    near = soft.with_robots(*(replace(robot, arm=arm) for robot, arm in pairs))
+    plans = [seqopt.optimize(each, "free", aim="D_max") for each in (near, soft.with_grips(None))]
+    assert plans[0].objective == pytest.approx(plans[1].objective, rel=1e-5)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import pandas as pd
@@ -170,3 +171,30 @@ def test_too_many_sets_are_refused(scene):
     some = [facing(scene, (3.0 + 0.01 * i, 1.0, 0.0)) for i in range(120)]
     with pytest.raises(ProblemError, match="give fewer places"):
         choose_bases(posed(scene, "steps"), scene, {"north": some, "south": some}, seqopt.solve)
+
+
+@pytest.mark.slow
+def test_bases_of_arms_that_give_way_are_all_solved(scene):
+    """Robots without arms hold otherwise, so no bound of theirs skips a set."""
+    joints = (2e6, 2e6, 1e6, 5e5, 4e5, 2e5)
+    arms = (replace(robot.arm, joint_stiffness=joints) for robot in scene.robots)
+    pairs = zip(scene.robots, arms, strict=True)
+    soft = scene.with_robots(*(replace(robot, arm=arm) for robot, arm in pairs))
+    x, y, _ = soft.robots[0].arm.position
+    at = [(x + 0.75, y, 0.0), (x, -y, 0.0), (x + 1.1, y, 0.0)]
+    places = {"south": [facing(soft, each) for each in at]}
+    found = choose_bases(posed(soft, "D_max"), soft, places, seqopt.solve)
+    values = []
+    for base in places["south"]:
+        moved = soft.robots[1].arm
+        own = {"position": base.position, "x_axis": base.x_axis, "y_axis": base.y_axis}
+        there = soft.with_robots(soft.robots[0], replace(soft.robots[1], arm=replace(moved, **own)))
+        try:
+            plan = seqopt.optimize(there, "free", aim="D_max", least_grips=1)
+        except InfeasibleError:
+            continue
+        values.append(plan.objective["D_max"])
+    assert found.plan.objective["D_max"] == pytest.approx(min(values), rel=1e-9)
+    assert len(values) > 1
+    assert max(values) > 1.01 * min(values)
+    assert not found.tried["outcome"].str.startswith("skipped").any()

@@ -32,7 +32,7 @@ STIFF = (2e6, 2e6, 1e6, 5e5, 4e5, 2e5)  # N m/rad
 
 @pytest.fixture(scope="module")
 def scene():
-    return two_arms(joint_stiffness=STIFF)
+    return two_arms()
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +95,8 @@ def test_pairs_collide_where_the_table_says(kind, scene, tight):
     assert 0 < sum(found) < len(found)
 
 
-def test_compliance_is_that_of_joints_alone(scene, table, witness):
+def test_compliance_is_that_of_joints_alone(scene, witness):
+    table = find_postures(two_arms(joint_stiffness=STIFF))
     for row in range(0, len(table.robot), 9):
         name = whose(table, row)
         witness.pose(name, row)
@@ -113,6 +114,8 @@ def test_compliance_is_that_of_joints_alone(scene, table, witness):
 def test_a_stiffness_is_needed_for_every_joint():
     with pytest.raises(SceneError, match="2 joint stiffnesses for 6 joints"):
         find_postures(two_arms(joint_stiffness=(1e6, 1e6)))
+    with pytest.raises(SceneError, match="robot north: 2 joint stiffnesses for 6 joints"):
+        seqopt.make_engine("compliance", two_arms(joint_stiffness=(1e6, 1e6)))
 
 
 def test_a_table_is_the_same_each_time_in_any_order_and_from_a_folder(scene, table, tmp_path):

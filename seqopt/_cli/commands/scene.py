@@ -76,6 +76,7 @@ def _network_facts(network: Network) -> dict[str, object]:
         "payloads_N": {robot.name: robot.payload for robot in scene.robots},
         "grips_N_per_m": {robot.name: robot.stiffness for robot in scene.robots},
         "grips_Nm_per_rad": {robot.name: robot.rotational_stiffness for robot in scene.robots},
+        "joints_Nm_per_rad": {r.name: r.arm.joint_stiffness for r in scene.robots if r.arm},
         "reaches": {robot.name: type(robot.reach).__name__.lower() for robot in scene.robots},
         "provenance": scene.provenance,
     }
@@ -109,6 +110,8 @@ def _grip(robot: Robot) -> str:
     out = "" if robot.stiffness is None else f", grip of {said(robot.stiffness)} N/m"
     if robot.rotational_stiffness is not None:
         out += f", which resists turning by {said(robot.rotational_stiffness)} N m/rad"
+    if robot.arm is not None and robot.arm.joint_stiffness:
+        out += f", joints of {' x '.join(f'{k:g}' for k in robot.arm.joint_stiffness)} N m/rad"
     return out
 
 

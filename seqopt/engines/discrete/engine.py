@@ -24,7 +24,7 @@ from scipy import linalg, sparse
 
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.mortar import EPOXY, Mortar
-from seqopt.engines._hands import Hands
+from seqopt.engines._hands import Hands, invertible
 from seqopt.engines.discrete._equilibrium_path import Held, Settled, settle
 from seqopt.engines.discrete._system import BedStiffness, System, build_system
 from seqopt.engines.interface import Fields, SerialEngine
@@ -170,9 +170,13 @@ def _springs(
         if ways:
             shift = point_motion(nodes[grip] - network.centroid[body])
             every = np.vstack([shift, np.eye(6)[3:]]) * system.unit[:6]
-            own = give[grip][np.ix_(ways, ways)] / np.outer(scale[ways], scale[ways])
+            own = invertible(give[grip][np.ix_(ways, ways)]) / np.outer(scale[ways], scale[ways])
             moved = np.append(far[grip], np.zeros(3))[ways]
-            out.append(_Spring(grip, int(body), ways, every[ways], np.linalg.inv(own), moved))
+            out.append(
+                _Spring(
+                    grip, int(body), ways, every[ways], np.asarray(np.linalg.inv(own), float), moved
+                )
+            )
     return out
 
 

@@ -194,7 +194,9 @@ def _load_rows(nodes: Ints, directions: int, moments: int) -> Ints:
     first = (2 * directions + moments) * (nodes // 2)
     force = (first + directions * (nodes % 2))[:, :, None] + np.arange(directions)
     moment = (first + 2 * directions)[:, :, None] + np.arange(moments)
-    return np.hstack([force.reshape(len(nodes), -1), moment.reshape(len(nodes), -1)])
+    sets, grips = nodes.shape  # maybe no sets
+    parts = force.reshape(sets, grips * directions), moment.reshape(sets, grips * moments)
+    return np.hstack(parts)
 
 
 class OperatorBuilder:

@@ -182,7 +182,8 @@ def _opening(problem: States, look: Look) -> Iterator[str]:
             yield text
     if problem.demands and look(replace(problem, standing=None, settled=())).whole:
         yield STANDING
-    able = problem.network.scene.has_arms and recipe_of(problem.engine) is not None
+    scene = problem.network.scene  # robots without arms hold as others with joints that are rigid
+    able = scene.has_arms and not scene.grip_kinds.arms.any() and recipe_of(problem.engine)
     if able and look(_without_arms(problem)).whole:
         yield ARMS
     for limit in problem.limits:

@@ -1,7 +1,8 @@
 """Which states the arms of robots can be in, looked up in the posture table, one by one.
 
 A second route to what `seqopt.arms.reach.Permits` says: it takes from there with which postures
-plans are made, and asks the table itself what these hit.
+plans are made, and asks the table itself what these hit. How grips give way by the joints of arms
+is found by moving every joint a little, from places of the flange, without the Jacobian.
 """
 
 from __future__ import annotations
@@ -10,9 +11,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from seqopt.arms._held import held_postures
+from seqopt.arms._model import ArmModel
 from seqopt.arms._permits import permits
 from seqopt.arms.reach import find_postures
-from seqopt.arrays import Bools, Ints
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import StepError
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
@@ -84,7 +87,10 @@ def _bits(row: Bools) -> int:
 
 
 def check_postures(scene: Scene, steps: Sequence[Step]) -> None:
-    """Raise a `StepError` if arms have no postures that go together in a step."""
+    """Raise a `StepError` if arms have no postures that go together in a step.
+
+    Or if their grips give way in another way than their joints do.
+    """
     rules = PostureRules(scene, range(len(scene.robots)))
     nodes = [node for brick in scene.placed for node in brick.nodes]
     place = {None: 0} | {node: i for i, node in enumerate(nodes, start=1)}
@@ -92,3 +98,51 @@ def check_postures(scene: Scene, steps: Sequence[Step]) -> None:
         held = np.array([[place[node] for node in step.grips]])
         if not rules.allow(step.bricks, held)[0]:
             raise StepError(f"step {step.number}: arms cannot hold {list(step.held)} together")
+    _check_grips(scene)
+
+
+_LITTLE = 1e-4  # by which joints are moved, rad or m
+_SAME = 1e-6  # difference of compliances, over the largest
+_REACHED = 1e-3  # how far a node may be off the tip of the tool, over its length
+
+
+def _check_grips(scene: Scene) -> None:
+    """Raise a `StepError` if a grip gives way in another way than the joints of its arm.
+
+    Or if an arm is not at its node. A proof uses all nodes, so all are looked at.
+    """
+    held, table = held_postures(scene), find_postures(scene)
+    if held is None or table is None:
+        return
+    for own, robot in enumerate(held.robots.tolist()):
+        arm, name = scene.robots[robot].arm, scene.robots[robot].name
+        assert arm is not None
+        model, given = ArmModel(arm), held.compliance(scene)[own]
+        for place in np.flatnonzero(held.rows[own] >= 0).tolist():
+            node = int(held.nodes[place])
+            way, at = _moved(model, table.joints[held.rows[own, place], : model.joints])
+            compliance = way / np.array(arm.joint_stiffness) @ way.T
+            off = np.linalg.norm(at - np.array(scene.node_position(node)))
+            apart = np.abs(compliance - given[place]).max() / np.abs(compliance).max()
+            if not (apart <= _SAME and off <= _REACHED * arm.tool_length):
+                raise StepError(
+                    f"the grip of {name} at node {node} gives way in another way than its joints"
+                )
+
+
+def _moved(model: ArmModel, joints: Floats) -> tuple[Floats, Floats]:
+    """Return how the tip of the tool moves and turns with joints, (6, J), and where it is."""
+
+    def tip(posture: Floats) -> tuple[Floats, Floats]:
+        axes, place = model.flange_pose(posture)
+        return axes, place + model.arm.tool_length * axes[:, 2]
+
+    axes, at = tip(joints)
+    out = np.zeros((6, len(joints)))
+    for k, way in enumerate(_LITTLE * np.eye(len(joints))):
+        (turned, ahead), (back, behind) = tip(joints + way), tip(joints - way)
+        out[:3, k] = (ahead - behind) / (2 * _LITTLE)
+        spin = (turned - back) @ axes.T / (2 * _LITTLE)
+        out[3:, k] = spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]
+    out[3:] *= 0.5
+    return out, at
