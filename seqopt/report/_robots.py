@@ -35,10 +35,13 @@ Arms = Mapping[str, Sequence[Floats | None]]
 
 
 class Cell:
-    """Where the robots of a scene stand, and how they hold nodes."""
+    """Where the robots of a scene stand, and how they hold nodes.
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+    ``arms``: lines that are known; the others are sketched.
+    """
+
+    def __init__(self, scene: Scene, arms: Arms | None = None) -> None:
+        self.scene, self._arms = scene, arms or {}
         self.up = np.array(scene.up)
         self.corners = np.vstack([vertices_of(brick)[0] for brick in scene.bricks])
         self._found: dict[tuple[str, int | None], Floats | None] = {}
@@ -62,7 +65,22 @@ class Cell:
     def stands(self) -> Floats:
         """Where robots stand: their feet and shoulders, (k, 3), m."""
         points = [p for at, _ in self.shoulders.values() for p in (self._on_ground(at), at)]
+        points += [line[0] for own in self._arms.values() for line in own if line is not None]
         return np.array(points).reshape(-1, 3)
+
+    @cached_property
+    def known(self) -> Floats:
+        """All points of the arms that are known, in all steps, (k, 3), m."""
+        lines = [line for own in self._arms.values() for line in own if line is not None]
+        return np.vstack([np.zeros((0, 3)), *lines])
+
+    def lines(self, step: Step, at: int) -> list[Floats | None]:
+        """Return the line of every robot in a step, the ``at``-th of those of known arms."""
+        pairs = zip(self.scene.robots, step.grips, strict=True)
+        return [
+            self._arms[robot.name][at] if robot.name in self._arms else self.arm(robot, node)
+            for robot, node in pairs
+        ]
 
     @cached_property
     def yard(self) -> Floats:
@@ -181,12 +199,8 @@ def _known_arms(scene: Scene, steps: Sequence[Step]) -> Arms:
     return out
 
 
-def arm_data(scene: Scene, steps: Sequence[Step], given: Arms) -> dict[str, object]:
-    """Return the arms of robots in every step, ready for JSON.
-
-    ``lines`` are points, each line once; ``at`` has a row for every step with the place of each
-    robot's among them, or -1.
-    """
+def _require_arms(scene: Scene, steps: Sequence[Step], given: Arms) -> None:
+    """Raise a `ProblemError` unless arms have a line a step, by names of robots."""
     known = {robot.name for robot in scene.robots}
     for name, own in given.items():
         if name not in known or len(own) != len(steps):
@@ -194,12 +208,20 @@ def arm_data(scene: Scene, steps: Sequence[Step], given: Arms) -> dict[str, obje
                 f"arms of {name}: {len(own)} for {len(steps)} steps; give one a step, "
                 f"by the name of a robot: {', '.join(sorted(known))}"
             )
-    cell, places = Cell(scene), dict[str, int]()
+
+
+def arm_data(scene: Scene, steps: Sequence[Step], given: Arms) -> dict[str, object]:
+    """Return the arms of robots in every step, ready for JSON.
+
+    ``lines`` are points, each line once; ``at`` has a row for every step with the place of each
+    robot's among them, or -1.
+    """
+    _require_arms(scene, steps, given)
+    cell, places = Cell(scene, given), dict[str, int]()
     lines, at = list[object](), list[list[int]]()
     for s, step in enumerate(steps):
         row = []
-        for robot, node in zip(scene.robots, step.grips, strict=True):
-            points = given[robot.name][s] if robot.name in given else cell.arm(robot, node)
+        for points in cell.lines(step, s):
             line = None if points is None else np.asarray(points).round(4).tolist()
             if line is not None and (key := str(line)) not in places:
                 places[key] = len(lines)

@@ -28,7 +28,6 @@ from seqopt.report._robots import ROBOT_COLORS, Cell
 from seqopt.report._style import BLUE, SMALL, VERMILION
 from seqopt.scene.boxes import boxes, vertices_of
 from seqopt.scene.parts import Brick
-from seqopt.scene.scene import Scene
 from seqopt.scene.shape import normal_of
 
 HALO = (withStroke(linewidth=2.5, foreground="white"),)
@@ -285,16 +284,15 @@ def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: 
         _write(axes, name, (x, y), (10, LINE * line), color=mark["color"], zorder=6)
 
 
-def _draw_robots(axes: Axes, scene: Scene, grips: Sequence[int | None], view: View) -> None:
+def _draw_robots(axes: Axes, cell: Cell, lines: Sequence[Floats | None], view: View) -> None:
     """Draw the ground and the arms of all robots, behind the structure or before it.
 
-    Arms lead from a base to the grip, as sketches; see `seqopt.report._robots`.
+    ``lines``: of every robot in a step, from its foot to its grip; see `seqopt.report._robots`.
     """
-    cell, (right, up, toward) = Cell(scene), view.axes()
+    right, up, toward = view.axes()
     seen = np.stack([right, up])
     axes.add_patch(Polygon(cell.yard @ seen.T, fc=GROUND, lw=0, zorder=0.1))
-    for i, (robot, node) in enumerate(zip(scene.robots, grips, strict=True)):
-        points = cell.arm(robot, node)
+    for i, points in enumerate(lines):
         if points is None:
             continue
         near = (points[0] - cell.middle) @ toward > 0

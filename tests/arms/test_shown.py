@@ -8,10 +8,13 @@ import json
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import seqopt
 from seqopt._cli.outputs import _task_files
-from seqopt.report._robots import _known_arms
+from seqopt.errors import ProblemError
+from seqopt.report._pictures import VIEW, Film, steps_picture
+from seqopt.report._robots import Cell, _known_arms
 from seqopt.sequence.exports._arm_tasks import _in_postures
 from seqopt.sequence.exports._tasks import Action, plan_tasks
 from tests.arms.scenes import TOOL, two_arms
@@ -86,3 +89,41 @@ def test_arms_are_drawn_from_their_base_to_what_they_hold(plan):
             )
     assert held
     assert _known_arms(scene.with_robots(scene.robots[2]), ()) == {}
+
+
+def lines_in(axes):
+    """The lines of arms in a picture, by their points."""
+    return [patch.get_path().vertices for patch in axes.patches[1:]]
+
+
+def test_pictures_and_films_draw_arms_in_their_postures(plan, tmp_path):
+    engine, steps = plan.engine, plan.steps
+    scene, right_up = engine.network.scene, VIEW.axes()[:2]
+    number = next(s.number for s in steps if s.grips[0] is not None)
+    (axes,) = steps_picture(engine, steps, number).axes
+    known = _known_arms(scene, steps)["north"][number - 1] @ right_up.T
+    sketch = Cell(scene).arm(scene.robots[0], steps[number - 1].grips[0]) @ right_up.T
+
+    def is_drawn(axes, line):
+        own = [each for each in lines_in(axes) if len(each) == len(line) - 1]
+        return any(np.allclose(each, line[:-1]) for each in own)
+
+    assert is_drawn(axes, known)
+    assert not is_drawn(axes, sketch)
+    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+    for own in _known_arms(scene, steps).values():
+        seen = np.vstack(own) @ right_up.T
+        assert (seen > low).all()  # arms are seen whole
+        assert (seen < high).all()
+    (bare,) = steps_picture(engine, steps, number, arms={}).axes  # the control: sketches are asked
+    assert is_drawn(bare, sketch)
+    assert not is_drawn(bare, known)
+    with Image.open(Film(engine, steps[:2]).save(tmp_path / "build.gif")) as film:
+        with_arms = [np.array(film.convert("L"))]
+    with Image.open(Film(engine, steps[:2], arms={}).save(tmp_path / "bare.gif")) as film:
+        assert with_arms[0].shape != film.size[::-1] or (with_arms[0] != film.convert("L")).any()
+
+
+def test_arms_that_are_given_must_be_of_robots(plan):
+    with pytest.raises(ProblemError, match="give one a step, by the name of a robot: crane"):
+        steps_picture(plan.engine, plan.steps, 1, arms={"nobody": [None]})
