@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import base64
 import csv
+import gzip
 import io
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 from PIL import Image
 
 import seqopt
+from seqopt._cli.main import main
 from seqopt._cli.outputs import _task_files
-from seqopt.errors import ProblemError
+from seqopt._files import csv_text
+from seqopt.errors import ExtraError, ProblemError
+from seqopt.plan._bases import without_arms
 from seqopt.report._pictures import VIEW, Film, steps_picture
 from seqopt.report._robots import Cell, _known_arms
+from seqopt.report.page import Build, _tasks
 from seqopt.sequence.exports._arm_tasks import _in_postures
-from seqopt.sequence.exports._tasks import Action, plan_tasks
-from tests.arms.scenes import TOOL, two_arms
+from seqopt.sequence.exports._tasks import Action, plan_tasks, tasks_json
+from seqopt.sequence.exports.formats import export_plan, read_folder
+from tests.arms.scenes import TOOL, beside, two_arms
 
 pytest.importorskip("pinocchio")
 pytest.importorskip("coal")
@@ -65,6 +73,67 @@ def test_files_beside_a_plan_have_postures(plan):
     rows = [row for row in csv.DictReader(io.StringIO(files["tasks.csv"])) if row["joint_6"]]
     assert len(told) == len(rows) > 0
     assert float(rows[0]["joint_1"]) == pytest.approx(told[0]["posture"][0])
+
+
+@pytest.fixture(scope="module")
+def folder(plan, tmp_path_factory):
+    out = tmp_path_factory.mktemp("plan")
+    scene = plan.engine.network.scene
+    seqopt.save_scene(scene, out / "scene.json")
+    (out / "plan.csv").write_text(csv_text(plan.responses()), encoding="utf-8")
+    return out
+
+
+@pytest.mark.parametrize(("form", "name"), [("tasks", "tasks.json"), ("tasks_csv", "tasks.csv")])
+def test_what_is_exported_later_has_the_same_postures(plan, folder, form, name, capsys):
+    assert _task_files(plan)[name] == export_plan(
+        plan.engine.network.scene, read_folder(folder)[1], form
+    )
+    out = folder / name
+    words = ["export", str(folder), "--format", form, "--out", str(out)]
+    assert main([*words, "--cache", str(folder / "postures")]) == 0
+    assert capsys.readouterr().err == ""
+    assert out.read_text(encoding="utf-8") == _task_files(plan)[name]
+    assert [*(folder / "postures").iterdir()]
+
+
+def test_an_export_without_postures_is_of_proposals(plan, folder, monkeypatch, capsys):
+    scene, steps = read_folder(folder)
+    proposed = tasks_json(scene, plan_tasks(scene, steps))
+    assert export_plan(scene, steps, "tasks", postures={}) == proposed
+    assert proposed != _task_files(plan)["tasks.json"]  # the control
+
+    def missing(*_):
+        raise ExtraError("arms need pinocchio and coal: pip install 'seqopt[arms]'")
+
+    monkeypatch.setattr("seqopt._cli.commands.exporting.find_postures", missing)
+    out = folder / "proposed.json"
+    assert main(["export", str(folder), "--format", "tasks", "--out", str(out)]) == 0
+    assert "grips are proposals without postures; arms need pinocchio" in capsys.readouterr().err
+    assert out.read_text(encoding="utf-8") == proposed
+
+
+def test_an_export_names_steps_that_arms_cannot_be_in(folder, tmp_path, capsys):
+    scene, _ = read_folder(folder)
+    seqopt.save_scene(beside(scene, 0.75), tmp_path / "scene.json")
+    rows = [
+        {"step": s.number, "type": s.kind.value, "bricks": s.bricks}
+        | {f"{n}_node": node for n, node in zip(("north", "south", "crane"), s.grips, strict=True)}
+        for s in seqopt.sequential(without_arms(scene))
+    ]
+    table = pd.DataFrame(rows).astype("Int64", errors="ignore")
+    table.to_csv(tmp_path / "plan.csv", index=False)
+    words = ["export", str(tmp_path), "--format", "tasks", "--out", str(tmp_path / "tasks.json")]
+    assert main(words) == 0
+    assert "arms cannot: " in capsys.readouterr().err
+
+
+def test_a_page_keeps_tasks_with_postures(plan):
+    scene = plan.engine.network.scene
+    kept = _tasks(plan.engine, Build("plan", plan.steps, plan.responses()))
+    told = gzip.decompress(base64.b64decode(kept["json"])).decode()
+    assert told == export_plan(scene, plan.steps, "tasks")
+    assert any(row["posture"] for row in json.loads(told)["tasks"])
 
 
 def test_arms_are_drawn_from_their_base_to_what_they_hold(plan):
