@@ -9,8 +9,8 @@ better; no robot exceeds its payload; every step stands, the wall dry, the vault
 arm holds some time, and has joint values in every task but that of picking.
 
 Inputs: the generators, and the models in compas_fab. What is written: the folders of
-``docs/examples/four_arms``, each with scene, plan, tasks and film, and the picture of both. Command:
-``python -m experiments.exchange.four_arms [--quick] [--films]``.
+``docs/examples/four_arms``, each with scene, plan, tasks and film, and the picture of both.
+Command: ``python -m experiments.exchange.four_arms [--quick] [--films]``.
 """
 
 import json
@@ -27,7 +27,7 @@ from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, ClaimError, Extra, Finding, Option, Options, none_of
 from experiments.harness.results import FIGURES
 from seqopt._cli.main import main
-from seqopt.arms._drawn import _arm_line, _idle_line
+from seqopt.arms._drawn import PosedArm, idle_arm
 from seqopt.errors import ExtraError, SceneError
 from seqopt.report._pictures import VIEW, Film, _build_box, _mark_grips
 from seqopt.report._robots import Arms, Cell
@@ -139,32 +139,32 @@ def stored_build(name: str) -> tuple[Scene, tuple[Step, ...], Arms]:
     tasks = pd.read_csv(EXAMPLES / name / "tasks.csv")
     held = tasks[~tasks["action"].isin(["pick", "release"])].set_index(["robot", "step"])
     joints = held.filter(like="joint_")
-    lines: dict[str, list[Any]] = {}
+    arms: dict[str, list[Any]] = {}
     try:
         for robot in scene.robots:
             assert robot.arm is not None
             own = joints.loc[robot.name]
-            lines[robot.name] = [
-                _arm_line(robot.arm, own.loc[step.number].to_numpy())
+            arms[robot.name] = [
+                PosedArm(robot.arm, own.loc[step.number].to_numpy())
                 if step.number in own.index
-                else _idle_line(robot.arm)
+                else idle_arm(robot.arm)
                 for step in steps
             ]
     except (ExtraError, SceneError):
         return scene, steps, {}
-    return scene, steps, lines
+    return scene, steps, arms
 
 
 @styled
 def chart() -> Figure:
-    figure, panels = subplots(5.4, 2, 3)
+    figure, panels = subplots(4.4, 2, 3)
     for row, name in zip(panels, SCENES, strict=True):
         scene, steps, arms = stored_build(name)
         cell, network = Cell(scene, arms), seqopt.build_network(scene)
         low, high = _build_box(cell)
         for axes, number in zip(row, SHOWN[name], strict=True):
             step = steps[number - 1]
-            _draw_robots(axes, cell, cell.lines(step, number - 1), VIEW)
+            _draw_robots(axes, cell, cell.arms(step, number - 1), VIEW)
             draw_bricks(axes, network, step.bricks, VIEW)
             _mark_grips(axes, scene, step.grips)
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))

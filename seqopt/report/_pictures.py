@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import tempfile
 from base64 import b64encode
 from collections.abc import Sequence
@@ -13,13 +14,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib import colormaps
-from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
+from PIL import Image  # comes with matplotlib
 
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
@@ -48,7 +49,7 @@ from seqopt.stability.assessment import Stability
 VIEW = View(azimuth=25, elevation=18)
 NUMBERED = 30  # bricks up to which the nodes of a network are numbered
 FRAMES, MOST = 6, 24  # pictures of a build where no steps are named, and at most
-FILM_DPI, FILM_WIDTH = 80, 6.0  # inches
+FILM_DPI, FILM_WIDTH, FILM_COLORS = 80, 6.0, 64  # inches
 SHADES = "YlGnBu"
 PALE = "#f2efe9"  # of a grip whose force is not known
 DARK = "#222222"
@@ -142,8 +143,8 @@ def steps_picture(
     """Return a picture of steps of a build, by their numbers from 1.
 
     By default `FRAMES` of them, spread over the build. With ``forces`` the network is drawn,
-    colored by axial force, instead of the bricks and the robots. ``arms``: their lines in all
-    steps; by default those of postures, where robots of the scene have arms.
+    colored by axial force, instead of the bricks and the robots. ``arms``: what is known of them
+    in all steps; by default their postures, where robots of the scene have arms.
     """
     picked, cell = _picked(steps, chosen), _cell(engine, steps, arms, forces=forces)
     scene, box = cell.scene, _build_box(cell)
@@ -156,7 +157,7 @@ def steps_picture(
     for axes, at in zip(panels, picked, strict=True):
         step = steps[at]
         if not forces:
-            _draw_robots(axes, cell, cell.lines(step, at), VIEW)
+            _draw_robots(axes, cell, cell.arms(step, at), VIEW)
         _draw_step(axes, engine, step, forces=forces, magnify=magnify, largest_force=largest)
         if len(picked) == 1:
             draw_grips(axes, engine.network, step.grips, VIEW)
@@ -286,21 +287,42 @@ class Film:
         high_enough = max(FILM_WIDTH * (high - low) / (right - left), 2.0) + 0.5
         figure = new_picture(FILM_WIDTH, high_enough, "none")
         axes = figure.add_axes((0.02, 0.02, 0.96, 0.88))
-        rate: Any = 1.0 / self.seconds  # the writer takes fractions
-        writer = PillowWriter(fps=rate)
+        frames = []
+        for at, step in enumerate(self.steps):
+            axes.clear()
+            if not self.forces:
+                _draw_robots(axes, cell, cell.arms(step, at), VIEW)
+            _draw_step(axes, self.engine, step, forces=self.forces, magnify=self.magnify)
+            draw_grips(axes, self.engine.network, step.grips, VIEW)
+            _frame(axes, cell.scene, step, len(self.steps), box)
+            frames.append(_shown(figure))
         try:
-            with writer.saving(figure, path, FILM_DPI):
-                for at, step in enumerate(self.steps):
-                    axes.clear()
-                    if not self.forces:
-                        _draw_robots(axes, cell, cell.lines(step, at), VIEW)
-                    _draw_step(axes, self.engine, step, forces=self.forces, magnify=self.magnify)
-                    draw_grips(axes, self.engine.network, step.grips, VIEW)
-                    _frame(axes, cell.scene, step, len(self.steps), box)
-                    writer.grab_frame()
+            path.write_bytes(_animated(frames, self.seconds))
         except OSError as error:
             raise FileError(f"cannot write {path}: {error.strerror}; name another") from error
         return path
+
+
+def _shown(figure: Figure) -> Image.Image:
+    """Return what a figure shows, as an image."""
+    out = io.BytesIO()
+    figure.savefig(out, format="png", dpi=FILM_DPI)
+    return Image.open(out).convert("RGB")
+
+
+def _animated(frames: Sequence[Image.Image], seconds: float) -> bytes:
+    """Return images as a GIF of few colors, the same in all: less than half of the bytes."""
+    wide, high = frames[0].size
+    some = [frames[k * (len(frames) - 1) // 3] for k in range(4)]
+    sample = Image.new("RGB", (wide, len(some) * high))
+    for k, frame in enumerate(some):
+        sample.paste(frame, (0, k * high))
+    colors, plain = sample.quantize(FILM_COLORS, Image.Quantize.MEDIANCUT), Image.Dither.NONE
+    first, *more = (frame.quantize(palette=colors, dither=plain) for frame in frames)
+    out = io.BytesIO()
+    how: Any = {"save_all": True, "append_images": more, "loop": 0, "optimize": True}
+    first.save(out, format="GIF", duration=round(1000 * seconds), **how)
+    return out.getvalue()
 
 
 @styled

@@ -12,15 +12,18 @@ import numpy as np
 import pandas as pd
 import pytest
 from PIL import Image
+from scipy.spatial import ConvexHull
 
 import seqopt
 from seqopt._cli.main import main
 from seqopt._cli.outputs import _task_files
 from seqopt._files import csv_text
+from seqopt.arms._drawn import idle_arm
+from seqopt.arms._model import ArmModel
 from seqopt.errors import ExtraError, ProblemError
 from seqopt.plan._bases import without_arms
 from seqopt.report._pictures import VIEW, Film, steps_picture
-from seqopt.report._robots import Cell, _known_arms
+from seqopt.report._robots import _known_arms
 from seqopt.report.page import Build, _tasks
 from seqopt.sequence.exports._arm_tasks import _in_postures
 from seqopt.sequence.exports._tasks import Action, plan_tasks, tasks_json
@@ -142,8 +145,9 @@ def test_arms_are_drawn_from_their_base_to_what_they_hold(plan):
     assert set(arms) == set(found.table.robots)
     for robot in (each for each in scene.robots if each.arm is not None):
         r = scene.robots.index(robot)
-        foot = arms[robot.name][0][0]
-        for step, points in zip(plan.steps, arms[robot.name], strict=True):
+        foot = arms[robot.name][0].line[0]
+        for step, arm in zip(plan.steps, arms[robot.name], strict=True):
+            points = arm.line
             assert np.allclose(points[0], foot)
             assert np.allclose(foot, robot.arm.position)
             node = step.grips[r]
@@ -160,37 +164,66 @@ def test_arms_are_drawn_from_their_base_to_what_they_hold(plan):
     assert _known_arms(scene.with_robots(scene.robots[2]), ()) == {}
 
 
-def lines_in(axes):
-    """The lines of arms in a picture, by their points."""
+def seen(points):
+    return points @ VIEW.axes()[:2].T
+
+
+def outlines(axes):
+    """What is drawn of robots in a picture: outlines of bodies, and lines of sketches."""
     return [patch.get_path().vertices for patch in axes.patches[1:]]
+
+
+def area(points):
+    """The area inside a line through points, by the shoelace formula."""
+    x, y = points[:, 0], points[:, 1]
+    return 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))
 
 
 def test_pictures_and_films_draw_arms_in_their_postures(plan, tmp_path):
     engine, steps = plan.engine, plan.steps
-    scene, right_up = engine.network.scene, VIEW.axes()[:2]
+    posed = _known_arms(engine.network.scene, steps)
     number = next(s.number for s in steps if s.grips[0] is not None)
     (axes,) = steps_picture(engine, steps, number).axes
-    known = _known_arms(scene, steps)["north"][number - 1] @ right_up.T
-    sketch = Cell(scene).arm(scene.robots[0], steps[number - 1].grips[0]) @ right_up.T
-
-    def is_drawn(axes, line):
-        own = [each for each in lines_in(axes) if len(each) == len(line) - 1]
-        return any(np.allclose(each, line[:-1]) for each in own)
-
-    assert is_drawn(axes, known)
-    assert not is_drawn(axes, sketch)
+    arm = posed["north"][number - 1]
+    inside = [ConvexHull(seen(points)).volume for points in arm.bodies]
+    drawn = [abs(area(each)) for each in outlines(axes)]
+    assert all(min(abs(each - other) for other in drawn) < 1e-9 for each in inside)
     low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
-    for own in _known_arms(scene, steps).values():
-        seen = np.vstack(own) @ right_up.T
-        assert (seen > low).all()  # arms are seen whole
-        assert (seen < high).all()
+    for own in (each for every in posed.values() for each in every):
+        points = seen(np.vstack([own.line, *own.bodies]))
+        assert (points > low).all()  # arms are seen whole
+        assert (points < high).all()
     (bare,) = steps_picture(engine, steps, number, arms={}).axes  # the control: sketches are asked
-    assert is_drawn(bare, sketch)
-    assert not is_drawn(bare, known)
-    with Image.open(Film(engine, steps[:2]).save(tmp_path / "build.gif")) as film:
-        with_arms = [np.array(film.convert("L"))]
-    with Image.open(Film(engine, steps[:2], arms={}).save(tmp_path / "bare.gif")) as film:
-        assert with_arms[0].shape != film.size[::-1] or (with_arms[0] != film.convert("L")).any()
+    sketched = [abs(area(each)) for each in outlines(bare)]
+    assert not any(min(abs(each - other) for other in sketched) < 1e-9 for each in inside)
+    films = [
+        Film(engine, steps[:2], **how).save(tmp_path / name)
+        for name, how in (("build.gif", {}), ("bare.gif", {"arms": {}}))
+    ]
+    sizes = []
+    for path in films:
+        with Image.open(path) as film:
+            assert film.n_frames == 2
+            sizes.append(film.size)
+    assert sizes[0] != sizes[1]  # there is room for the arms
+
+
+def test_bodies_are_those_that_collisions_are_looked_for_with(plan):
+    """The tool ends at the node, and links are where the table of postures has them."""
+    scene = plan.engine.network.scene
+    for robot, own in ((r, _known_arms(scene, plan.steps)[r.name]) for r in scene.robots[:2]):
+        for step, arm in zip(plan.steps, own, strict=True):
+            node = step.grips[scene.robots.index(robot)]
+            if node is None:
+                assert len(arm.bodies) == len(idle_arm(robot.arm).bodies) >= 1
+                continue
+            tip = arm.bodies[-1][len(arm.bodies[-1]) // 2 :].mean(axis=0)
+            np.testing.assert_allclose(tip, scene.node_position(node), atol=1e-5)
+            placed = ArmModel(robot.arm).placed(arm.joints[None], np.array([0.1]))
+            links = arm.bodies[-placed.low.shape[1] :][:-1]
+            for k, points in enumerate(links):
+                np.testing.assert_allclose(points.min(axis=0), placed.low[0, k], atol=1e-9)
+                np.testing.assert_allclose(points.max(axis=0), placed.high[0, k], atol=1e-9)
 
 
 def test_arms_that_are_given_must_be_of_robots(plan):
