@@ -56,8 +56,10 @@ class Site:
         return cls(bricks, robots, tuple(sorted(scene.blocked_nodes)), scene.up)
 
     def alone(self, robot: int) -> Site:
-        """Return the same with one of the robots, whatever its name."""
-        return replace(self, robots=(replace(self.robots[robot], name="alone"),))
+        """Return the same with one of the robots, whatever its name and the others."""
+        own = self.robots[robot]
+        arm = own.arm and replace(own.arm, keeps_apart=True)
+        return replace(self, robots=(replace(own, name="alone", arm=arm),))
 
     def together(self, one: int, two: int) -> bool:
         """Return whether two robots must keep apart."""
