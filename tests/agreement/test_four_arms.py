@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image
 
 from experiments.exchange.four_arms import EXAMPLES, SCENES, faults, stored_build
 from experiments.harness.results import stored
@@ -15,6 +17,7 @@ from seqopt.errors import StepError
 from seqopt.scene.scene_file import dump_scene, load_scene
 from seqopt.sequence.exports.formats import export_plan, read_folder
 from seqopt.sequence.schedule_file import parse_plan
+from tests.builders import ROOT
 
 MOST = 1_500_000  # bytes of all files to download
 
@@ -155,3 +158,21 @@ def test_no_step_has_a_contact_by_another_library(build):
     robot, row = held["robot"].iloc[0], held.index[0]
     table.joints[row, 1] += 1.0  # the control: an arm that reaches into the ground
     assert site.touching({robot: row}, len(scene.bricks)) != set()
+
+
+def test_the_page_prints_what_it_says(monkeypatch, capsys):
+    page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    code, said = re.search(r"```python\n(.*?)```\n\n```text\n(.*?)```", page, re.DOTALL).groups()
+    monkeypatch.chdir(EXAMPLES / "wall")
+    exec(compile(code, "page", "exec"), {})
+    assert capsys.readouterr().out == said
+
+
+def test_the_page_names_files_that_are_there():
+    page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    named = re.findall(r"[<(](examples/four_arms/[^>)]+)[>)]", page)
+    files = {str(path.relative_to(ROOT / "docs")) for path in EXAMPLES.rglob("*.*")}
+    assert {*named} == files
+    for name in SCENES:
+        with Image.open(EXAMPLES / name / "film.gif") as film:
+            assert film.n_frames == len(read_folder(EXAMPLES / name)[1])
