@@ -44,7 +44,7 @@ EXAMPLES = FIGURES.parent / "examples" / "four_arms"
 ABB = "compas_fab:data/robot_library/abb_irb4600_40_255/urdf/robot_description.urdf"
 PAYLOAD = 390.0  # N
 BRICK = (0.246, 0.116, 0.053)  # m; that of the vault of Bruun et al.
-FILES = ("scene.json", "plan.csv", "plan.json", "tasks.json", "tasks.csv")
+FILES = ("plan.csv", "plan.json", "tasks.json", "tasks.csv")
 SHOWN = {"wall": (8, 19, 28), "vault": (12, 22, 46)}  # steps in the picture
 
 
@@ -81,7 +81,7 @@ STANDS = {"wall": "dry", "vault": "epoxy"}  # with which mortar every step stand
 
 def built(name: str, scene: Scene, folder: Path) -> dict[str, object]:
     """Write the plan of a scene to a folder, as the command line does; return a row about it."""
-    given, plan = folder / "given.json", folder / "plan"
+    given, plan = folder / "scene.json", folder / "plan"
     seqopt.save_scene(scene, given)
     run("optimize", given, "--schedule", "free", "--out", plan)
     run("export", plan, "--format", "json", "--out", plan / "plan.json")
@@ -112,6 +112,13 @@ def run(*words: object) -> None:
     """Run a command; it must end well."""
     if status := main([*map(str, words)]):
         raise ClaimError(f"seqopt {words[0]} ended with status {status}")
+
+
+def keep(name: str, folder: Path) -> None:
+    """Keep the scene and the files of its plan among the examples."""
+    (EXAMPLES / name).mkdir(parents=True, exist_ok=True)
+    for path in (folder / "scene.json", *(folder / "plan" / file for file in FILES)):
+        (EXAMPLES / name / path.name).write_bytes(path.read_bytes())
 
 
 def faults(table: pd.DataFrame) -> list[str]:
@@ -189,9 +196,8 @@ def experiment(options: Options) -> Finding | None:
     for name, scene in scenes.items():
         with tempfile.TemporaryDirectory() as folder:
             rows.append(built(name, scene(), Path(folder)))
-            for file in () if options.quick else FILES:
-                (EXAMPLES / name).mkdir(parents=True, exist_ok=True)
-                (EXAMPLES / name / file).write_bytes((Path(folder) / "plan" / file).read_bytes())
+            if not options.quick:
+                keep(name, Path(folder))
     if not options.quick:
         draw_films()
     table = pd.DataFrame(rows)

@@ -49,7 +49,7 @@ from seqopt.stability.assessment import Stability
 VIEW = View(azimuth=25, elevation=18)
 NUMBERED = 30  # bricks up to which the nodes of a network are numbered
 FRAMES, MOST = 6, 24  # pictures of a build where no steps are named, and at most
-FILM_DPI, FILM_WIDTH, FILM_COLORS = 80, 6.0, 64  # inches
+FILM_DPI, FILM_WIDTH, FILM_COLORS = 80, 6.0, 128  # inches
 SHADES = "YlGnBu"
 PALE = "#f2efe9"  # of a grip whose force is not known
 DARK = "#222222"
@@ -317,7 +317,10 @@ def _animated(frames: Sequence[Image.Image], seconds: float) -> bytes:
     sample = Image.new("RGB", (wide, len(some) * high))
     for k, frame in enumerate(some):
         sample.paste(frame, (0, k * high))
-    colors, plain = sample.quantize(FILM_COLORS, Image.Quantize.MEDIANCUT), Image.Dither.NONE
+    colors, plain = sample.quantize(FILM_COLORS, Image.Quantize.FASTOCTREE), Image.Dither.NONE
+    palette = np.array(colors.getpalette()).reshape(-1, 3)
+    palette[palette.sum(axis=1).argmax()] = 255  # the background stays white
+    colors.putpalette(palette.ravel().tolist())
     first, *more = (frame.quantize(palette=colors, dither=plain) for frame in frames)
     out = io.BytesIO()
     how: Any = {"save_all": True, "append_images": more, "loop": 0, "optimize": True}
