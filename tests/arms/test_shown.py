@@ -20,7 +20,7 @@ from seqopt._cli.outputs import _task_files
 from seqopt._files import csv_text
 from seqopt.arms._drawn import idle_arm
 from seqopt.arms._model import ArmModel
-from seqopt.errors import ExtraError, ProblemError
+from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.plan._bases import without_arms
 from seqopt.report._pictures import VIEW, Film, steps_picture
 from seqopt.report._robots import _known_arms
@@ -100,14 +100,15 @@ def test_what_is_exported_later_has_the_same_postures(plan, folder, form, name, 
     assert [*(folder / "postures").iterdir()]
 
 
-def test_an_export_without_postures_is_of_proposals(plan, folder, monkeypatch, capsys):
+@pytest.mark.parametrize("kind", [ExtraError, SceneError])
+def test_an_export_without_postures_is_of_proposals(plan, folder, monkeypatch, capsys, kind):
     scene, steps = read_folder(folder)
     proposed = tasks_json(scene, plan_tasks(scene, steps))
     assert export_plan(scene, steps, "tasks", postures={}) == proposed
     assert proposed != _task_files(plan)["tasks.json"]  # the control
 
     def missing(*_):
-        raise ExtraError("arms need pinocchio and coal: pip install 'seqopt[arms]'")
+        raise kind("arms need pinocchio and coal: pip install 'seqopt[arms]'")
 
     monkeypatch.setattr("seqopt._cli.commands.exporting.find_postures", missing)
     out = folder / "proposed.json"

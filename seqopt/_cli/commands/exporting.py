@@ -11,7 +11,7 @@ from seqopt._cli.options import declare, form_options
 from seqopt._cli.values import number_word
 from seqopt._files import require_apart, write_text
 from seqopt.arms.reach import find_postures
-from seqopt.errors import ExtraError
+from seqopt.errors import ExtraError, SceneError
 from seqopt.problem._arms import arm_faults
 from seqopt.scene.scene import Scene
 from seqopt.sequence.exports._tasks import Postures
@@ -88,6 +88,6 @@ def _arms(
         return (), None
     try:
         find_postures(scene, options.cache, options.tell)
-    except ExtraError as error:
+    except (ExtraError, SceneError) as error:
         return (f"arms: grips are proposals without postures; {error}",), {}
     return tuple(f"arms cannot: {fault}" for fault in arm_faults(scene, steps)), None

@@ -168,7 +168,9 @@ def _what_helps(problem: States, look: Look) -> str:
     """Return what opens a way, as the end of a line."""
     ways = [*_opening(problem, look)]
     if {*ways} <= {ARMS, APART}:  # of the same arms two rules may ask less
-        ways += islice(_pairs(problem, look), 1)
+        arms = (ARMS, APART) if ways else ()
+        pairs = (pair for pair in _pairs(problem, look) if not pair.endswith(arms))
+        ways = [*ways, *islice(pairs, 1)]
     if not ways:
         return ", whatever two rules or limits are loosened; extend a reach or add a robot"
     return f"; it becomes possible with {' or '.join(_enough(problem, w, look) for w in ways)}"
@@ -213,8 +215,7 @@ def _pairs(problem: States, look: Look) -> Iterator[str]:
     """Yield two that open a way together: rules, or a rule and a limit."""
     for text, rules in _loosened(problem):
         for other in _opening(replace(problem, rules=rules), look):
-            if other not in (ARMS, APART):
-                yield f"{text} together with {other}"
+            yield f"{text} together with {other}"
 
 
 def _enough(problem: States, way: str, look: Look) -> str:
