@@ -16,6 +16,8 @@ _STEPS = 60  # of Newton's method from each
 _LONGEST = 0.4  # step of a joint, rad or m
 _DAMPING = 1e-5
 _CLOSE = 1e-6  # m and rad; how far a flange may be from its target
+WAY = 4  # points of the way to a node at which an arm is checked
+_JUMP = 0.7  # rad or m; by which a joint goes at most from one of these to the next
 _SAME = 1e-2  # rad or m; postures closer than this are one
 _AXES = {"length": 0, "width": 1, "thickness": 2}
 
@@ -80,6 +82,26 @@ def solve(model: ArmModel, target: Target, draws: np.random.Generator) -> list[F
         if inside and all(np.abs(posture - other).max() > _SAME for other in found):
             found.append(posture)
     return found
+
+
+def way(model: ArmModel, target: Target, posture: Floats) -> Floats | None:
+    """Return postures at points of the way straight back from a target, (k, joints), the far last.
+
+    None if it cannot be gone without a jump: where a joint ends, or the arm does.
+    """
+    import pinocchio as pin  # noqa: PLC0415  # an extra
+
+    out, last = [], posture
+    for share in np.linspace(0.0, 1.0, WAY + 1)[1:]:
+        place = target.place - share * model.arm.approach * target.axes[:, 2]
+        found = _descend(pin, model, model.base.actInv(pin.SE3(target.axes, place)), last)
+        if found is None or np.abs(found - last).max() > _JUMP:
+            return None
+        if not ((found >= model.low) & (found <= model.high)).all():
+            return None
+        out.append(found)
+        last = found
+    return np.array(out)
 
 
 def _descend(pin: object, model: ArmModel, wanted: object, posture: Floats) -> Floats | None:

@@ -19,7 +19,7 @@ from seqopt.arms._collisions import (
     overlap,
     touching,
 )
-from seqopt.arms._inverse import solve, targets
+from seqopt.arms._inverse import WAY, Target, solve, targets, way
 from seqopt.arms._model import ArmModel, Placed
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SceneError
@@ -64,8 +64,10 @@ class Site:
         return cls(bricks, robots, tuple(sorted(scene.blocked_nodes)), scene.up)
 
     def alone(self, robot: int) -> Site:
-        """Return the same with one of the robots, whatever its name."""
-        return replace(self, robots=(replace(self.robots[robot], name="alone"),))
+        """Return the same with one of the robots, whatever its name and the others."""
+        own = self.robots[robot]
+        arm = own.arm and replace(own.arm, keeps_apart=True)
+        return replace(self, robots=(replace(own, name="alone", arm=arm),))
 
     def together(self, one: int, two: int) -> bool:
         """Return whether two robots must keep apart."""
@@ -105,7 +107,8 @@ def reached_alone(site: Site, most: int) -> Reached:
     """Return the postures of the one robot of a site at all nodes: at most so many at each.
 
     They touch neither the ground, which is level with the lower one of its base and of the lowest
-    brick, nor the arm itself, nor, the tool aside, the brick that is gripped.
+    brick, nor the arm itself, nor, the tool aside, the brick that is gripped: where they hold, and
+    on the way there and back, if that is checked.
     """
     (robot,) = site.robots
     assert robot.arm is not None
@@ -115,13 +118,17 @@ def reached_alone(site: Site, most: int) -> Reached:
     )
     _require_free(site, robot, np.asarray(overlap(fixed_bodies(model), bricks).any(axis=0)))
     places, joints, flanges = _solved(site, model)
-    placed = model.placed(joints, np.array([flange.tool for flange in flanges]))
+    tools = np.array([flange.tool for flange in flanges])
+    placed, able = _with_ways(model, joints, flanges, tools)
     up = np.array(site.up)
     ground = min(float(model.base.translation @ up), *(float((c @ up).min()) for c in corners))
-    clear = ~np.asarray(touching(model, placed, apart_pairs(model)).any(axis=1))
-    clear &= (_lowest(model, placed, up) > ground)[:, model.above :].all(axis=1)
+    pairs, clear = apart_pairs(model), able
+    for each in (placed, *placed.ways):
+        clear &= ~np.asarray(touching(model, each, pairs).any(axis=1))
+        clear &= (_lowest(model, each, up) > ground)[:, model.above :].all(axis=1)
     rows = np.flatnonzero(clear)
-    struck = hits(model, placed.rows(rows), bricks)
+    free = placed.rows(rows)
+    struck = np.logical_or.reduce([hits(model, each, bricks) for each in (free, *free.ways)])
     held = places[rows] // 2  # the tool goes around the brick that it grips, the arm does not
     at = np.arange(len(rows))
     some = np.flatnonzero(~struck[at, :-1, held].any(axis=1))
@@ -140,6 +147,23 @@ def reached_alone(site: Site, most: int) -> Reached:
         placed=placed.rows(kept),
         found=counts,
     )
+
+
+def _with_ways(
+    model: ArmModel, joints: Floats, flanges: list[Target], tools: Floats
+) -> tuple[Placed, Bools]:
+    """Return where bodies are in postures, also on their ways, and which have one (P,)."""
+    placed, able = model.placed(joints, tools), np.ones(len(joints), dtype=bool)
+    if not model.arm.approach:
+        return placed, able
+    found = [way(model, *each) for each in zip(flanges, joints, strict=True)]
+    able = np.array([each is not None for each in found], dtype=bool)
+    still = np.repeat(joints[:, None], WAY, axis=1)  # where there is no way
+    points = np.array([still[i] if each is None else each for i, each in enumerate(found)]).reshape(
+        -1, WAY, model.joints
+    )
+    ways = tuple(model.placed(points[:, k], tools) for k in range(WAY))
+    return replace(placed, ways=ways), able
 
 
 def _require_free(site: Site, robot: Robot, inside: Bools) -> None:
@@ -162,12 +186,13 @@ def beside_others(site: Site, alone: Sequence[Reached]) -> list[Reached]:
             if overlap(bases[i], bases[j]).any():
                 one, two = (site.robots[k].name for k in (i, j))
                 raise SceneError(f"robot {one}: the base of its arm hits that of {two}; move one")
-            clear &= ~np.asarray(hits(own.model, own.placed, bases[j]).any(axis=(1, 2)))
+            for placed in (own.placed, *own.placed.ways):
+                clear &= ~np.asarray(hits(own.model, placed, bases[j]).any(axis=(1, 2)))
         out.append(own.rows(np.flatnonzero(clear)))
     return out
 
 
-def _solved(site: Site, model: ArmModel) -> tuple[Ints, Floats, list[Any]]:
+def _solved(site: Site, model: ArmModel) -> tuple[Ints, Floats, list[Target]]:
     """Return the nodes, as places, the joints and the targets of all postures of a robot."""
     reach = site.robots[0].reach
     nodes, joints, flanges = [], [], []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import tempfile
 from base64 import b64encode
 from collections.abc import Sequence
@@ -13,20 +14,20 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from matplotlib import colormaps
-from matplotlib.animation import PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
+from PIL import Image  # comes with matplotlib
 
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import FileError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.report._robots import Cell
+from seqopt.report._robots import Arms, Cell, _known_arms, _require_arms
 from seqopt.report._style import BLUE, SMALL, WIDTH, new_picture, styled
 from seqopt.report.draw import (
     View,
@@ -48,7 +49,7 @@ from seqopt.stability.assessment import Stability
 VIEW = View(azimuth=25, elevation=18)
 NUMBERED = 30  # bricks up to which the nodes of a network are numbered
 FRAMES, MOST = 6, 24  # pictures of a build where no steps are named, and at most
-FILM_DPI, FILM_WIDTH = 80, 6.0  # inches
+FILM_DPI, FILM_WIDTH, FILM_COLORS = 80, 6.0, 128  # inches
 SHADES = "YlGnBu"
 PALE = "#f2efe9"  # of a grip whose force is not known
 DARK = "#222222"
@@ -80,13 +81,18 @@ def _seen_box(scene: Scene) -> tuple[Floats, Floats]:
     return np.asarray(seen.min(axis=0) - room), np.asarray(seen.max(axis=0) + room)
 
 
-def _build_box(scene: Scene) -> tuple[Floats, Floats]:
-    """Return the corners (2,) of what is seen of a build: robots too, as far as they are near."""
-    low, high = _seen_box(scene)
-    stands = Cell(scene).stands @ VIEW.axes()[:2].T
+def _build_box(cell: Cell) -> tuple[Floats, Floats]:
+    """Return the corners (2,) of what is seen of a build: robots too, as far as they are near.
+
+    Arms whose postures are known are seen whole.
+    """
+    low, high = _seen_box(cell.scene)
+    stands, known = (points @ VIEW.axes()[:2].T for points in (cell.stands, cell.known))
     most, room = NEARBY * (high - low).max(), 0.05 * (high - low).max()
     low = np.maximum(np.vstack([low, stands - room]).min(axis=0), low - most)
-    return low, np.minimum(np.vstack([high, stands + room]).max(axis=0), high + most)
+    high = np.minimum(np.vstack([high, stands + room]).max(axis=0), high + most)
+    low = np.vstack([low, known - room]).min(axis=0)
+    return low, np.vstack([high, known + room]).max(axis=0)
 
 
 @styled
@@ -132,26 +138,32 @@ def steps_picture(
     *,
     forces: bool = False,
     magnify: float = 0.0,
+    arms: Arms | None = None,
 ) -> Figure:
     """Return a picture of steps of a build, by their numbers from 1.
 
     By default `FRAMES` of them, spread over the build. With ``forces`` the network is drawn,
-    colored by axial force, instead of the bricks.
+    colored by axial force, instead of the bricks and the robots. ``arms``: what is known of them
+    in all steps; by default their postures, where robots of the scene have arms.
     """
-    picked, scene = _picked(steps, chosen), engine.network.scene
-    figure, panels = _panels(_build_box(scene), len(picked))
+    picked, cell = _picked(steps, chosen), _cell(engine, steps, arms, forces=forces)
+    scene, box = cell.scene, _build_box(cell)
+    figure, panels = _panels(box, len(picked))
     largest = None
     if forces:  # of any edge in these steps, N
-        each = (_fields(engine, step).edge_force for step in picked)
+        each = (_fields(engine, steps[at]).edge_force for at in picked)
         largest = max(float(np.abs(force).max(initial=0.0)) for force in each)
     key: dict[int, Line2D] = {}
-    for axes, step in zip(panels, picked, strict=True):
+    for axes, at in zip(panels, picked, strict=True):
+        step = steps[at]
+        if not forces:
+            _draw_robots(axes, cell, cell.arms(step, at), VIEW)
         _draw_step(axes, engine, step, forces=forces, magnify=magnify, largest_force=largest)
         if len(picked) == 1:
             draw_grips(axes, engine.network, step.grips, VIEW)
         else:
             key |= _mark_grips(axes, scene, step.grips)
-        _frame(axes, scene, step, steps[-1].number)
+        _frame(axes, scene, step, steps[-1].number, box)
     handles = [key[robot] for robot in sorted(key)]
     handles += [] if largest is None else force_key(largest)
     if handles:
@@ -189,14 +201,22 @@ def _draw_step(
         how |= {"edge_force": fields.edge_force[0], "largest_force": largest_force}
         draw_network(axes, network, bricks, VIEW, **how)
         return
-    _draw_robots(axes, network.scene, step.grips, VIEW)
     if fields is not None:
         draw_bricks(axes, network, bricks, VIEW, alpha=0.15)
         how["twist"] = fields.brick_twist[0]
     draw_bricks(axes, network, bricks, VIEW, **how)
 
 
-def _frame(axes: Axes, scene: Scene, step: Step, count: int) -> None:
+def _cell(engine: Engine, steps: Sequence[Step], given: Arms | None, *, forces: bool) -> Cell:
+    """Return where robots stand, with the arms that are given or, by default, known."""
+    scene = engine.network.scene
+    if given is not None:
+        _require_arms(scene, steps, given)
+        return Cell(scene, given)
+    return Cell(scene, {} if forces else _known_arms(scene, steps))
+
+
+def _frame(axes: Axes, scene: Scene, step: Step, count: int, box: tuple[Floats, Floats]) -> None:
     """Say above a picture which of how many steps it shows, and give it the size of all."""
     newest = scene.placed[step.bricks - 1].name
     what = {
@@ -205,7 +225,7 @@ def _frame(axes: Axes, scene: Scene, step: Step, count: int) -> None:
         StepKind.REPOSITION: "a robot takes a grip",
     }[step.kind]
     axes.set_title(f"step {step.number} of {count}: {what}", loc="center")
-    low, high = _build_box(scene)
+    low, high = box
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
 
 
@@ -221,8 +241,8 @@ def _fields(engine: Engine, step: Step) -> Fields:
     return step_fields(engine, step, Want.EDGES | Want.DISPLACEMENTS | Want.BRICKS)
 
 
-def _picked(steps: Sequence[Step], chosen: int | Sequence[int] | None) -> list[Step]:
-    """Return the steps of some numbers, from 1."""
+def _picked(steps: Sequence[Step], chosen: int | Sequence[int] | None) -> list[int]:
+    """Return the places of the steps of some numbers, from 1."""
     if chosen is None:
         chosen = spread_steps(steps, FRAMES)
     numbers: list[Any] = [*chosen] if isinstance(chosen, tuple | list | range) else [chosen]
@@ -232,7 +252,7 @@ def _picked(steps: Sequence[Step], chosen: int | Sequence[int] | None) -> list[S
     for number in numbers:
         if not isinstance(number, Integral) or not first <= int(number) <= last:
             raise StepError(f"step {short(number)}: the build has steps {first} to {last}")
-    return [steps[int(number) - first] for number in numbers]
+    return [int(number) - first for number in numbers]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -244,6 +264,7 @@ class Film:
     forces: bool = False
     magnify: float = 0.0
     seconds: float = 0.4
+    arms: Arms | None = None
 
     def __repr__(self) -> str:
         name, count = self.engine.network.scene.name, len(self.steps)
@@ -262,24 +283,50 @@ class Film:
         path = Path(path)
         if path.suffix != ".gif":
             raise FileError(f"film {path}: give a name that ends in .gif")
-        scene = self.engine.network.scene
-        (left, low), (right, high) = _build_box(scene)
+        cell = _cell(self.engine, self.steps, self.arms, forces=self.forces)
+        (left, low), (right, high) = box = _build_box(cell)
         high_enough = max(FILM_WIDTH * (high - low) / (right - left), 2.0) + 0.5
         figure = new_picture(FILM_WIDTH, high_enough, "none")
         axes = figure.add_axes((0.02, 0.02, 0.96, 0.88))
-        rate: Any = 1.0 / self.seconds  # the writer takes fractions
-        writer = PillowWriter(fps=rate)
+        frames = []
+        for at, step in enumerate(self.steps):
+            axes.clear()
+            if not self.forces:
+                _draw_robots(axes, cell, cell.arms(step, at), VIEW)
+            _draw_step(axes, self.engine, step, forces=self.forces, magnify=self.magnify)
+            draw_grips(axes, self.engine.network, step.grips, VIEW)
+            _frame(axes, cell.scene, step, self.steps[-1].number, box)
+            frames.append(_shown(figure))
         try:
-            with writer.saving(figure, path, FILM_DPI):
-                for step in self.steps:
-                    axes.clear()
-                    _draw_step(axes, self.engine, step, forces=self.forces, magnify=self.magnify)
-                    draw_grips(axes, self.engine.network, step.grips, VIEW)
-                    _frame(axes, scene, step, self.steps[-1].number)
-                    writer.grab_frame()
+            path.write_bytes(_animated(frames, self.seconds))
         except OSError as error:
             raise FileError(f"cannot write {path}: {error.strerror}; name another") from error
         return path
+
+
+def _shown(figure: Figure) -> Image.Image:
+    """Return what a figure shows, as an image."""
+    out = io.BytesIO()
+    figure.savefig(out, format="png", dpi=FILM_DPI)
+    return Image.open(out).convert("RGB")
+
+
+def _animated(frames: Sequence[Image.Image], seconds: float) -> bytes:
+    """Return images as a GIF of few colors, the same in all: less than half of the bytes."""
+    wide, high = frames[0].size
+    some = [frames[k * (len(frames) - 1) // 3] for k in range(4)]
+    sample = Image.new("RGB", (wide, len(some) * high))
+    for k, frame in enumerate(some):
+        sample.paste(frame, (0, k * high))
+    colors, plain = sample.quantize(FILM_COLORS, Image.Quantize.FASTOCTREE), Image.Dither.NONE
+    palette = np.array(colors.getpalette()).reshape(-1, 3)
+    palette[palette.sum(axis=1).argmax()] = 255  # the background stays white
+    colors.putpalette(palette.ravel().tolist())
+    first, *more = (frame.quantize(palette=colors, dither=plain) for frame in frames)
+    out = io.BytesIO()
+    how: Any = {"save_all": True, "append_images": more, "loop": 0, "optimize": True}
+    first.save(out, format="GIF", duration=round(1000 * seconds), **how)
+    return out.getvalue()
 
 
 @styled

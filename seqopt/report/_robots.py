@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from seqopt.arms._drawn import _arm_line, _idle_line
+from seqopt.arms._drawn import PosedArm, idle_arm
 from seqopt.arrays import Floats
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.scene.boxes import vertices_of
@@ -30,15 +30,18 @@ _LONGEST = 0.4  # of a link, over the size of the structure
 _TOOL = 0.5  # of a tool outside of a brick, over the longest side of the brick
 _FOLDED = ((0.75, -0.45), (0.35, 0.1), (0.2, 0.1))  # elbow, wrist, tip: up and ahead, over a link
 
-Arms = Mapping[str, Sequence[Floats | None]]
-"""Points of arms, (k, 3), m, by the names of robots: an entry for every step."""
+Arms = Mapping[str, Sequence[Floats | PosedArm | None]]
+"""Points of arms, (k, 3), m, or arms in postures, by robots' names: an entry for every step."""
 
 
 class Cell:
-    """Where the robots of a scene stand, and how they hold nodes."""
+    """Where the robots of a scene stand, and how they hold nodes.
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+    ``arms``: lines that are known; the others are sketched.
+    """
+
+    def __init__(self, scene: Scene, arms: Arms | None = None) -> None:
+        self.scene, self._arms = scene, arms or {}
         self.up = np.array(scene.up)
         self.corners = np.vstack([vertices_of(brick)[0] for brick in scene.bricks])
         self._found: dict[tuple[str, int | None], Floats | None] = {}
@@ -62,7 +65,28 @@ class Cell:
     def stands(self) -> Floats:
         """Where robots stand: their feet and shoulders, (k, 3), m."""
         points = [p for at, _ in self.shoulders.values() for p in (self._on_ground(at), at)]
+        points += [_line(arm)[0] for arm in self._known]
         return np.array(points).reshape(-1, 3)
+
+    @cached_property
+    def known(self) -> Floats:
+        """All points of the arms that are known, in all steps, (k, 3), m."""
+        lines = [_line(arm) for arm in self._known]
+        bodies = [body for arm in self._known if isinstance(arm, PosedArm) for body in arm.bodies]
+        return np.vstack([np.zeros((0, 3)), *lines, *bodies])
+
+    @cached_property
+    def _known(self) -> list[Floats | PosedArm]:
+        every = [arm for own in self._arms.values() for arm in own if arm is not None]
+        return [*{id(arm): arm for arm in every}.values()]
+
+    def arms(self, step: Step, at: int) -> list[Floats | PosedArm | None]:
+        """Return what there is of every robot in a step, the ``at``-th of those of known arms."""
+        pairs = zip(self.scene.robots, step.grips, strict=True)
+        return [
+            self._arms[robot.name][at] if robot.name in self._arms else self.arm(robot, node)
+            for robot, node in pairs
+        ]
 
     @cached_property
     def yard(self) -> Floats:
@@ -155,19 +179,25 @@ class Cell:
         return np.array([self._on_ground(shoulder), shoulder, *bent])
 
 
+def _line(arm: Floats | PosedArm) -> Floats:
+    """Return the points of an arm that is known, (k, 3), m."""
+    return arm.line if isinstance(arm, PosedArm) else np.asarray(arm)
+
+
 def _known_arms(scene: Scene, steps: Sequence[Step]) -> Arms:
-    """Return the lines of robots with arms in the steps of a plan, in postures that it allows.
+    """Return robots with arms in the steps of a plan, in postures that it allows.
 
     Where a step has no posture the grip alone is drawn; none are known where nothing computes them.
     """
     try:
         found = plan_postures(scene, steps)
-        idle = {robot.name: _idle_line(robot.arm) for robot in scene.robots if robot.arm}
+        idle = {robot.name: idle_arm(robot.arm) for robot in scene.robots if robot.arm}
     except (ExtraError, SceneError):
         return {}
     if found is None:
         return {}
-    table, cell, out = found.table, Cell(scene), dict[str, list[Floats | None]]()
+    table, cell, posed = found.table, Cell(scene), dict[int, PosedArm]()
+    out = dict[str, list[Floats | PosedArm | None]]()
     for r, robot in enumerate(scene.robots):
         if robot.arm is None:
             continue
@@ -175,10 +205,21 @@ def _known_arms(scene: Scene, steps: Sequence[Step]) -> Arms:
         for step, rows in zip(steps, found.steps, strict=True):
             row, node = rows[r], step.grips[r]
             if row is not None:
-                own.append(_arm_line(robot.arm, table.joints[row]))
+                own.append(posed.setdefault(row, PosedArm(robot.arm, table.joints[row])))
             else:
                 own.append(idle[robot.name] if node is None else cell.arm(robot, node))
     return out
+
+
+def _require_arms(scene: Scene, steps: Sequence[Step], given: Arms) -> None:
+    """Raise a `ProblemError` unless arms have a line a step, by names of robots."""
+    known = {robot.name for robot in scene.robots}
+    for name, own in given.items():
+        if name not in known or len(own) != len(steps):
+            raise ProblemError(
+                f"arms of {name}: {len(own)} for {len(steps)} steps; give one a step, "
+                f"by the name of a robot: {', '.join(sorted(known))}"
+            )
 
 
 def arm_data(scene: Scene, steps: Sequence[Step], given: Arms) -> dict[str, object]:
@@ -187,20 +228,13 @@ def arm_data(scene: Scene, steps: Sequence[Step], given: Arms) -> dict[str, obje
     ``lines`` are points, each line once; ``at`` has a row for every step with the place of each
     robot's among them, or -1.
     """
-    known = {robot.name for robot in scene.robots}
-    for name, own in given.items():
-        if name not in known or len(own) != len(steps):
-            raise ProblemError(
-                f"arms of {name}: {len(own)} for {len(steps)} steps; give one a step, "
-                f"by the name of a robot: {', '.join(sorted(known))}"
-            )
-    cell, places = Cell(scene), dict[str, int]()
+    _require_arms(scene, steps, given)
+    cell, places = Cell(scene, given), dict[str, int]()
     lines, at = list[object](), list[list[int]]()
     for s, step in enumerate(steps):
         row = []
-        for robot, node in zip(scene.robots, step.grips, strict=True):
-            points = given[robot.name][s] if robot.name in given else cell.arm(robot, node)
-            line = None if points is None else np.asarray(points).round(4).tolist()
+        for arm in cell.arms(step, s):
+            line = None if arm is None else _line(arm).round(4).tolist()
             if line is not None and (key := str(line)) not in places:
                 places[key] = len(lines)
                 lines.append(line)

@@ -310,7 +310,8 @@ def plan_figures(engine: Engine, builds: Sequence[Build]) -> dict[str, bytes]:
     """Return figures of plans as PNG and SVG, by file name: steps, grips, and all responses."""
     files: dict[str, bytes] = {}
     for build in builds:
-        files |= picture_files(f"{build.name}_steps", steps_picture(engine, build.steps))
+        shown = steps_picture(engine, build.steps, arms=build.arms)
+        files |= picture_files(f"{build.name}_steps", shown)
         grips = gantt_picture(engine.network.scene, build.steps, build.table)
         files |= picture_files(f"{build.name}_grips", grips)
     tables = {build.name: build.table for build in builds}

@@ -17,18 +17,20 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgb
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch, Polygon
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
+from scipy.spatial import ConvexHull
 
+from seqopt.arms._drawn import PosedArm
 from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind
 from seqopt.report._robots import ROBOT_COLORS, Cell
 from seqopt.report._style import BLUE, SMALL, VERMILION
 from seqopt.scene.boxes import boxes, vertices_of
 from seqopt.scene.parts import Brick
-from seqopt.scene.scene import Scene
 from seqopt.scene.shape import normal_of
 
 HALO = (withStroke(linewidth=2.5, foreground="white"),)
@@ -49,6 +51,7 @@ CLAY = np.array([0.80, 0.52, 0.38])
 MARKED = np.array([0.46, 0.63, 0.76])
 ROBOT_MARKERS = "XPDs"
 GROUND, ARM = "#efece6", 3.2  # color; width of an arm, points
+PALE, THROUGH = 0.55, 0.6  # of the color of an arm's bodies; opacity of those before bricks
 LINE = 11.0  # points from one line of text to the next
 NEAR = (0.3, 0.08)  # share of a picture within which labels are neighbors, aside and up
 
@@ -285,26 +288,47 @@ def draw_grips(axes: Axes, network: Network, grips: Sequence[int | None], view: 
         _write(axes, name, (x, y), (10, LINE * line), color=mark["color"], zorder=6)
 
 
-def _draw_robots(axes: Axes, scene: Scene, grips: Sequence[int | None], view: View) -> None:
+def _draw_robots(
+    axes: Axes, cell: Cell, arms: Sequence[Floats | PosedArm | None], view: View
+) -> None:
     """Draw the ground and the arms of all robots, behind the structure or before it.
 
-    Arms lead from a base to the grip, as sketches; see `seqopt.report._robots`.
+    ``arms``: of every robot in a step: its bodies are drawn where its posture is known, otherwise
+    the line from its foot to its grip; see `seqopt.report._robots`.
     """
-    cell, (right, up, toward) = Cell(scene), view.axes()
-    seen = np.stack([right, up])
+    seen = view.axes()[:2]
     axes.add_patch(Polygon(cell.yard @ seen.T, fc=GROUND, lw=0, zorder=0.1))
-    for i, (robot, node) in enumerate(zip(scene.robots, grips, strict=True)):
-        points = cell.arm(robot, node)
-        if points is None:
+    for i, arm in enumerate(arms):
+        if arm is None:
             continue
-        near = (points[0] - cell.middle) @ toward > 0
-        color, order = grip_mark(i)["color"], 4.0 if near else 0.5
-        line, wide = points @ seen.T, ARM if len(points) > 2 else 0.5 * ARM
-        for width, paint in ((wide + 1.6, "white"), (wide, color)):
-            look: Any = {"fill": False, "capstyle": "round", "joinstyle": "round", "zorder": order}
-            axes.add_patch(PathPatch(Path(line[:-1]), lw=width, ec=paint, **look))
-        ends: Any = {"fill": False, "capstyle": "round", "zorder": order}
-        axes.add_patch(PathPatch(Path(line[-2:]), lw=0.6 * ARM, ec=INK, **ends))
+        points = arm.line if isinstance(arm, PosedArm) else arm
+        near = (points[0] - cell.middle) @ view.axes()[2] > 0
+        look: Any = {"color": grip_mark(i)["color"], "order": 4.0 if near else 0.5}
+        if isinstance(arm, PosedArm):
+            _draw_bodies(axes, arm, view, **look)
+        else:
+            _draw_line(axes, points @ seen.T, **look)
+
+
+def _draw_line(axes: Axes, line: Floats, *, color: str, order: float) -> None:
+    """Draw an arm as the line that is seen of it, (k, 2), its tool thin."""
+    wide = ARM if len(line) > 2 else 0.5 * ARM
+    for width, paint in ((wide + 1.6, "white"), (wide, color)):
+        look: Any = {"fill": False, "capstyle": "round", "joinstyle": "round", "zorder": order}
+        axes.add_patch(PathPatch(Path(line[:-1]), lw=width, ec=paint, **look))
+    ends: Any = {"fill": False, "capstyle": "round", "zorder": order}
+    axes.add_patch(PathPatch(Path(line[-2:]), lw=0.6 * ARM, ec=INK, **ends))
+
+
+def _draw_bodies(axes: Axes, arm: PosedArm, view: View, *, color: str, order: float) -> None:
+    """Draw an arm as the outlines of its bodies, the farthest first, its tool dark."""
+    seen = [points @ view.axes().T for points in arm.bodies]
+    last = len(seen) - 1 if arm.holds else None
+    for k in sorted(range(len(seen)), key=lambda k: float(seen[k][:, 2].mean())):
+        around = seen[k][ConvexHull(seen[k][:, :2]).vertices, :2]
+        face = to_rgb(INK) if k == last else tuple(1 - PALE * (1 - np.array(to_rgb(color))))
+        fill = (*face, THROUGH if order > 1 else 1.0)
+        axes.add_patch(Polygon(around, fc=fill, ec=color, lw=0.7, joinstyle="round", zorder=order))
 
 
 def grip_mark(robot: int) -> dict[str, Any]:

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from seqopt._files import csv_text
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Want
-from seqopt.errors import ProblemError
+from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, overloads
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
@@ -35,7 +35,8 @@ from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Order, Scene
 from seqopt.scene.shape import normal_of
-from seqopt.sequence.exports import export_plan
+from seqopt.sequence.exports._arm_tasks import _known_tasks
+from seqopt.sequence.exports._tasks import plan_tasks, tasks_csv, tasks_json
 from seqopt.sequence.steps import Step
 from seqopt.stability._builds import WORDS, BuildVerdicts
 
@@ -327,10 +328,21 @@ def _data(engine: Engine, builds: Sequence[Build], scatter: Scatter | None) -> d
     }
 
 
-def _tasks(engine: Engine, build: Build) -> str:
-    """Return what robots do in a build, CSV, compressed: to copy and to keep."""
-    text = export_plan(engine.network.scene, build.steps, "tasks_csv")
-    return b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode("ascii")
+def _tasks(engine: Engine, build: Build) -> dict[str, str]:
+    """Return what robots do in a build as CSV and JSON, compressed: to copy and to keep.
+
+    Arms are in their postures; where nothing computes these, grips are proposals.
+    """
+    scene = engine.network.scene
+    try:
+        tasks = [*_known_tasks(scene, build.steps)]
+    except (ExtraError, SceneError):
+        tasks = [*plan_tasks(scene, build.steps)]
+    texts = {"csv": tasks_csv(tasks), "json": tasks_json(scene, tasks)}
+    return {
+        kind: b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode("ascii")
+        for kind, text in texts.items()
+    }
 
 
 def _left_out(builds: Sequence[Build], numbers: int) -> str:

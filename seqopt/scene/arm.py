@@ -79,6 +79,9 @@ class Arm(Terse):
     postures : int
         With how many postures at each node plans are made: with one, every plan keeps it; of
         several, a step needs some that go together, and whether they can be kept is found after.
+    approach : float
+        How far the tool comes straight to a node and goes straight back, m: there the arm is
+        checked too, at a few points; with 0, the default, only where it holds.
     keeps_apart : bool
         Whether it must not touch other arms that keep apart; False for what reach alone allows.
     joint_stiffness : tuple of float
@@ -106,13 +109,19 @@ class Arm(Terse):
     faces: tuple[str, ...] = ("width", "thickness")
     flange: str = ""
     postures: int = MOST
+    approach: float = 0.0
     keeps_apart: bool = True
     joint_stiffness: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         check(self, "arm", urdf=_model, position=vector, faces=_faces, flange=printable)
         unit_axes(self, "arm", "x_axis", "y_axis")
-        lengths = {"tool_length": length, "tool_radius": length, "fingers": not_negative}
+        lengths = {
+            "tool_length": length,
+            "tool_radius": length,
+            "fingers": not_negative,
+            "approach": not_negative,
+        }
         check(self, "arm", **lengths, joint_stiffness=_stiffnesses)
         settle(self, keeps_apart=kind_of("arm: keeps_apart", self.keeps_apart, bool))
         settle(self, postures=whole_between("arm: postures", self.postures, 1, MOST))

@@ -249,6 +249,22 @@ def test_no_plan_is_said_where_arms_reach_nothing(scene):
         seqopt.optimize(far, "free", aim="steps", least_grips=1)
 
 
+def test_no_plan_is_said_where_arms_are_in_each_others_way():
+    """That is told from arms that do not reach, and computed with the postures of each alone."""
+    close = beside(two_arms(), 0.6)
+    both = close.with_robots(*close.robots[:2])
+    with pytest.raises(InfeasibleError, match=r"newest=free or arms that are out of each") as error:
+        seqopt.optimize(both, "free", aim="steps", least_grips=1)
+    assert "reach more" not in str(error.value)
+    apart = [replace(r, arm=replace(r.arm, keeps_apart=False)) for r in both.robots]
+    alone = find_postures(both.with_robots(*apart))
+    assert find_postures(both).collide.any()
+    assert not alone.collide.any()
+    assert (alone.found == find_postures(both).found).all()
+    plan = seqopt.optimize(both.with_robots(*apart), "free", aim="steps", least_grips=1)
+    assert plan.steps  # the control: what is said to help does
+
+
 def test_bases_must_not_stand_in_each_other(scene):
     with pytest.raises(SceneError, match="the base of its arm hits that of"):
         find_postures(beside(scene, 0.1))

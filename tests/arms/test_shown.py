@@ -2,19 +2,33 @@
 
 from __future__ import annotations
 
+import base64
 import csv
+import gzip
 import io
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
+from PIL import Image
+from scipy.spatial import ConvexHull
 
 import seqopt
+from seqopt._cli.main import main
 from seqopt._cli.outputs import _task_files
+from seqopt._files import csv_text
+from seqopt.arms._drawn import idle_arm
+from seqopt.arms._model import ArmModel
+from seqopt.errors import ExtraError, ProblemError, SceneError
+from seqopt.plan._bases import without_arms
+from seqopt.report._pictures import VIEW, Film, steps_picture
 from seqopt.report._robots import _known_arms
+from seqopt.report.page import Build, _tasks
 from seqopt.sequence.exports._arm_tasks import _in_postures
-from seqopt.sequence.exports._tasks import Action, plan_tasks
-from tests.arms.scenes import TOOL, two_arms
+from seqopt.sequence.exports._tasks import Action, plan_tasks, tasks_json
+from seqopt.sequence.exports.formats import export_plan, read_folder
+from tests.arms.scenes import TOOL, beside, two_arms
 
 pytest.importorskip("pinocchio")
 pytest.importorskip("coal")
@@ -64,14 +78,77 @@ def test_files_beside_a_plan_have_postures(plan):
     assert float(rows[0]["joint_1"]) == pytest.approx(told[0]["posture"][0])
 
 
+@pytest.fixture(scope="module")
+def folder(plan, tmp_path_factory):
+    out = tmp_path_factory.mktemp("plan")
+    scene = plan.engine.network.scene
+    seqopt.save_scene(scene, out / "scene.json")
+    (out / "plan.csv").write_text(csv_text(plan.responses()), encoding="utf-8")
+    return out
+
+
+@pytest.mark.parametrize(("form", "name"), [("tasks", "tasks.json"), ("tasks_csv", "tasks.csv")])
+def test_what_is_exported_later_has_the_same_postures(plan, folder, form, name, capsys):
+    assert _task_files(plan)[name] == export_plan(
+        plan.engine.network.scene, read_folder(folder)[1], form
+    )
+    out = folder / name
+    words = ["export", str(folder), "--format", form, "--out", str(out)]
+    assert main([*words, "--cache", str(folder / "postures")]) == 0
+    assert capsys.readouterr().err == ""
+    assert out.read_text(encoding="utf-8") == _task_files(plan)[name]
+    assert [*(folder / "postures").iterdir()]
+
+
+@pytest.mark.parametrize("kind", [ExtraError, SceneError])
+def test_an_export_without_postures_is_of_proposals(plan, folder, monkeypatch, capsys, kind):
+    scene, steps = read_folder(folder)
+    proposed = tasks_json(scene, plan_tasks(scene, steps))
+    assert export_plan(scene, steps, "tasks", postures={}) == proposed
+    assert proposed != _task_files(plan)["tasks.json"]  # the control
+
+    def missing(*_):
+        raise kind("arms need pinocchio and coal: pip install 'seqopt[arms]'")
+
+    monkeypatch.setattr("seqopt._cli.commands.exporting.find_postures", missing)
+    out = folder / "proposed.json"
+    assert main(["export", str(folder), "--format", "tasks", "--out", str(out)]) == 0
+    assert "grips are proposals without postures; arms need pinocchio" in capsys.readouterr().err
+    assert out.read_text(encoding="utf-8") == proposed
+
+
+def test_an_export_names_steps_that_arms_cannot_be_in(folder, tmp_path, capsys):
+    scene, _ = read_folder(folder)
+    seqopt.save_scene(beside(scene, 0.75), tmp_path / "scene.json")
+    rows = [
+        {"step": s.number, "type": s.kind.value, "bricks": s.bricks}
+        | {f"{n}_node": node for n, node in zip(("north", "south", "crane"), s.grips, strict=True)}
+        for s in seqopt.sequential(without_arms(scene))
+    ]
+    table = pd.DataFrame(rows).astype("Int64", errors="ignore")
+    table.to_csv(tmp_path / "plan.csv", index=False)
+    words = ["export", str(tmp_path), "--format", "tasks", "--out", str(tmp_path / "tasks.json")]
+    assert main(words) == 0
+    assert "arms cannot: " in capsys.readouterr().err
+
+
+def test_a_page_keeps_tasks_with_postures(plan):
+    scene = plan.engine.network.scene
+    kept = _tasks(plan.engine, Build("plan", plan.steps, plan.responses()))
+    told = gzip.decompress(base64.b64decode(kept["json"])).decode()
+    assert told == export_plan(scene, plan.steps, "tasks")
+    assert any(row["posture"] for row in json.loads(told)["tasks"])
+
+
 def test_arms_are_drawn_from_their_base_to_what_they_hold(plan):
     scene, found = plan.engine.network.scene, plan.arms.postures
     arms, held = _known_arms(scene, plan.steps), 0
     assert set(arms) == set(found.table.robots)
     for robot in (each for each in scene.robots if each.arm is not None):
         r = scene.robots.index(robot)
-        foot = arms[robot.name][0][0]
-        for step, points in zip(plan.steps, arms[robot.name], strict=True):
+        foot = arms[robot.name][0].line[0]
+        for step, arm in zip(plan.steps, arms[robot.name], strict=True):
+            points = arm.line
             assert np.allclose(points[0], foot)
             assert np.allclose(foot, robot.arm.position)
             node = step.grips[r]
@@ -86,3 +163,70 @@ def test_arms_are_drawn_from_their_base_to_what_they_hold(plan):
             )
     assert held
     assert _known_arms(scene.with_robots(scene.robots[2]), ()) == {}
+
+
+def seen(points):
+    return points @ VIEW.axes()[:2].T
+
+
+def outlines(axes):
+    """What is drawn of robots in a picture: outlines of bodies, and lines of sketches."""
+    return [patch.get_path().vertices for patch in axes.patches[1:]]
+
+
+def area(points):
+    """The area inside a line through points, by the shoelace formula."""
+    x, y = points[:, 0], points[:, 1]
+    return 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+def test_pictures_and_films_draw_arms_in_their_postures(plan, tmp_path):
+    engine, steps = plan.engine, plan.steps
+    posed = _known_arms(engine.network.scene, steps)
+    number = next(s.number for s in steps if s.grips[0] is not None)
+    (axes,) = steps_picture(engine, steps, number).axes
+    arm = posed["north"][number - 1]
+    inside = [ConvexHull(seen(points)).volume for points in arm.bodies]
+    drawn = [abs(area(each)) for each in outlines(axes)]
+    assert all(min(abs(each - other) for other in drawn) < 1e-9 for each in inside)
+    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+    for own in (each for every in posed.values() for each in every):
+        points = seen(np.vstack([own.line, *own.bodies]))
+        assert (points > low).all()  # arms are seen whole
+        assert (points < high).all()
+    (bare,) = steps_picture(engine, steps, number, arms={}).axes  # the control: sketches are asked
+    sketched = [abs(area(each)) for each in outlines(bare)]
+    assert not any(min(abs(each - other) for other in sketched) < 1e-9 for each in inside)
+    films = [
+        Film(engine, steps[:2], **how).save(tmp_path / name)
+        for name, how in (("build.gif", {}), ("bare.gif", {"arms": {}}))
+    ]
+    sizes = []
+    for path in films:
+        with Image.open(path) as film:
+            assert film.n_frames == 2
+            sizes.append(film.size)
+    assert sizes[0] != sizes[1]  # there is room for the arms
+
+
+def test_bodies_are_those_that_collisions_are_looked_for_with(plan):
+    """The tool ends at the node, and links are where the table of postures has them."""
+    scene = plan.engine.network.scene
+    for robot, own in ((r, _known_arms(scene, plan.steps)[r.name]) for r in scene.robots[:2]):
+        for step, arm in zip(plan.steps, own, strict=True):
+            node = step.grips[scene.robots.index(robot)]
+            if node is None:
+                assert len(arm.bodies) == len(idle_arm(robot.arm).bodies) >= 1
+                continue
+            tip = arm.bodies[-1][len(arm.bodies[-1]) // 2 :].mean(axis=0)
+            np.testing.assert_allclose(tip, scene.node_position(node), atol=1e-5)
+            placed = ArmModel(robot.arm).placed(arm.joints[None], np.array([0.1]))
+            links = arm.bodies[-placed.low.shape[1] :][:-1]
+            for k, points in enumerate(links):
+                np.testing.assert_allclose(points.min(axis=0), placed.low[0, k], atol=1e-9)
+                np.testing.assert_allclose(points.max(axis=0), placed.high[0, k], atol=1e-9)
+
+
+def test_arms_that_are_given_must_be_of_robots(plan):
+    with pytest.raises(ProblemError, match="give one a step, by the name of a robot: crane"):
+        steps_picture(plan.engine, plan.steps, 1, arms={"nobody": [None]})

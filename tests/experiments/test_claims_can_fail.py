@@ -15,7 +15,7 @@ from experiments.calibration import calibration, vault_loads
 from experiments.calibration.parts import arch_numbers, calibration_spread
 from experiments.discrete import contact_steps, discrete_arches
 from experiments.engines import engine_speed, fidelity_ladder, frame_contrast, parallel, soft_grips
-from experiments.exchange import outside_assemblies
+from experiments.exchange import four_arms, outside_assemblies
 from experiments.harness.claim import claims
 from experiments.harness.results import stored
 from experiments.peers import peers
@@ -154,6 +154,11 @@ CHECKS = {
         outside_assemblies.holds,
         ("outside_assemblies",),
         *("said", "feasible", {"file": "bridge.json"}),
+    ),
+    "four_arms": Check(
+        lambda table: not four_arms.faults(table),
+        ("four_arms",),
+        *("status", "feasible", {"build": "vault"}),
     ),
     "composing": Check(
         composing.holds, ("composing",), *("value", 1.0, {"schedule": "free", "with": "overlap_dp"})

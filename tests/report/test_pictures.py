@@ -81,6 +81,7 @@ def test_a_film_has_a_picture_for_every_step(build, tmp_path):
     short = Film(build.engine, build.steps[:5], seconds=0.5)
     with Image.open(short.save(tmp_path / "build.gif")) as film:
         assert film.n_frames == 5
+        assert film.convert("RGB").getpixel((0, 0)) == (255, 255, 255)
         assert film.info["duration"] == 500
     assert short._repr_html_().startswith('<img alt="5 steps of a build" src="data:image/gif')
     for wrong in ("build.mp4", "no folder/build.gif"):

@@ -100,8 +100,9 @@ def test_a_page_has_arms_and_tasks(text):
             if node is not None:
                 tip = build["arms"]["lines"][place][-1]
                 assert tip == pytest.approx(SCENE.node_position(node), abs=1e-4)
-    kept = gzip.decompress(base64.b64decode(build["tasks"])).decode()
-    assert kept == export_plan(SCENE, STEPS, "tasks_csv")
+    for kind, form in (("csv", "tasks_csv"), ("json", "tasks")):
+        kept = gzip.decompress(base64.b64decode(build["tasks"][kind])).decode()
+        assert kept == export_plan(SCENE, STEPS, form)
 
 
 @pytest.mark.slow
@@ -116,7 +117,8 @@ def test_a_browser_names_the_robots_that_it_draws(text, tmp_path):
         assert not [line for line in said.splitlines() if "CONSOLE" in line and "rror" in line]
         names = re.findall(r'<span class="robot"([^>]*)>(\w+)</span>', page)
         seen[state] = [name for attributes, name in names if "hidden" not in attributes]
-        assert re.search('<button id="download"[^>]*hidden', page) is None
+        for kind in ("csv", "json"):
+            assert re.search(f'<button id="{kind}"[^>]*hidden', page) is None
     held = [r.name for r, node in zip(ROBOTS, STEPS[4].grips, strict=True) if node is not None]
     assert seen == {
         "step=5": ["left", "front", *(["mobile"] if "mobile" in held else [])],

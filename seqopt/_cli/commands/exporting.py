@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import scene_facts
 from seqopt._cli.options import declare, form_options
 from seqopt._cli.values import number_word
 from seqopt._files import require_apart, write_text
-from seqopt.sequence.exports.formats import EXPORTS, LOST, export_plan, read_folder
+from seqopt.arms.reach import find_postures
+from seqopt.errors import ExtraError, SceneError
+from seqopt.problem._arms import arm_faults
+from seqopt.scene.scene import Scene
+from seqopt.sequence.exports._tasks import Postures
+from seqopt.sequence.exports.formats import EXPORTS, LOST, TASKS, export_plan, read_folder
+from seqopt.sequence.steps import Step
 
 DESCRIPTION = (
     "Write the plan of a folder, as seqopt optimize --out makes it, in a format of others: which "
@@ -26,6 +33,9 @@ DISTANCE = {
     "--distance M": "with tasks, tasks_csv or compas_fab: from a grip to where the tool comes "
     "from and goes to, m (default: the longest side of each block)"
 }
+POSTURES = {
+    "--cache DIR": "where robots have arms: keep their postures there, and use what is there"
+}
 SOURCE = {
     "--source FILE": "with a format of COMPAS: the file that was imported, to name its elements or "
     "to write the plan into"
@@ -40,7 +50,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     basic.add_argument("--format", choices=EXPORTS, required=True, metavar="NAME", help=said)
     declare(basic, {"--out FILE": "file to write"}, required=True)
     declare(basic, SOURCE)
-    declare(basic, DISTANCE)
+    declare(basic, DISTANCE | POSTURES)
     form_options(command)
 
 
@@ -51,7 +61,8 @@ def run(options: argparse.Namespace) -> Answer:
     scene, steps = read_folder(options.folder)
     given = options.distance
     distance = None if given is None else number_word(given, f"--distance {given}")
-    text = export_plan(scene, steps, options.format, options.source, distance)
+    notes, postures = _arms(options, scene, steps)
+    text = export_plan(scene, steps, options.format, options.source, distance, postures)
     write_text(options.out, text)
     said, lost = f"{len(steps)} steps", LOST.get(options.format)
     if lost:
@@ -62,4 +73,21 @@ def run(options: argparse.Namespace) -> Answer:
         facts={"scene": scene_facts(scene), "steps": len(steps), "format": options.format},
         text=f"{said} written to {options.out}",
         written=(options.out,),
+        notes=notes,
     )
+
+
+def _arms(
+    options: argparse.Namespace, scene: Scene, steps: Sequence[Step]
+) -> tuple[tuple[str, ...], Postures | None]:
+    """Return what there is to say of arms in a plan, and postures: none where they are not known.
+
+    Other formats than those of tasks have none.
+    """
+    if options.format not in TASKS or not scene.has_arms:
+        return (), None
+    try:
+        find_postures(scene, options.cache, options.tell)
+    except (ExtraError, SceneError) as error:
+        return (f"arms: grips are proposals without postures; {error}",), {}
+    return tuple(f"arms cannot: {fault}" for fault in arm_faults(scene, steps)), None

@@ -376,7 +376,7 @@
     byId("where").textContent = `step ${at + 1} of ${Number(slider.max) + 1}`;
     byId("now").replaceChildren(...pair.map((build) => table(build, at)));
     charts.cursors.forEach((move) => move(at));
-    for (const id of ["copy", "download"]) byId(id).hidden = !pair[0].tasks;
+    for (const id of ["copy", "csv", "json"]) byId(id).hidden = !pair[0].tasks;
     if (points) points.mark();
   }
   function go(s) { slider.value = Math.max(0, Math.min(Number(slider.max), s)); refresh(); }
@@ -425,7 +425,7 @@
   byId("second").prepend(new Option("nothing", "", true, true));
   byId("second").value = "";
   await Promise.all(builds.flatMap((build) => ["twist", "edge", "push", "turn", "fall"].map((name) => unpack(build[name]))));
-  await Promise.all(builds.map(async (build) => { if (build.tasks) build.tasks = new TextDecoder().decode(await unzip(build.tasks)); }));
+  await Promise.all(builds.map(async ({ tasks }) => { for (const kind in tasks) tasks[kind] = new TextDecoder().decode(await unzip(tasks[kind])); }));
   for (const id of ["first", "second"]) byId(id).addEventListener("change", () => { drawCharts(); refresh(); });
   for (const id of ["magnify", "forces", "robots", "fall"]) byId(id).addEventListener("input", refresh);
   slider.addEventListener("input", refresh);
@@ -438,16 +438,16 @@
     link.href = panes[0].canvas.toDataURL("image/png");
     link.click();
   });
-  byId("download").addEventListener("click", () => {
+  for (const [kind, type] of [["csv", "text/csv"], ["json", "application/json"]]) byId(kind).addEventListener("click", () => {
     const build = shown()[0], link = document.createElement("a");
-    link.download = `${structure.name} ${build.name} tasks.csv`;
-    link.href = URL.createObjectURL(new Blob([build.tasks], { type: "text/csv" }));
+    link.download = `${structure.name} ${build.name} tasks.${kind}`;
+    link.href = URL.createObjectURL(new Blob([build.tasks[kind]], { type }));
     link.click();
     URL.revokeObjectURL(link.href);
   });
   byId("copy").addEventListener("click", async () => {
     const area = document.createElement("textarea");
-    area.value = shown()[0].tasks;
+    area.value = shown()[0].tasks.csv;
     document.body.append(area);
     area.select();
     const done = document.execCommand("copy");

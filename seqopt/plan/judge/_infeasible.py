@@ -29,6 +29,7 @@ from seqopt.problem.problem import STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import length_text
+from seqopt.scene.arm import Arm
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule
 
@@ -76,6 +77,7 @@ def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
 STEPS = (Goal(Measure.STEPS),)
 STANDING = "no requirement to stand"
 ARMS = "arms that reach more, or stand elsewhere"
+APART = "arms that are out of each other's way (slimmer, or elsewhere)"
 Look = Callable[[States], Explorer]
 
 
@@ -165,7 +167,11 @@ def _where(problem: States, look: Look) -> str:
 
 def _what_helps(problem: States, look: Look) -> str:
     """Return what opens a way, as the end of a line."""
-    ways = [*_opening(problem, look)] or [*islice(_pairs(problem, look), 1)]
+    ways = [*_opening(problem, look)]
+    if {*ways} <= {ARMS, APART}:  # of the same arms two rules may ask less
+        arms = (ARMS, APART) if ways else ()
+        pairs = (pair for pair in _pairs(problem, look) if not pair.endswith(arms))
+        ways = [*ways, *islice(pairs, 1)]
     if not ways:
         return ", whatever two rules or limits are loosened; extend a reach or add a robot"
     return f"; it becomes possible with {' or '.join(_enough(problem, w, look) for w in ways)}"
@@ -184,19 +190,20 @@ def _opening(problem: States, look: Look) -> Iterator[str]:
         yield STANDING
     scene = problem.network.scene  # robots without arms hold as others with joints that are rigid
     able = scene.has_arms and not scene.grip_kinds.arms.any() and recipe_of(problem.engine)
-    if able and look(_without_arms(problem)).whole:
-        yield ARMS
+    if able and look(_with_arms(problem, lambda _: None)).whole:
+        alone = _with_arms(problem, lambda arm: arm and replace(arm, keeps_apart=False))
+        yield APART if look(alone).whole else ARMS
     for limit in problem.limits:
         rest = tuple(other for other in problem.limits if other is not limit)
         if look(replace(problem, limits=rest)).whole:
             yield limit.response
 
 
-def _without_arms(problem: States) -> States:
-    """Return a problem of robots that reach what they reach without arms."""
+def _with_arms(problem: States, changed: Callable[[Arm | None], Arm | None]) -> States:
+    """Return a problem of robots with other arms, or of what they reach without them."""
     scene = problem.network.scene
-    bare = scene.with_robots(*(replace(robot, arm=None) for robot in scene.robots))
-    return replace(problem, engine=engine_for(problem.engine, bare), scenarios=())
+    other = scene.with_robots(*(replace(each, arm=changed(each.arm)) for each in scene.robots))
+    return replace(problem, engine=engine_for(problem.engine, other), scenarios=())
 
 
 def _loosened(problem: States) -> Iterator[tuple[str, FreeRules]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,9 +12,25 @@ from seqopt.arrays import Floats
 from seqopt.scene.boxes import as_vector
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
-from seqopt.sequence._postures import PlanPostures
+from seqopt.sequence._postures import PlanPostures, plan_postures
 from seqopt.sequence.exports._grip_frames import Frame, brick_frame
-from seqopt.sequence.exports._tasks import Action, Task
+from seqopt.sequence.exports._tasks import Action, Postures, Task, plan_tasks
+from seqopt.sequence.steps import Step
+
+
+def _known_tasks(
+    scene: Scene,
+    steps: Sequence[Step],
+    distance: float | None = None,
+    postures: Postures | None = None,
+) -> Iterator[Task]:
+    """Yield tasks of a plan as `plan_tasks` does, by default in the postures of its arms.
+
+    Raises `ExtraError` if these have to be computed and nothing is installed that does.
+    """
+    tasks = plan_tasks(scene, steps, distance, postures)
+    found = plan_postures(scene, steps) if postures is None else None
+    return tasks if found is None else _in_postures(scene, tasks, found)
 
 
 def _in_postures(scene: Scene, tasks: Iterable[Task], found: PlanPostures) -> Iterator[Task]:

@@ -1,0 +1,175 @@
+"""The plans of four arms on the page of examples, opened by those who would drive them."""
+
+from __future__ import annotations
+
+import json
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+
+from experiments.exchange.four_arms import EXAMPLES, SCENES, faults, stored_build
+from experiments.harness.results import stored
+from seqopt.errors import StepError
+from seqopt.scene.scene_file import dump_scene, load_scene
+from seqopt.sequence.exports.formats import export_plan, read_folder
+from seqopt.sequence.schedule_file import parse_plan
+from tests.builders import ROOT
+
+MOST = 1_500_000  # bytes of all files to download
+
+
+def content(name, file):
+    return (EXAMPLES / name / file).read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module", params=SCENES)
+def build(request):
+    return request.param, *read_folder(EXAMPLES / request.param)
+
+
+def test_files_are_of_one_plan(build):
+    name, scene, steps = build
+    assert content(name, "plan.json") == export_plan(scene, steps, "json")
+    told = json.loads(content(name, "tasks.json"))["tasks"]
+    table = pd.read_csv(EXAMPLES / name / "tasks.csv")
+    assert [row["action"] for row in told] == [*table["action"]]
+    for row, joints in zip(told, table.filter(like="joint_").to_numpy(), strict=True):
+        assert (row["posture"] is None) == np.isnan(joints).all() == (row["action"] == "pick")
+        np.testing.assert_allclose(row["posture"] or joints, joints, atol=1e-8)
+    known = [[row["step"], row["robot"], row["node"]] for row in told if row["action"] != "release"]
+    for step in steps:
+        held = {(r.name, n) for r, n in zip(scene.robots, step.grips, strict=True) if n is not None}
+        assert held == {(robot, node) for at, robot, node in known if at == step.number}
+
+
+def test_four_arms_build_them_and_the_files_are_small(build):
+    name, scene, _ = build
+    assert all(robot.arm is not None for robot in scene.robots)
+    assert len(scene.robots) == 4
+    row = stored("four_arms").set_index("build").loc[name]
+    assert faults(stored("four_arms")) == []
+    assert (row["blocks"], row["arms"]) == (len(scene.bricks), 4)
+    assert sum(path.stat().st_size for path in EXAMPLES.rglob("*.*")) < MOST
+
+
+def test_a_spoiled_plan_is_no_plan(build):
+    """The control of what is read."""
+    name, scene, _ = build
+    lines = content(name, "plan.csv").splitlines(keepends=True)
+    with pytest.raises(StepError):
+        parse_plan(scene, "".join([*lines[:3], *lines[4:]]), name)
+
+
+def test_scenes_are_those_that_are_generated(build, tmp_path):
+    name, scene, _ = build
+    assert scene == SCENES[name]()
+    (tmp_path / "again.json").write_text(dump_scene(scene), encoding="utf-8")
+    assert load_scene(tmp_path / "again.json") == scene
+
+
+def test_compas_opens_tasks_with_frames_shapes_and_postures(build):
+    compas = pytest.importorskip("compas")
+    from compas.geometry import Frame, Transformation  # noqa: PLC0415
+
+    name, scene, _ = build
+    found = compas.json_load(EXAMPLES / name / "tasks.json")
+    assert {robot["robot"] for robot in found["robots"]} == {robot.name for robot in scene.robots}
+    for block, brick in zip(found["blocks"], scene.placed, strict=True):
+        assert block["shape"].volume() * brick.density == pytest.approx(brick.mass, rel=1e-6)
+    for task in (task for task in found["tasks"] if task["action"] != "pick"):
+        assert len(task["posture"]) == 6
+        assert list(task["grip"].point) == pytest.approx(
+            scene.node_position(task["node"]), abs=1e-5
+        )
+        there = Transformation.from_frame(task["block_frame"])
+        grip = Frame.from_transformation(there * Transformation.from_frame(task["grip_in_block"]))
+        assert list(grip.point) == pytest.approx(list(task["grip"].point), abs=1e-6)
+    plain = json.loads(content(name, "tasks.json"))["tasks"][1]["grip"]
+    assert not isinstance(plain, Frame)  # the control: it is compas that makes frames
+
+
+def test_joints_put_the_tool_where_the_task_says(build):
+    """By the arm's own kinematics, from the joints in the table of tasks alone."""
+    for extra in ("pinocchio", "coal", "compas_fab"):
+        pytest.importorskip(extra)
+    name, scene, steps = build
+    _, _, arms = stored_build(name)
+    held = 0
+    for r, robot in enumerate(scene.robots):
+        for step, arm in zip(steps, arms[robot.name], strict=True):
+            assert arm.holds == (step.grips[r] is not None)
+            if arm.holds:
+                held += 1
+                tip = scene.node_position(step.grips[r])
+                np.testing.assert_allclose(arm.line[-1], tip, atol=1e-5)
+    assert held > 2 * len(steps)
+
+
+def test_compas_fab_takes_the_arms_of_the_tasks_there():
+    """A cell of compas_fab puts the flange where the task has it, by its own kinematics."""
+    kinematics = pytest.importorskip("compas_fab.backends.kinematics.solvers")
+    from compas.geometry import Frame  # noqa: PLC0415
+
+    compas = pytest.importorskip("compas")
+    scene, _ = read_folder(EXAMPLES / "wall")
+    solver, far = kinematics.ABB_IRB4600_40_255Kinematics(), 0
+    robots = {robot.name: robot for robot in scene.robots}
+    for task in compas.json_load(EXAMPLES / "wall" / "tasks.json")["tasks"]:
+        if task["posture"] is None:
+            continue
+        arm = robots[task["robot"]].arm
+        base = Frame(arm.position, arm.x_axis, arm.y_axis)
+        flange = base.to_world_coordinates(solver.forward(task["posture"]))
+        tool = np.array(flange.point) + arm.tool_length * np.array(task["grip"].zaxis)
+        np.testing.assert_allclose(tool, task["grip"].point, atol=2e-3)
+        far += np.abs(np.array(flange.point) - task["grip"].point).max() > 0.1
+    assert far
+
+
+@pytest.mark.slow
+def test_no_step_has_a_contact_by_another_library(build):
+    """MuJoCo has its own kinematics and its own collisions; joints are those of the tasks."""
+    for extra in ("pinocchio", "compas_fab", "mujoco"):
+        pytest.importorskip(extra)
+    from tests.arms.witness import Site  # noqa: PLC0415
+
+    name, scene, steps = build
+    tasks = pd.read_csv(EXAMPLES / name / "tasks.csv")
+    arms = {robot.name: robot.arm for robot in scene.robots}
+    outside = [
+        arms[row.robot].tool_length - row.depth - arms[row.robot].fingers
+        for row in tasks.itertuples()
+    ]
+    table = SimpleNamespace(joints=tasks.filter(like="joint_").to_numpy(), tools=np.array(outside))
+    site = Site(scene, table)
+    held = tasks[~tasks["action"].isin(["pick", "release"])]
+    for step in steps:
+        rows = held[held["step"] == step.number]
+        assert (
+            site.touching(dict(zip(rows["robot"], rows.index, strict=True)), step.bricks) == set()
+        )
+    robot, row = held["robot"].iloc[0], held.index[0]
+    table.joints[row, 1] += 1.0  # the control: an arm that reaches into the ground
+    assert site.touching({robot: row}, len(scene.bricks)) != set()
+
+
+def test_the_page_prints_what_it_says(monkeypatch, capsys):
+    page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    code, said = re.search(r"```python\n(.*?)```\n\n```text\n(.*?)```", page, re.DOTALL).groups()
+    monkeypatch.chdir(EXAMPLES / "wall")
+    exec(compile(code, "page", "exec"), {})
+    assert capsys.readouterr().out == said
+
+
+def test_the_page_names_files_that_are_there():
+    page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    named = re.findall(r"[<(](examples/four_arms/[^>)]+)[>)]", page)
+    files = {str(path.relative_to(ROOT / "docs")) for path in EXAMPLES.rglob("*.*")}
+    assert {*named} == files
+    for name in SCENES:
+        with Image.open(EXAMPLES / name / "film.gif") as film:
+            assert film.n_frames == len(read_folder(EXAMPLES / name)[1])
