@@ -23,7 +23,7 @@ DISPLAYS = {
     "scene_picture": "seqopt.report._pictures",
     "network_picture": "seqopt.report._pictures",
     "steps_picture": "seqopt.report._pictures",
-    "tilt_picture": "seqopt.report._pictures",
+    "tilt_picture": "seqopt.report._failure_chart",
     "gantt_picture": "seqopt.report._pictures",
     "Film": "seqopt.report._pictures",
     "build_page": "seqopt.report._pages",

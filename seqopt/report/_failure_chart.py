@@ -1,4 +1,4 @@
-"""A map of failure as a picture (extra ``plot``)."""
+"""A map of failure, and the tilt that a step survives, as pictures (extra ``plot``)."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from seqopt.report._failures import AXIS_WORDS
-from seqopt.report._style import GRAY, SKY, SMALL, VERMILION, new_figure, styled
-from seqopt.stability.assessment import Verdict
+from seqopt.report._style import BLUE, GRAY, SKY, SMALL, VERMILION, new_figure, new_picture, styled
+from seqopt.stability.assessment import Stability, Verdict
 from seqopt.stability.failure_map import FailureMap
 
 _ROW = 0.27  # inches of a build
@@ -91,3 +91,17 @@ def _name(axes: Axes, names: list[str]) -> None:
     axes.tick_params(length=0)
     axes.invert_yaxis()
     axes.spines[:].set_visible(False)
+
+
+@styled
+def tilt_picture(value: Stability) -> Figure:
+    """Return the tilt that a step which stands survives in every direction."""
+    figure = new_picture(3.0, 3.0)
+    axes = figure.add_subplot(projection="polar")
+    angles = 2 * np.pi * np.arange(len(value.pull) + 1) / len(value.pull)
+    tilts = np.degrees(np.arctan(value.pull))
+    axes.plot(angles, [*tilts, tilts[0]], "o-", color=BLUE, ms=4)
+    axes.fill(angles, [*tilts, tilts[0]], color=BLUE, alpha=0.15)
+    axes.set_title("tilt survived, degrees", loc="center")
+    axes.set_yticks([float(f"{np.nanmax(tilts) / 2:.2g}"), float(f"{np.nanmax(tilts):.2g}")])
+    return figure

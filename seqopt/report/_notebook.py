@@ -199,9 +199,12 @@ def _build(value: ShownBuild) -> _Card:
         paint, count = display("steps_picture"), len(value.steps)
         from seqopt.report._pictures import spread_steps  # noqa: PLC0415  # matplotlib is an extra
 
-        shown = spread_steps(value.steps, 3) if small else count // 2 + 1
+        shown = spread_steps(value.steps, 3) if small else value.steps[count // 2].number
         pictures = [paint(value.engine, value.steps, shown)]
-        return [*pictures, *([value.gantt(1, min(count, STEPS))] if small else [])]
+        return [
+            *pictures,
+            *([value.gantt(None, value.steps[min(count, STEPS) - 1].number)] if small else []),
+        ]
 
     return _Card(f"Plan for {scene.name}", rows, draw)
 

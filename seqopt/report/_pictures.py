@@ -28,7 +28,7 @@ from seqopt.errors import FileError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report._robots import Arms, Cell, _known_arms, _require_arms
-from seqopt.report._style import BLUE, SMALL, WIDTH, new_picture, styled
+from seqopt.report._style import SMALL, WIDTH, new_picture, styled
 from seqopt.report.draw import (
     View,
     _draw_robots,
@@ -44,7 +44,6 @@ from seqopt.scene.boxes import boxes
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
-from seqopt.stability.assessment import Stability
 
 VIEW = View(azimuth=25, elevation=18)
 NUMBERED = 30  # bricks up to which the nodes of a network are numbered
@@ -327,20 +326,6 @@ def _animated(frames: Sequence[Image.Image], seconds: float) -> bytes:
     how: Any = {"save_all": True, "append_images": more, "loop": 0, "optimize": True}
     first.save(out, format="GIF", duration=round(1000 * seconds), **how)
     return out.getvalue()
-
-
-@styled
-def tilt_picture(value: Stability) -> Figure:
-    """Return the tilt that a step which stands survives in every direction."""
-    figure = new_picture(3.0, 3.0)
-    axes = figure.add_subplot(projection="polar")
-    angles = 2 * np.pi * np.arange(len(value.pull) + 1) / len(value.pull)
-    tilts = np.degrees(np.arctan(value.pull))
-    axes.plot(angles, [*tilts, tilts[0]], "o-", color=BLUE, ms=4)
-    axes.fill(angles, [*tilts, tilts[0]], color=BLUE, alpha=0.15)
-    axes.set_title("tilt survived, degrees", loc="center")
-    axes.set_yticks([float(f"{np.nanmax(tilts) / 2:.2g}"), float(f"{np.nanmax(tilts):.2g}")])
-    return figure
 
 
 @styled

@@ -95,4 +95,4 @@ def test_pictures_of_a_build_are_spread_over_it(build):
     assert numbers[-1] == 49
     kinds = [build.steps[number - 1].kind.value for number in numbers[:-1]]
     assert kinds == ["place"] * 5
-    assert spread_steps(build.steps[-1:], 6) == (1,)
+    assert spread_steps(build.steps[-1:], 6) == (49,)
