@@ -8,7 +8,7 @@ mean the same in all scenarios. Wind varies as weights do.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any, TypeVar
@@ -18,6 +18,7 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene._checks import short, whole_between
+from seqopt.scene._loads import Load
 from seqopt.scene.boxes import as_vector
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.scene import Scene
@@ -86,13 +87,51 @@ def shifted(scene: Scene, size: float, rng: np.random.Generator) -> Scene:
         old.name: np.subtract(new.position, old.position)
         for old, new in zip(scene.bricks, bricks, strict=True)
     }
-    loads = tuple(
+    loads = _loads_with(scene, steps)
+    return replace(scene, bricks=bricks, joints=joints, grounds=grounds, loads=loads)
+
+
+def _loads_with(scene: Scene, steps: Mapping[int, Floats]) -> tuple[Load, ...]:
+    """Return the loads where bricks take them that move by steps, m."""
+    return tuple(
         replace(load, position=as_vector(np.array(load.position) + steps[load.brick]))
         if load.position
         else load
         for load in scene.loads
     )
-    return replace(scene, bricks=bricks, joints=joints, grounds=grounds, loads=loads)
+
+
+def as_built(scene: Scene, measured: Mapping[int, Sequence[float]]) -> Scene:
+    """Return a scene whose bricks are where they were measured, m, all others as planned.
+
+    A brick takes its nodes and loads with it. A joint goes half as far as its two bricks together,
+    the end of a brick on the ground half as far as the brick; what is fixed to the ground stays.
+    Raises `SceneError` if there is no such brick, or it was measured farther off than it is long.
+    """
+    known = {brick.name: brick for brick in scene.bricks}
+    steps = {name: np.zeros(3) for name in known}
+    for name, position in measured.items():
+        if name not in known:
+            raise SceneError(f"measured brick {name}: scene {scene.name} has no such brick")
+        steps[name] = np.subtract(position, known[name].position)
+        off, most = float(np.linalg.norm(steps[name])), max(known[name].dimensions)
+        if not off <= most:
+            raise SceneError(
+                f"measured brick {name}: it is {off:.3g} m from where it was planned, more "
+                f"than its {most:.3g} m; give positions of centroids in the frame of the scene, m"
+            )
+
+    def moved(spring: _Part, step: Floats) -> _Part:
+        return replace(spring, position=as_vector(np.array(spring.position) + step))
+
+    joints = (moved(j, 0.5 * (steps[j.bricks[0]] + steps[j.bricks[1]])) for j in scene.joints)
+    return replace(
+        scene,
+        bricks=tuple(moved(brick, steps[brick.name]) for brick in scene.bricks),
+        joints=tuple(joints),
+        grounds=tuple(moved(ground, 0.5 * steps[ground.brick]) for ground in scene.grounds),
+        loads=_loads_with(scene, steps),
+    )
 
 
 MOST = 100_000  # scenarios; more are a slip of the finger

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from seqopt._files import read_text
 from seqopt.errors import StepError, did_you_mean
-from seqopt.scene._checks import short
+from seqopt.scene._checks import as_float, short
+from seqopt.scene.imports.formats import import_scene
+from seqopt.scene.scenarios import as_built
 from seqopt.scene.scene import Scene, in_order
 from seqopt.sequence.schedule import Move, OpenGrip, Schedule
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step
 
+SAME = 1e-9  # m; closer than this a brick is where it was planned
 KEYS = ("bricks", "grips", "last", "regrips", "step", "measured")
 
 
@@ -32,6 +38,7 @@ def read_site(scene: Scene, path: Path) -> tuple[Scene, Site]:
             hint = did_you_mean(key, KEYS)
             raise StepError(f"{where}: {key} is not known{hint}; give {', '.join(KEYS)}")
     scene, count = _standing(scene, told["bricks"], where)
+    scene = _measured(scene, told.get("measured", {}), where)
     grips = _by_robot(scene, told.get("grips"), f"{where}, grips")
     last = _by_robot(scene, told.get("last", {}), f"{where}, last") or ()
     more = {key: told[key] for key in ("regrips", "step") if key in told}
@@ -43,6 +50,41 @@ def read_site(scene: Scene, path: Path) -> tuple[Scene, Site]:
     except StepError as error:
         raise StepError(f"{where}: {error}") from None
     return scene, site
+
+
+def _measured(scene: Scene, told: object, where: str) -> Scene:
+    """Return a scene whose bricks are where they were measured."""
+    points = {} if not isinstance(told, Mapping) else {**told}
+    right = all(
+        str(name).isdecimal() and isinstance(point, list) and len(point) == 3
+        for name, point in points.items()
+    )
+    if not isinstance(told, Mapping) or not right:
+        raise StepError(f"{where}: measured {short(told)}; give x, y, z by brick, m")
+    found = {int(name): tuple(map(as_float, point)) for name, point in points.items()}
+    return as_built(scene, found)
+
+
+def read_measured(scene: Scene, path: Path) -> dict[int, tuple[float, ...]]:
+    """Return where bricks were measured, m, from a CSV file (brick, x, y, z) or of COMPAS."""
+    if path.suffix == ".json":
+        found = {brick.name: brick.position for brick in import_scene(path).bricks}
+        own = {brick.name: brick.position for brick in scene.bricks}
+        return {n: p for n, p in found.items() if n not in own or math.dist(own[n], p) > SAME}
+    rows = [*csv.DictReader(io.StringIO(read_text(path)))]
+    columns = ("brick", "x", "y", "z")
+    if not rows or not {*columns} <= {*rows[0]}:
+        raise StepError(f"{path}: give a CSV file with columns {', '.join(columns)}")
+    out = {}
+    for number, row in enumerate(rows, start=2):
+        try:
+            values = [float(row[name]) for name in columns]
+        except (TypeError, ValueError):
+            values = [math.nan]
+        if not all(map(math.isfinite, values)) or values[0] % 1:
+            raise StepError(f"{path}, line {number}: give numbers for {', '.join(columns)}")
+        out[int(values[0])] = tuple(values[1:])
+    return out
 
 
 def _standing(scene: Scene, told: object, where: str) -> tuple[Scene, int]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -28,9 +29,13 @@ from seqopt._cli.where import Place
 from seqopt._files import read_text
 from seqopt.errors import FileError, InfeasibleError, StepError
 from seqopt.plan._replan import compared, without
+from seqopt.plan.plan import Plan
 from seqopt.responses._tolerance import value_text
+from seqopt.responses.quantities import length_text
+from seqopt.scene.scenarios import as_built
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
+from seqopt.sequence._parts import read_measured
 from seqopt.sequence.rules import FREE, with_robots
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.study.published import CRITERIA
@@ -54,6 +59,8 @@ CHANGES = {
     "--robots N": "how many robots there are from now on: new ones reach every node",
     "--missing BRICK ...": "brick that is not there: one that stood is placed again next, one that "
     "was still to come waits until all are placed that do not hang on it",
+    "--measured FILE": "where bricks that stand were measured, m: a CSV file (brick, x, y, z), or "
+    "an assembly of COMPAS",
     "--to PLAN:STEP|STATE|N": "where the build ends, as of optimize",
 }
 ASKED = ("aim", "criteria", "limit", "rule", "stands", "friction", "tilt")
@@ -91,11 +98,22 @@ def run(options: argparse.Namespace) -> Answer:
     answer = optimize.answered(base, found)
     old = [step for step in steps if step.number > int(options.at)]
     facts = compared(found.plan, old)
+    if options.measured is not None:
+        facts |= _off(scene, found.plan)
     return replace(
         answer,
         facts={**answer.facts, "replanned": facts},
         text="\n".join([*map(wrapped, _in_words(facts)), answer.text]),
     )
+
+
+def _off(scene: Scene, plan: Plan) -> dict[str, object]:
+    """Return how far bricks are off at most, m, and how far grips of the rest may be."""
+    planned = {brick.name: brick.position for brick in scene.bricks}
+    built = plan.engine.network.scene.bricks
+    off, brick = max((math.dist(each.position, planned[each.name]), each.name) for each in built)
+    left = plan.tolerances()["tolerance_mm"].min() / 1000
+    return {"off_m": off, "off_brick": brick, "tolerance_left_m": float(left)}
 
 
 def _as_optimize(options: argparse.Namespace, scene_file: Path) -> argparse.Namespace:
@@ -139,9 +157,20 @@ def _changed(options: argparse.Namespace, scene: Scene, begin: Place) -> tuple[S
     for text in options.payload:
         scene = _with_payload(scene, text)
     bricks = [_brick(text) for text in options.missing]
+    if options.measured is not None:
+        scene = _built(scene, begin.site.bricks, options.measured)
     scene, site = without(scene, begin.site, options.lost, bricks)
     left = [robot.name for robot in scene.robots if robot.name not in options.lost]
     return scene, Place(site, None), ",".join(left) if options.lost else ""
+
+
+def _built(scene: Scene, bricks: int, path: Path) -> Scene:
+    """Return a scene whose bricks stand where they were measured."""
+    found, stand = read_measured(scene, path), scene.build_order[:bricks]
+    early = [name for name in found if name in scene.build_order and name not in stand]
+    if early:
+        raise StepError(f"--measured {path}: brick {early[0]} does not stand yet; leave it out")
+    return as_built(scene, found)
 
 
 def _with_payload(scene: Scene, text: str) -> Scene:
@@ -180,6 +209,12 @@ def _in_words(facts: Mapping[str, Any]) -> Sequence[str]:
     else:
         values = ", ".join(f"{name} {value_text(name, value)}" for name, value in was.items())
         line = f"as planned the rest takes: {values}"
+    if "off_m" in facts:
+        off, left = length_text(facts["off_m"]), length_text(facts["tolerance_left_m"])
+        line = (
+            f"as built, brick {facts['off_brick']} is {off} from where it was planned; grips of "
+            f"the rest may be {left} off; {line}"
+        )
     if facts["differs"] is None:
         return (line, "the new plan is the old one")
     counts = f"{facts['steps']} steps instead of {facts['steps_before']}"
