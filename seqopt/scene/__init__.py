@@ -18,6 +18,7 @@ than its weight loads it; `save_scene` writes it to a file.
 """
 
 from seqopt.scene._loads import Load
+from seqopt.scene._props import Prop
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.scene import Scene
@@ -29,6 +30,7 @@ __all__ = [
     "Ground",
     "Joint",
     "Load",
+    "Prop",
     "Robot",
     "Scene",
     "arch_scene",
