@@ -142,11 +142,14 @@ def whole_bound(problem: AllOrders) -> float:
     if free.goals[0].measure is not Measure.PEAK:
         return -np.inf
     numbers = node_numbers(free.network)
-    places = [i for i, n in enumerate(numbers, 1) if n not in problem.scene.blocked_nodes]
+    scene = problem.scene
+    taken = {*scene.blocked_nodes, *(prop.node for prop in scene.props)}
+    places = [i for i, n in enumerate(numbers, 1) if n not in taken]
     least = -np.inf
-    kinds = [k * len(numbers) for k in range(len(problem.scene.grip_kinds.turns))]
+    of_robots = {*scene.grip_kinds.of_robot[: len(scene.robots)].tolist()}
+    kinds = [k * len(numbers) for k in sorted(of_robots)]
     every = [place + more for more in kinds for place in places]  # whoever holds them
-    fewest = max(1, free.free_rules.least_grips)
+    fewest = max(1, free.free_rules.least_grips - len(scene.props))
     sets = _sets(every, fewest, free.space.robots, len(numbers))
     if len(sets):
         least = float(_values(free, sets).min())

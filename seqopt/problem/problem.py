@@ -20,10 +20,10 @@ from seqopt.arrays import Floats
 from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.problem.requirements import Criterion, Limit, _with_other_limits, as_limits
+from seqopt.problem.requirements import Criterion, Limit, _with_other_limits, as_limits, prop_limits
 from seqopt.problem.standing import MARGINS, Standing
 from seqopt.responses._tolerance import is_tolerance
-from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, robot_response
+from seqopt.responses.quantities import NO_TOLERANCE, PROP_EXCESS, TOLERANCE, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
@@ -418,7 +418,8 @@ class Problem(Shown):
     resources: Resources = HERE
 
     def __post_init__(self) -> None:
-        """Let a tolerance keep to the limits on tension and displacements, too."""
+        """Let a tolerance keep to limits on tension and displacements, and props to what they may."""
+        object.__setattr__(self, "limits", _with_prop_limits(self.limits, self.engine))
         said = [(each, _with_other_limits([each.response], self.limits)[0]) for each in self.limits]
         goals = [(each, _with_other_limits([each.response], self.limits)[0]) for each in self.goals]
         limits = tuple(replace(each, response=name) for each, name in said)
@@ -467,6 +468,12 @@ class Problem(Shown):
     def graphs(self) -> dict[str, Any]:
         """The graphs of choices that were made for it, which keep what was computed."""
         return {}
+
+
+def _with_prop_limits(limits: tuple[Limit, ...], engine: Engine) -> tuple[Limit, ...]:
+    """Return limits, with that on what the props of an engine's scene bear."""
+    kept = tuple(each for each in limits if each.response != PROP_EXCESS)
+    return (*kept, *prop_limits(engine.network.scene))
 
 
 def _in_values(words: Mapping[str, Any]) -> dict[str, Any]:

@@ -28,6 +28,7 @@ from seqopt.plan.search._margin_search import WORST, bisected, with_margin
 from seqopt.problem.problem import STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
+from seqopt.responses.quantities import PROP_EXCESS
 from seqopt.responses.quantities import length_text
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule
@@ -75,6 +76,7 @@ def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
 
 STEPS = (Goal(Measure.STEPS),)
 STANDING = "no requirement to stand"
+PROPS = "props that bear any force, both ways"
 ARMS = "arms that reach more, or stand elsewhere"
 Look = Callable[[States], Explorer]
 
@@ -227,7 +229,7 @@ def _enough(problem: States, way: str, look: Look) -> str:
         return f"a bond of {math.ceil(enough / digit) * digit:.10g} Pa"
     found = [limit for limit in problem.limits if limit.response == way]
     if not found or not (way in STATE_RESPONSES or is_tolerance(way)):
-        return f"no limit on {way}" if found else way
+        return way if not found else PROPS if way == PROP_EXCESS else f"no limit on {way}"
     rest = tuple(limit for limit in problem.limits if limit not in found)
     least = worst_least(replace(problem, limits=rest), way, look)
     if is_tolerance(way):
