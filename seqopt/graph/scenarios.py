@@ -66,9 +66,9 @@ def require_alike(nominal: Scene, scene: Scene, number: int) -> None:
 
     if meant(nominal) != meant(scene):
         raise ProblemError(
-            f"scenario {number}: it has other bricks, nodes, joints, robots, props or another build order "
-            f"than {nominal.name}, or other robots give way alike; vary stiffnesses, densities and "
-            "positions alone"
+            f"scenario {number}: it has other bricks, nodes, joints, robots or props, or another "
+            f"build order than {nominal.name}, or other robots give way alike; vary stiffnesses, "
+            "densities and positions alone"
         )
 
 

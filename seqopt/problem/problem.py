@@ -418,7 +418,7 @@ class Problem(Shown):
     resources: Resources = HERE
 
     def __post_init__(self) -> None:
-        """Let a tolerance keep to limits on tension and displacements, and props to what they may."""
+        """Let a tolerance keep to other limits, and props to what they may bear."""
         object.__setattr__(self, "limits", _with_prop_limits(self.limits, self.engine))
         said = [(each, _with_other_limits([each.response], self.limits)[0]) for each in self.limits]
         goals = [(each, _with_other_limits([each.response], self.limits)[0]) for each in self.goals]

@@ -70,7 +70,6 @@ def props_table(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
 
 
 def _row(scene: Scene, prop: Prop, held: Sequence[tuple[int, Floats]]) -> dict[str, object]:
-    assert prop.node is not None
     force = np.array([own for _, own in held])
     size = lengths(force)
     push = np.nan if prop.direction is None else float((force @ np.array(prop.direction)).min())

@@ -48,7 +48,7 @@ class Prop(Terse):
     Prop(node=13, direction=(0, 0, 1))
     """
 
-    node: int | None = None
+    node: int = None  # type: ignore[assignment]  # that next to the position
     position: Vector | None = None
     stiffness: float | Vector | None = None
     direction: Vector | None = None
@@ -65,7 +65,7 @@ class Prop(Terse):
     @property
     def label(self) -> str:
         """What messages call it."""
-        return f"prop at {f'node {self.node}' if self.node is not None else list(self.position)}"  # type: ignore[arg-type]
+        return f"prop at {f'node {self.node}' if self.position is None else list(self.position)}"
 
     @property
     def as_robot(self) -> Robot:

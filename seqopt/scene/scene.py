@@ -106,10 +106,8 @@ def _check_loads(loads: Sequence[Load], bricks: Mapping[int, Brick]) -> None:
             raise SceneError(f"{load.label}: position is {where}; move it to its brick")
 
 
-_KINDS = {
-    **{"bricks": Brick, "joints": Joint, "grounds": Ground, "robots": Robot},
-    **{"loads": Load, "props": Prop},
-}
+_PARTS = (Brick, Joint, Ground, Robot, Load, Prop)
+_KINDS = {f"{part.__name__.lower()}s": part for part in _PARTS}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -339,7 +337,7 @@ class Scene(Shown):
         if bricks == len(self.bricks) and not held:
             return ()
         since, of = self.since, self.brick_of_node
-        return tuple(p for p in self.props if since[of[p.node].name] <= bricks)  # type: ignore[index]
+        return tuple(prop for prop in self.props if since[of[prop.node].name] <= bricks)
 
     @cached_property
     def grip_kinds(self) -> GripKinds:

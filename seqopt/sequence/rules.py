@@ -116,10 +116,8 @@ class FreeRules:
         team = {name: i for i, name in enumerate(known) if name in self.robots or not self.robots}
         least = 1 if scene.props else 2
         if not least <= len(team) <= _MOST_ROBOTS:
-            lone = "" if scene.props else ", or one in a scene with props"
-            raise StepError(
-                f"the free schedule: {len(team)} robots take part; name {'one' if least < 2 else 'two'} to {_MOST_ROBOTS}{lone}"
-            )
+            how = f"name two to {_MOST_ROBOTS}, or one in a scene with props"
+            raise StepError(f"the free schedule: {len(team)} robots take part; {how}")
         outside = [name for name in self.placers if name not in team]
         if outside:
             raise StepError(
@@ -186,9 +184,8 @@ def with_robots(scene: Scene, count: int) -> Scene:
     """
     least = 1 if scene.props else 2
     if not isinstance(count, Integral) or not least <= count <= _MOST_ROBOTS:
-        raise StepError(
-            f"{short(count)} robots: the free schedule takes two to {_MOST_ROBOTS}, or one with props"
-        )
+        known = f"two to {_MOST_ROBOTS}, or one in a scene with props"
+        raise StepError(f"{short(count)} robots: the free schedule takes {known}")
     robots = list(scene.robots[:count])
     names = {robot.name for robot in robots}
     payload = max((robot.payload for robot in scene.robots), default=float("nan"))

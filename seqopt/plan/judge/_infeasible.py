@@ -28,8 +28,7 @@ from seqopt.plan.search._margin_search import WORST, bisected, with_margin
 from seqopt.problem.problem import STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
-from seqopt.responses.quantities import PROP_EXCESS
-from seqopt.responses.quantities import length_text
+from seqopt.responses.quantities import PROP_EXCESS, length_text
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule
 

@@ -20,8 +20,8 @@ from seqopt.errors import SolverError
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.judge._posture_rules import check_postures
-from seqopt.plan.judge._prop_rules import check_props
 from seqopt.plan.judge._proof import BELOW, Hint, Proof
+from seqopt.plan.judge._prop_rules import check_props
 from seqopt.plan.judge._rule_moves import check_scheduled
 from seqopt.plan.judge._standing_proof import proven_margins, require_margin
 from seqopt.plan.judge.certificate import Certificate
