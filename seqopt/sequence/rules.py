@@ -48,8 +48,7 @@ class FreeRules:
     Parameters
     ----------
     robots : tuple of str
-        Names of the robots that take part, two to five, or one beside props; by default all of the
-        scene.
+        Names of the robots that take part, one to five; by default all of the scene.
     placers : tuple of str
         Names of the robots that may place a brick; by default all that take part.
     least_grips : int
@@ -114,10 +113,10 @@ class FreeRules:
                     f"robot {name!r} does not exist{hint}; give some of {', '.join(known)}"
                 )
         team = {name: i for i, name in enumerate(known) if name in self.robots or not self.robots}
-        least = 1 if scene.props else 2
-        if not least <= len(team) <= _MOST_ROBOTS:
-            how = f"name two to {_MOST_ROBOTS}, or one in a scene with props"
-            raise StepError(f"the free schedule: {len(team)} robots take part; {how}")
+        if not 1 <= len(team) <= _MOST_ROBOTS:
+            raise StepError(
+                f"the free schedule: {len(team)} robots take part; name one to {_MOST_ROBOTS}"
+            )
         outside = [name for name in self.placers if name not in team]
         if outside:
             raise StepError(
@@ -171,7 +170,7 @@ _LOOSEST = (
 
 
 def with_robots(scene: Scene, count: int) -> Scene:
-    """Return a scene with two to five robots, or one: its own first, then mobile ones.
+    """Return a scene with one to five robots: its own first, then mobile ones.
 
     Further robots reach every node, have the largest payload of the scene's own, and give way as
     the first of them does.
@@ -182,10 +181,8 @@ def with_robots(scene: Scene, count: int) -> Scene:
     >>> [robot.name for robot in with_robots(seqopt.load_scene("arch25"), 4).robots]
     ['rob1', 'rob2', 'rob3', 'rob4']
     """
-    least = 1 if scene.props else 2
-    if not isinstance(count, Integral) or not least <= count <= _MOST_ROBOTS:
-        known = f"two to {_MOST_ROBOTS}, or one in a scene with props"
-        raise StepError(f"{short(count)} robots: the free schedule takes {known}")
+    if not isinstance(count, Integral) or not 1 <= count <= _MOST_ROBOTS:
+        raise StepError(f"{short(count)} robots: the free schedule takes one to {_MOST_ROBOTS}")
     robots = list(scene.robots[:count])
     names = {robot.name for robot in robots}
     payload = max((robot.payload for robot in scene.robots), default=float("nan"))
