@@ -8,6 +8,7 @@ from typing import Any
 
 from seqopt._cli.asked import asked_engine, asked_scene
 from seqopt._cli.outputs import require_out
+from seqopt._cli.props import parse_props
 from seqopt._cli.values import (
     asked_criterion,
     asked_resources,
@@ -34,6 +35,7 @@ from seqopt.problem.problem import (
     parse_robust,
 )
 from seqopt.problem.requirements import Criterion
+from seqopt.scene._props import Prop
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, FreeRules, with_robots
@@ -67,6 +69,25 @@ class Asked:
     aim: RobustAim | None = None
     known: Scenarios | None = None
     unseen: Scenarios | None = None
+    fewest: tuple[Prop, ...] | None = None  # candidates, where as few props as can be are asked
+
+
+def fewest_asked(options: argparse.Namespace, scene: Scene) -> tuple[Prop, ...] | None:
+    """Return the candidates where as few props as can be are asked; that aim is then taken out."""
+    aims = [word.strip() for word in (options.aim or "").split(",")]
+    among = getattr(options, "props_among", None)
+    if "props" not in aims:
+        if among is not None:
+            raise ProblemError("--props-among: it goes with --aim props,minmax")
+        return None
+    why = "it comes first, and goes with a schedule in the scene's own order and without --bases"
+    wrong = aims[0] != "props" or options.order == SEARCH or options.command != "optimize"
+    if wrong or options.props is not None or getattr(options, "bases", None) is not None:
+        raise ProblemError(
+            f"aim props: {why}" + (", or --props" if options.props is not None else "")
+        )
+    options.aim = ",".join(aims[1:]) or "minmax"
+    return parse_props(among or "all", scene, "--props-among")
 
 
 def asked_problem(options: argparse.Namespace) -> Asked:
@@ -86,6 +107,8 @@ def asked_problem(options: argparse.Namespace) -> Asked:
         scene = without_arms(scene)  # bases are chosen afterwards
     if options.robots.isdecimal():
         scene = with_robots(scene, int(options.robots))
+    fewest = fewest_asked(options, scene)
+    scene = scene if fewest is None else scene.with_props(*fewest)
     find_postures(scene, getattr(options, "cache", None), options.tell)
     words: dict[str, Any] = {"limits": parse_limits(options.limit, scene)}
     budgets = getattr(options, "budget", [])
@@ -104,7 +127,7 @@ def asked_problem(options: argparse.Namespace) -> Asked:
     words |= {"stands": asked_standing(options), "budgets": budgets}
     words |= {"orders": Orders.TIED} if sought else {}
     problem = posed(engine, moves, criterion, options.aim, **words)
-    return Asked(scene, problem, aim, known, unseen)
+    return Asked(scene, problem, aim, known, unseen, fewest)
 
 
 def _wants_states(options: argparse.Namespace) -> bool:

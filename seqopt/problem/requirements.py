@@ -402,8 +402,13 @@ def excesses(scene: Scene, table: pd.DataFrame, limits: Sequence[Limit]) -> tupl
 def overloads(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
     """Return the payloads that steps exceed, in the order of the robots; see `excesses`."""
     names = {robot_response(robot.name): robot.name for robot in scene.robots}
-    found = excesses(scene, table, (*payload_limits(scene), *prop_limits(scene)))
-    return tuple(replace(each, robot=names.get(each.limit.response, "")) for each in found)
+    found = excesses(scene, table, payload_limits(scene))
+    return tuple(replace(excess, robot=names[excess.limit.response]) for excess in found)
+
+
+def prop_faults(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
+    """Return in which steps props bear more than they may; see `excesses`."""
+    return excesses(scene, table, prop_limits(scene))
 
 
 def _response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:

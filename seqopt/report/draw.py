@@ -49,6 +49,7 @@ CLAY = np.array([0.80, 0.52, 0.38])
 MARKED = np.array([0.46, 0.63, 0.76])
 ROBOT_MARKERS = "XPDs"
 GROUND, ARM = "#efece6", 3.2  # color; width of an arm, points
+PROP = "#8a8478"
 LINE = 11.0  # points from one line of text to the next
 NEAR = (0.3, 0.08)  # share of a picture within which labels are neighbors, aside and up
 
@@ -305,6 +306,18 @@ def _draw_robots(axes: Axes, scene: Scene, grips: Sequence[int | None], view: Vi
             axes.add_patch(PathPatch(Path(line[:-1]), lw=width, ec=paint, **look))
         ends: Any = {"fill": False, "capstyle": "round", "zorder": order}
         axes.add_patch(PathPatch(Path(line[-2:]), lw=0.6 * ARM, ec=INK, **ends))
+
+
+def draw_props(axes: Axes, scene: Scene, bricks: int, *, held: bool, view: View) -> None:
+    """Draw the props that hold while so many bricks stand, behind the structure.
+
+    ``held``: whether a robot holds any.
+    """
+    cell = Cell(scene)
+    for prop in scene.standing_props(bricks, held=held):
+        x, y = view.axes()[:2] @ cell.prop(prop).T
+        axes.plot(x, y, color=PROP, lw=3.5, solid_capstyle="butt", zorder=0.4)
+        axes.plot(x[:1], y[:1], "^", color=PROP, mec="white", ms=7, zorder=4.5)
 
 
 def grip_mark(robot: int) -> dict[str, Any]:

@@ -80,7 +80,7 @@ def _unit(where: str, values: Iterable[float]) -> Vector:
     size = math.hypot(x, y, z)
     if not size > 0:
         raise SceneError(f"{where} is {[x, y, z]}; give one that is not zero")
-    return x / size, y / size, z / size
+    return x / size + 0.0, y / size + 0.0, z / size + 0.0  # no zero with a minus
 
 
 def settled_props(props: Sequence[Prop], bricks: Mapping[int, Brick]) -> tuple[Prop, ...]:
@@ -108,3 +108,19 @@ def _at_node(prop: Prop, position: Vector, bricks: Mapping[int, Brick]) -> Prop:
             f"{most:.3g} m from one"
         )
     return replace(prop, node=node, position=None)
+
+
+def free_nodes(bricks: Iterable[Brick], blocked: Iterable[int]) -> tuple[int, ...]:
+    """Return the nodes that props may hold, brick by brick."""
+    taken = {*blocked}
+    return tuple(node for brick in bricks for node in brick.nodes if node not in taken)
+
+
+def centering(bricks: Iterable[Brick], blocked: Iterable[int]) -> tuple[int, ...]:
+    """Return a node of every brick that leaves the one at which it is placed free.
+
+    A brick of which no other node is free has none.
+    """
+    taken = {*blocked}
+    free = ([n for n in b.nodes if n not in taken and n != b.placing_node] for b in bricks)
+    return tuple(nodes[0] for nodes in free if nodes)

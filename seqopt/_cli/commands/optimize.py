@@ -42,6 +42,7 @@ from seqopt.errors import ProblemError
 from seqopt.graph.states.states import States
 from seqopt.plan._bases import FoundBases, choose_bases
 from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation, formulation_names
+from seqopt.plan.fewest_props import FoundProps, fewest_props
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.out_of_sample import Trial, judge_unseen, worst_values
 from seqopt.plan.plan import Plan
@@ -83,7 +84,8 @@ BUDGET = {
     "free: steps=N, regrips=N, travel=METERS or sum(RESPONSE)=VALUE"
 }
 AIM = {
-    "--aim NAME,NAME": "what is to be as small as possible, the most important first: minmax (the "
+    "--aim NAME,NAME": "what is to be as small as possible, the most important first: props (how "
+    "many are needed, at which nodes), minmax (the "
     "worst step by the criterion, by default worst-ratio), sum, steps, regrips, travel, bond, "
     "friction, tilt, a response, or sum(RESPONSE) (free: by default minmax; other schedules: by "
     "default the total of what their moves cost); with --order search, the best order of the "
@@ -125,6 +127,10 @@ BASES = {
     "the best plan that they allow: among places of a grid around the bricks (grid:METERS for its "
     "spacing), or those of a CSV file with the columns robot, x, y, z, heading_deg"
 }
+FEWEST = {
+    "--props-among NODES": "with --aim props: at which nodes props may be, and what they bear, as "
+    "--props; all of them by default, as all:1e6,push"
+}
 MEMORY = {
     "--cache DIR": "keep answers there and use what is there: a run that was ended goes on",
     "--max-memory SIZE": "what responses and costs may take, as 500MB or 2GB (default: four fifths "
@@ -138,7 +144,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     declare(command.add_argument_group("what is allowed"), LIMIT | BUDGET)
     form_options(command, strict=True, builds=True)
     states = "what plans are compared by, state after state, with any schedule"
-    declare(command.add_argument_group(states), AIM | STANDING)
+    declare(command.add_argument_group(states), AIM | FEWEST | STANDING)
     declare(command.add_argument_group("with --schedule free"), RULE | BASES)
     criterion_options(command)
     engine_options(command)
@@ -179,6 +185,7 @@ class _Found:
     assemble: float
     prover: BuildProver
     bases: FoundBases | None = None
+    props: FoundProps | None = None
 
     @cached_property
     def trial(self) -> Trial | None:
@@ -209,6 +216,7 @@ class _Found:
             "models_paper_count": _paper_count(self.plan),
             "stability": {each.mortar: each.facts() for each in self.own},
         }
+        out |= {} if self.props is None else {"fewest_props": self.props.described()}
         known, unseen = self.asked.known, self.asked.unseen
         if known is None or unseen is None:
             return out
@@ -234,14 +242,28 @@ def run(options: argparse.Namespace) -> Answer:
         return solve(problem, formulation, time_limit=limit, progress=tell, **how)
 
     bases = None if options.bases is None else _bases(options, asked.problem, choose)
-    plan = choose(asked.problem) if bases is None else bases.plan
-    found = _Found(asked, plan, assemble, asked_prover(options, plan.engine.network), bases)
+    props = None if asked.fewest is None else _props(options, asked, choose)
+    outer = bases or props
+    plan = choose(asked.problem) if outer is None else outer.plan
+    prover = asked_prover(options, plan.engine.network)
+    found = _Found(asked, plan, assemble, prover, bases, props)
 
     def files() -> dict[str, bytes | str]:
         made = plan_files(plan, found.report, found.prover, found.trial)
-        return made if bases is None else made | {"bases.csv": csv_text(bases.tried)}
+        name = "bases.csv" if props is None else "fewest_props.csv"
+        return made if outer is None else made | {name: csv_text(outer.tried)}
 
     return _answer(options, found, write_outputs(options, files))
+
+
+def _props(
+    options: argparse.Namespace, asked: Asked, choose: Callable[[Problem], Plan]
+) -> FoundProps:
+    """Return the best plan of the fewest props."""
+    if options.no_proof:
+        raise ProblemError("--no-proof: props are compared by proven plans; leave it out")
+    assert asked.fewest is not None
+    return fewest_props(asked.problem, asked.fewest, choose, options.tell)
 
 
 def _bases(
@@ -275,7 +297,7 @@ def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]
     over = () if stopped else exceeded(scene, table)
     lines = [f"{_said(found)}; {written_to(options.out)}"]
     lines += [f"stability, {each}" for each in found.own]
-    lines += [] if found.bases is None else [wrapped(found.bases.said)]
+    lines += [wrapped(each.said) for each in (found.bases, found.props) if each is not None]
     facts: dict[str, object] = {
         "scene": scene_facts(scene),
         "summary": found.report,
@@ -283,6 +305,8 @@ def _answer(options: argparse.Namespace, found: _Found, written: tuple[Any, ...]
     }
     if found.bases is not None:
         facts["bases"] = found.bases.tried
+    if found.props is not None:
+        facts["fewest_props"] = found.props.tried
     if plan.order is not None:
         order = plan.order.selection.order
         facts["order"] = order

@@ -29,6 +29,7 @@ from seqopt.problem.problem import STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, length_text
+from seqopt.scene._props import Prop, centering
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule
 
@@ -76,6 +77,7 @@ def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
 STEPS = (Goal(Measure.STEPS),)
 STANDING = "no requirement to stand"
 PROPS = "props that bear any force, both ways"
+CENTERING = "a prop at every brick, if not fewer"
 ARMS = "arms that reach more, or stand elsewhere"
 Look = Callable[[States], Explorer]
 
@@ -165,7 +167,9 @@ def _where(problem: States, look: Look) -> str:
 
 def _what_helps(problem: States, look: Look) -> str:
     """Return what opens a way, as the end of a line."""
-    ways = [*_opening(problem, look)] or [*islice(_pairs(problem, look), 1)]
+    ways = [*_opening(problem, look)]
+    if not ways:
+        ways = [*islice(_pairs(problem, look), 1), *_propped(problem, look)]
     if not ways:
         return ", whatever two rules or limits are loosened; extend a reach or add a robot"
     return f"; it becomes possible with {' or '.join(_enough(problem, w, look) for w in ways)}"
@@ -189,6 +193,19 @@ def _opening(problem: States, look: Look) -> Iterator[str]:
         rest = tuple(other for other in problem.limits if other is not limit)
         if look(replace(problem, limits=rest)).whole:
             yield limit.response
+
+
+def _propped(problem: States, look: Look) -> Iterator[str]:
+    """Yield that props help, if one at every brick does."""
+    scene = problem.network.scene
+    if scene.props or recipe_of(problem.engine) is None or problem.scenarios:
+        return
+    props = (Prop(node=node) for node in centering(scene.placed, scene.blocked_nodes))
+    engine = engine_for(problem.engine, scene.with_props(*props))
+    moves = problem.rules
+    rules = replace(moves, scene=engine.network.scene) if isinstance(moves, Schedule) else moves
+    if look(replace(problem, engine=engine, rules=rules, goals=STEPS)).whole:
+        yield CENTERING
 
 
 def _without_arms(problem: States) -> States:
