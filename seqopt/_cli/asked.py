@@ -19,7 +19,7 @@ from seqopt.engines.registry import LIMITED, make_engine
 from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.network.network import Network
 from seqopt.problem._arms import arm_faults
-from seqopt.problem.requirements import overloads, prop_faults
+from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.report.comparison import idle_note
 from seqopt.responses.table import OUTSIDE, REMEDY
 from seqopt.scene.scene import Scene, in_order
@@ -118,7 +118,7 @@ def idle_notes(scene: Scene, steps: Sequence[AnyStep]) -> tuple[str, ...]:
 
 def exceeded(scene: Scene, *tables: pd.DataFrame) -> tuple[str, ...]:
     """Return the payloads, also of props, that are exceeded in responses of steps, in words."""
-    found = ((*overloads(scene, table), *prop_faults(scene, table)) for table in tables)
+    found = ((*overloads(scene, table), *_prop_faults(scene, table)) for table in tables)
     return tuple(str(excess) for each in found for excess in each)
 
 

@@ -118,10 +118,10 @@ def step_assembly(
     held = [(node, robot.payload) for node, robot in pairs if node is not None]
     bare = bare_assembly(network, bricks, known)
     props = prop_grips(network, bricks, held=bool(held))
-    return with_grips(bare, network, held, props)
+    return _with_grips(bare, network, held, props)
 
 
-def with_grips(
+def _with_grips(
     bare: Assembly, network: Network, held: Sequence[tuple[int, float]], props: PropGrips
 ) -> Assembly:
     """Return an assembly with grips of robots, nodes and payloads, N, and of props."""

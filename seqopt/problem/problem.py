@@ -20,7 +20,13 @@ from seqopt.arrays import Floats
 from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.problem.requirements import Criterion, Limit, _with_other_limits, as_limits, prop_limits
+from seqopt.problem.requirements import (
+    Criterion,
+    Limit,
+    _prop_limits,
+    _with_other_limits,
+    as_limits,
+)
 from seqopt.problem.standing import MARGINS, Standing
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import NO_TOLERANCE, PROP_EXCESS, TOLERANCE, robot_response
@@ -473,7 +479,7 @@ class Problem(Shown):
 def _with_prop_limits(limits: tuple[Limit, ...], engine: Engine) -> tuple[Limit, ...]:
     """Return limits, with that on what the props of an engine's scene bear."""
     kept = tuple(each for each in limits if each.response != PROP_EXCESS)
-    return (*kept, *prop_limits(engine.network.scene))
+    return (*kept, *_prop_limits(engine.network.scene))
 
 
 def _in_values(words: Mapping[str, Any]) -> dict[str, Any]:

@@ -303,7 +303,7 @@ def payload_limits(scene: Scene) -> tuple[Limit, ...]:
 _LITTLE = 1e-4  # of the mean weight of a brick: by how much props may bear more than they may
 
 
-def prop_limits(scene: Scene) -> tuple[Limit, ...]:
+def _prop_limits(scene: Scene) -> tuple[Limit, ...]:
     """Return the limit that keeps props within what they may bear; none where all bear anything."""
     if all(prop.capacity is None and prop.direction is None for prop in scene.props):
         return ()
@@ -406,9 +406,9 @@ def overloads(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
     return tuple(replace(excess, robot=names[excess.limit.response]) for excess in found)
 
 
-def prop_faults(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
+def _prop_faults(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
     """Return in which steps props bear more than they may; see `excesses`."""
-    return excesses(scene, table, prop_limits(scene))
+    return excesses(scene, table, _prop_limits(scene))
 
 
 def _response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:

@@ -30,11 +30,11 @@ from seqopt.report._robots import Cell
 from seqopt.report._style import BLUE, SMALL, WIDTH, new_picture, styled
 from seqopt.report.draw import (
     View,
+    _draw_props,
     _draw_robots,
     draw_bricks,
     draw_grips,
     draw_network,
-    draw_props,
     force_key,
     grip_mark,
 )
@@ -97,7 +97,7 @@ def scene_picture(scene: Scene, bricks: int | None = None, width: float = WIDTH)
     figure, (axes,) = _panels(_seen_box(scene), 1, width)
     if count < most:
         draw_bricks(axes, network, most, VIEW, alpha=0.15)
-    draw_props(axes, network.scene, count, held=True, view=VIEW)
+    _draw_props(axes, network.scene, count, held=True, view=VIEW)
     draw_bricks(axes, network, count, VIEW)
     axes.set_title(f"{scene.name}: {count} of {most} bricks")
     return figure
@@ -191,7 +191,7 @@ def _draw_step(
         how |= {"edge_force": fields.edge_force[0], "largest_force": largest_force}
         draw_network(axes, network, bricks, VIEW, **how)
         return
-    draw_props(axes, network.scene, bricks, held=bool(step.held), view=VIEW)
+    _draw_props(axes, network.scene, bricks, held=bool(step.held), view=VIEW)
     _draw_robots(axes, network.scene, step.grips, VIEW)
     if fields is not None:
         draw_bricks(axes, network, bricks, VIEW, alpha=0.15)

@@ -308,7 +308,7 @@ def _draw_robots(axes: Axes, scene: Scene, grips: Sequence[int | None], view: Vi
         axes.add_patch(PathPatch(Path(line[-2:]), lw=0.6 * ARM, ec=INK, **ends))
 
 
-def draw_props(axes: Axes, scene: Scene, bricks: int, *, held: bool, view: View) -> None:
+def _draw_props(axes: Axes, scene: Scene, bricks: int, *, held: bool, view: View) -> None:
     """Draw the props that hold while so many bricks stand, behind the structure.
 
     ``held``: whether a robot holds any.

@@ -26,7 +26,7 @@ from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Want
 from seqopt.errors import ProblemError
 from seqopt.network.network import GROUND, Network, PartKind
-from seqopt.problem.requirements import Excess, overloads, prop_faults
+from seqopt.problem.requirements import Excess, _prop_faults, overloads
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
 from seqopt.responses._tolerance import each_tolerance, held_in_steps, is_linear
 from seqopt.responses.quantities import _number_text, length_text
@@ -213,7 +213,7 @@ def _off(engine: Engine, build: Build) -> list[str]:
 
 def _marks(scene: Scene, build: Build) -> list[str]:
     """Return payloads that every step exceeds, and the linear range that it leaves, in words."""
-    over, props, out = build.overloads(scene), prop_faults(scene, build.table), []
+    over, props, out = build.overloads(scene), _prop_faults(scene, build.table), []
     for step in build.steps:
         said = [f"{each.robot} exceeds its payload" for each in over if step.number in each.steps]
         said += ["a prop bears more than it may" for each in props if step.number in each.steps]

@@ -41,8 +41,8 @@ from seqopt._files import csv_text
 from seqopt.errors import ProblemError
 from seqopt.graph.states.states import States
 from seqopt.plan._bases import FoundBases, choose_bases
+from seqopt.plan._fewest_props import FoundProps, fewest_props
 from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation, formulation_names
-from seqopt.plan.fewest_props import FoundProps, fewest_props
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.out_of_sample import Trial, judge_unseen, worst_values
 from seqopt.plan.plan import Plan
