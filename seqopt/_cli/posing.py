@@ -80,11 +80,10 @@ def fewest_asked(options: argparse.Namespace, scene: Scene) -> tuple[Prop, ...] 
         if among is not None:
             raise ProblemError("--props-among: it goes with --aim props,minmax")
         return None
-    why = "it comes first, and goes with a schedule in the scene's own order and without --bases"
-    wrong = aims[0] != "props" or options.order == SEARCH or options.command != "optimize"
+    wrong = aims[0] != "props" or options.command != "optimize"
     if wrong or options.props is not None or getattr(options, "bases", None) is not None:
         raise ProblemError(
-            f"aim props: {why}" + (", or --props" if options.props is not None else "")
+            "aim props: it comes first, and goes with optimize, without --props or --bases"
         )
     options.aim = ",".join(aims[1:]) or "minmax"
     return parse_props(among or "all", scene, "--props-among")
