@@ -11,7 +11,6 @@ from seqopt.scene._checks import short
 from seqopt.scene._props import Prop, centering, free_nodes
 from seqopt.scene.scene import Scene
 
-_MANY = {"every": centering, "all": free_nodes}
 _HOW = "give nodes, as 13,27, or every; then as 13:1e6 (N/m), and after a comma push, capacity=300"
 
 
@@ -42,11 +41,13 @@ def _placed(word: str, scene: Scene, where: str) -> Sequence[Prop]:
     """Return the props of one word."""
     place, colon, stiffness = word.partition(":")
     own = number_word(stiffness, where) if colon else None
-    if place in _MANY:
-        nodes = _MANY[place](scene.placed, scene.blocked_nodes)
+    if place == "every":
+        return centering(scene, own)
+    if place == "all":
+        nodes = free_nodes(scene)
     elif place.isascii() and place.isdecimal():
         nodes = (int(place),)
     else:
-        hint = did_you_mean(place, (*_MANY, "push", "none"))
+        hint = did_you_mean(place, ("every", "all", "push", "none"))
         raise SceneError(f"{where}: {place!r} is no node{hint}; {_HOW}")
     return [Prop(node=node, stiffness=own) for node in nodes]

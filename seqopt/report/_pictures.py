@@ -29,6 +29,7 @@ from seqopt.network.network import Network
 from seqopt.report._robots import Cell
 from seqopt.report._style import BLUE, SMALL, WIDTH, new_picture, styled
 from seqopt.report.draw import (
+    PROP_MARK,
     View,
     _draw_props,
     _draw_robots,
@@ -155,6 +156,7 @@ def steps_picture(
             key |= _mark_grips(axes, scene, step.grips)
         _frame(axes, scene, step, len(steps))
     handles = [key[robot] for robot in sorted(key)]
+    handles += [Line2D([], [], **PROP_MARK, ms=8, label="prop holds")] if scene.props else []
     handles += [] if largest is None else force_key(largest)
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=4)

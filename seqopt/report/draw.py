@@ -50,6 +50,7 @@ MARKED = np.array([0.46, 0.63, 0.76])
 ROBOT_MARKERS = "XPDs"
 GROUND, ARM = "#efece6", 3.2  # color; width of an arm, points
 PROP = "#8a8478"
+PROP_MARK: dict[str, Any] = {"marker": "^", "color": PROP, "mec": "white", "ls": "none"}
 LINE = 11.0  # points from one line of text to the next
 NEAR = (0.3, 0.08)  # share of a picture within which labels are neighbors, aside and up
 
@@ -317,7 +318,7 @@ def _draw_props(axes: Axes, scene: Scene, bricks: int, *, held: bool, view: View
     for prop in scene.standing_props(bricks, held=held):
         x, y = view.axes()[:2] @ cell.prop(prop).T
         axes.plot(x, y, color=PROP, lw=3.5, solid_capstyle="butt", zorder=0.4)
-        axes.plot(x[:1], y[:1], "^", color=PROP, mec="white", ms=7, zorder=4.5)
+        axes.plot(x[:1], y[:1], **PROP_MARK, ms=7, zorder=4.5)
 
 
 def grip_mark(robot: int) -> dict[str, Any]:

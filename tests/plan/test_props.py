@@ -55,7 +55,7 @@ def test_the_best_plan_with_props_is_that_of_brute_force(rules, nodes):
 @pytest.mark.parametrize("payload", [45.0, 75.0, 120.0])
 def test_the_fewest_props_are_those_of_brute_force(payload):
     scene = weak(5, payload)
-    nodes = free_nodes(scene.placed, scene.blocked_nodes)
+    nodes = free_nodes(scene)
     found = fewest_props(posed(scene), [Prop(node=n) for n in nodes], seqopt.solve)
     values = None
     for count in range(3):
@@ -76,7 +76,7 @@ def test_the_fewest_props_are_those_of_brute_force(payload):
 
 def test_the_tested_builds_need_props():
     """The control of the test above: none, some, and different numbers of props are needed."""
-    nodes = free_nodes(weak(5, 1.0).placed, weak(5, 1.0).blocked_nodes)
+    nodes = free_nodes(weak(5, 1.0))
     counts = [
         fewest_props(posed(weak(5, payload)), [Prop(node=n) for n in nodes], seqopt.solve).count
         for payload in (45.0, 120.0)
@@ -95,15 +95,14 @@ def test_what_stops_all_plans_is_the_same_for_sets_with_the_same_first_props():
     scene = weak(5, 45.0)
     stop = Proof(states_of(posed(scene))).stops_at()
     assert stop is not None
-    for node in free_nodes(scene.placed[stop:], ()):
+    for node in [n for brick in scene.placed[stop:] for n in brick.nodes]:
         again = Proof(states_of(posed(scene.with_props(Prop(node=node))))).stops_at()
         assert again == stop
 
 
 def test_one_robot_builds_on_centering():
     scene = small_arch(5)
-    nodes = centering(scene.placed, scene.blocked_nodes)
-    one = replace(scene, robots=scene.robots[-1:]).with_props(*(Prop(node=n) for n in nodes))
+    one = scene.with_robots(scene.robots[-1]).with_props(*centering(scene))
     rules = seqopt.FreeRules(least_grips=0, newest="free")
     plan = seqopt.solve(posed(one, rules))
     assert [len(step.held) for step in plan.steps] == [1, 0] * 5

@@ -14,8 +14,7 @@ import seqopt
 from seqopt.engines.interface import Want
 from seqopt.responses._props import excess_of
 from seqopt.responses._staged import analyze_staged
-from seqopt.scene import Prop, Robot
-from seqopt.scene._props import centering
+from seqopt.scene import Prop, Robot, centering
 from tests.builders import small_arch
 
 UP = (0.0, 0.0, 1.0)
@@ -82,7 +81,7 @@ def test_stiff_props_at_every_brick_hold_the_structure_still():
 
 def test_centering_leaves_robots_their_nodes():
     scene = small_arch(5)
-    nodes = centering(scene.placed, scene.blocked_nodes)
+    nodes = [prop.node for prop in centering(scene)]
     assert not {*nodes} & {brick.placing_node for brick in scene.placed}
     assert len(nodes) >= 4
 
