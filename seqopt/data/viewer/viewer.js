@@ -7,6 +7,7 @@
     F_sup_N: "support force, N", M_sup_Nm: "support moment, N m", F_max_N: "largest tension in an edge, N",
     F_min_N: "largest compression in an edge, N", F_avg_N: "mean force of the edges, N", T_pct: "edges in tension, %",
     "D_max_1e-3mm": "largest displacement, 1e-3 mm", "D_avg_1e-3mm": "mean displacement, 1e-3 mm", "D_std_1e-3mm": "spread of displacements, 1e-3 mm",
+    props: "props that hold", F_prop_N: "largest force of a prop, N", prop_excess_N: "more than props may bear, N",
   };
   const KINDS = { place: "place", release: "release", reposition: "reposition" };
   const CLAY = 0xcc8560, PROP = 0x8a8478, NEW = 0xe8b04a, TENSION = 0xc8102e, COMPRESSION = 0x1f5fa8, LARGEST = 32767;
