@@ -81,9 +81,10 @@ def fewest_asked(options: argparse.Namespace, scene: Scene) -> tuple[Prop, ...] 
             raise ProblemError("--props-among: it goes with --aim props,minmax")
         return None
     wrong = aims[0] != "props" or options.command != "optimize"
-    if wrong or options.props is not None or getattr(options, "bases", None) is not None:
+    if wrong or scene.props or getattr(options, "bases", None) is not None:
         raise ProblemError(
-            "aim props: it comes first, and goes with optimize, without --props or --bases"
+            "aim props: it comes first, and goes with optimize, without --bases or props that are "
+            "given (--props none leaves out those of a scene)"
         )
     options.aim = ",".join(aims[1:]) or "minmax"
     return parse_props(among or "all", scene, "--props-among")

@@ -121,12 +121,16 @@ class _Search:
         count, sets = len(self._candidates), 0
         for size in range(count + 1):
             sets += comb(count, size)
-            for chosen in self._sets(size, ()):
-                self._look(chosen)
+            whole = all(map(self._look, self._sets(size, ())))
             if self._plan is not None:
-                proven = not any(_is_below(bound, self._best) for bound in self._left)
+                proven = whole and not any(_is_below(bound, self._best) for bound in self._left)
                 rows = pd.DataFrame(self._rows)
                 return FoundProps(self._plan, self._of, rows, sets, proven)
+            if not whole:
+                raise ProblemError(
+                    f"aim props: {_MOST} sets were looked at, and none of up to {size} props was "
+                    "found to allow a plan; allow fewer nodes with --props-among"
+                )
         raise InfeasibleError(
             f"props: none of {sets} sets of up to {count} props allows a plan; allow other nodes, "
             "or loosen a rule or limit"
@@ -154,20 +158,16 @@ class _Search:
     def _until(self, chosen: _Set, bricks: int) -> _Set:
         return tuple(i for i in chosen if self._since[i] <= bricks)
 
-    def _look(self, chosen: _Set) -> None:
-        """Rule out a set and its like, or solve it."""
+    def _look(self, chosen: _Set) -> bool:
+        """Rule out a set and its like, or solve it; return whether there is time for another."""
         props = [self._candidates[i] for i in chosen]
         nodes = " ".join(str(prop.node) for prop in props)
-        if len(self._rows) >= _MOST:
-            raise ProblemError(
-                f"aim props: more than {_MOST} sets have to be looked at, none of fewer than "
-                f"{len(chosen)} props allows a plan; allow fewer nodes with --props-among"
-            )
         self._tell(f"props, {len(self._rows)} sets looked at, now {nodes or 'none'}")
         outcome, value = self._outcome(chosen, self._problem.scene.with_props(*props))
         named = zip(self._problem.goals, value, strict=False)
         known = {str(goal): goal.shown(number) for goal, number in named}
         self._rows.append({"nodes": nodes, "outcome": outcome, **known})
+        return len(self._rows) < _MOST
 
     def _outcome(self, chosen: _Set, scene: Scene) -> tuple[str, tuple[float, ...]]:
         """Return what is known of a set, in words, and the values of its best plan."""
