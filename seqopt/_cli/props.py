@@ -8,7 +8,7 @@ from dataclasses import replace
 from seqopt._cli.values import number_word
 from seqopt.errors import SceneError, did_you_mean
 from seqopt.scene._checks import short
-from seqopt.scene._props import Prop, centering, free_nodes
+from seqopt.scene._props import Prop
 from seqopt.scene.scene import Scene
 
 _HOW = "give nodes, as 13,27, or every; then as 13:1e6 (N/m), and after a comma push, capacity=300"
@@ -42,9 +42,10 @@ def _placed(word: str, scene: Scene, where: str) -> Sequence[Prop]:
     place, colon, stiffness = word.partition(":")
     own = number_word(stiffness, where) if colon else None
     if place == "every":
-        return centering(scene, own)
+        return scene.with_centering(own).props
     if place == "all":
-        nodes = free_nodes(scene)
+        free = (node for brick in scene.placed for node in brick.nodes)
+        nodes = tuple(node for node in free if node not in scene.blocked_nodes)
     elif place.isascii() and place.isdecimal():
         nodes = (int(place),)
     else:

@@ -20,6 +20,7 @@ from seqopt.arrays import Floats
 from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
+from seqopt.network.network import Network
 from seqopt.problem.requirements import (
     Criterion,
     Limit,
@@ -478,8 +479,11 @@ class Problem(Shown):
 
 def _with_prop_limits(limits: tuple[Limit, ...], engine: Engine) -> tuple[Limit, ...]:
     """Return limits, with that on what the props of an engine's scene bear."""
+    network = getattr(engine, "network", None)
+    if not isinstance(network, Network):  # it is refused later
+        return limits
     kept = tuple(each for each in limits if each.response != PROP_EXCESS)
-    return (*kept, *_prop_limits(engine.network.scene))
+    return (*kept, *_prop_limits(network.scene))
 
 
 def _in_values(words: Mapping[str, Any]) -> dict[str, Any]:

@@ -18,7 +18,6 @@ than its weight loads it; `save_scene` writes it to a file.
 """
 
 from seqopt.scene._loads import Load
-from seqopt.scene._props import Prop, centering
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.scene import Scene
@@ -30,11 +29,9 @@ __all__ = [
     "Ground",
     "Joint",
     "Load",
-    "Prop",
     "Robot",
     "Scene",
     "arch_scene",
-    "centering",
     "load_scene",
     "save_scene",
 ]

@@ -11,15 +11,11 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 from seqopt.arrays import Terse, Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import check, positive, unless_none, vector, whole
 from seqopt.scene.parts import Brick, Robot, _each_way
-
-if TYPE_CHECKING:
-    from seqopt.scene.scene import Scene
 
 _NEAR = 1.0  # of a node from where a prop is said to be, over the smallest side of its brick
 
@@ -114,23 +110,13 @@ def _at_node(prop: Prop, position: Vector, bricks: Mapping[int, Brick]) -> Prop:
     return replace(prop, node=node, position=None)
 
 
-def free_nodes(scene: Scene) -> tuple[int, ...]:
-    """Return the nodes that props may hold, brick by brick in build order."""
-    taken = {*scene.blocked_nodes}
-    return tuple(node for brick in scene.placed for node in brick.nodes if node not in taken)
-
-
-def centering(scene: Scene, stiffness: float | Vector | None = None) -> tuple[Prop, ...]:
+def centered(
+    bricks: Iterable[Brick], blocked: Sequence[int], stiffness: float | Vector | None
+) -> tuple[Prop, ...]:
     """Return a prop for every brick, at a node that leaves the one at which it is placed free.
 
-    A brick of which no other node is free has none. ``stiffness``: as of `Prop`.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> len(centering(seqopt.load_scene("arch25"))), centering(seqopt.load_scene("arch25"))[0]
-    (24, Prop(node=3))
+    A brick of which no other node is free has none.
     """
-    taken = {*scene.blocked_nodes}
-    free = [[n for n in b.nodes if n not in taken and n != b.placing_node] for b in scene.placed]
+    taken = {*blocked}
+    free = [[n for n in b.nodes if n not in taken and n != b.placing_node] for b in bricks]
     return tuple(Prop(node=nodes[0], stiffness=stiffness) for nodes in free if nodes)

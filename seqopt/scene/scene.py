@@ -15,7 +15,7 @@ from seqopt.errors import SceneError
 from seqopt.scene._checks import check, not_negative, printable, short, vector, wholes
 from seqopt.scene._grip_kinds import GripKinds, grip_kinds
 from seqopt.scene._loads import Load
-from seqopt.scene._props import Prop, settled_props
+from seqopt.scene._props import Prop, centered, settled_props
 from seqopt.scene.parts import Brick, Ground, Joint, Reach, Robot
 
 if TYPE_CHECKING:
@@ -323,11 +323,25 @@ class Scene(Shown):
         Examples
         --------
         >>> import seqopt
-        >>> from seqopt.scene import Prop
-        >>> seqopt.load_scene("arch25").with_props(Prop(node=13)).props
+        >>> seqopt.load_scene("arch25").with_props(seqopt.Prop(node=13)).props
         (Prop(node=13),)
         """
         return replace(self, props=props)
+
+    def with_centering(self, stiffness: float | Vector | None = None) -> Scene:
+        """Return the same scene with a prop at every brick, as centering has, and no others.
+
+        It holds the node at which the brick is not placed; a brick of which this is blocked has
+        none. ``stiffness``: as of `Prop`.
+
+        Examples
+        --------
+        >>> import seqopt
+        >>> props = seqopt.load_scene("arch25").with_centering(1e6).props
+        >>> len(props), props[0].node
+        (24, 3)
+        """
+        return self.with_props(*centered(self.placed, self.blocked_nodes, stiffness))
 
     def standing_props(self, bricks: int, *, held: bool) -> tuple[Prop, ...]:
         """Return the props that hold while so many bricks stand, in the scene's order.

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import seqopt
+from seqopt import Prop
 from seqopt.errors import InfeasibleError, SolverError, StepError
 from seqopt.plan._fewest_props import fewest_props
 from seqopt.plan.judge._proof import Proof
@@ -16,14 +17,17 @@ from seqopt.plan.judge._prop_rules import check_props, props_that_hold
 from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.plan.solving import states_of
 from seqopt.responses.quantities import PROP_EXCESS
-from seqopt.scene import Prop
-from seqopt.scene._props import centering, free_nodes
 from seqopt.sequence._rule_check import check_free
 from tests.brute_force import ONES, best_values
 from tests.builders import small_arch
 
 UP = (0.0, 0.0, 1.0)
 LOOSE = seqopt.FreeRules(least_grips=1)
+
+
+def free_nodes(scene):
+    nodes = (node for brick in scene.placed for node in brick.nodes)
+    return [node for node in nodes if node not in scene.blocked_nodes]
 
 
 def posed(scene, rules=LOOSE, aim="minmax,steps", **words):
@@ -102,7 +106,7 @@ def test_what_stops_all_plans_is_the_same_for_sets_with_the_same_first_props():
 
 def test_one_robot_builds_on_centering():
     scene = small_arch(5)
-    one = scene.with_robots(scene.robots[-1]).with_props(*centering(scene))
+    one = scene.with_robots(scene.robots[-1]).with_centering()
     rules = seqopt.FreeRules(least_grips=0, newest="free")
     plan = seqopt.solve(posed(one, rules))
     assert [len(step.held) for step in plan.steps] == [1, 0] * 5

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import seqopt
+from seqopt import Prop, Robot
 from seqopt.engines.interface import Want
 from seqopt.responses._props import excess_of
 from seqopt.responses._staged import analyze_staged
-from seqopt.scene import Prop, Robot, centering
 from tests.builders import small_arch
 
 UP = (0.0, 0.0, 1.0)
@@ -81,7 +81,7 @@ def test_stiff_props_at_every_brick_hold_the_structure_still():
 
 def test_centering_leaves_robots_their_nodes():
     scene = small_arch(5)
-    nodes = [prop.node for prop in centering(scene)]
+    nodes = [prop.node for prop in scene.with_centering().props]
     assert not {*nodes} & {brick.placing_node for brick in scene.placed}
     assert len(nodes) >= 4
 

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
+from seqopt import Prop, load_scene, save_scene
 from seqopt.errors import SceneError
-from seqopt.scene import Prop, load_scene, save_scene
 from seqopt.scene.scene_file import scene_to_dict
 from tests.builders import small_arch
 

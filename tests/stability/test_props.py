@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import seqopt
+from seqopt import Prop
 from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact._prop_grips import prop_grips
 from seqopt.contact.faces import step_assembly
 from seqopt.errors import SceneError
-from seqopt.scene import Prop
 from seqopt.stability._load_factor import load_factors
 from seqopt.stability._margins import Margins
 from seqopt.stability._screens import FALLS, STANDS, Screen

@@ -29,7 +29,6 @@ from seqopt.problem.problem import STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, length_text
-from seqopt.scene._props import centering
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule
 
@@ -200,7 +199,7 @@ def _propped(problem: States, look: Look) -> Iterator[str]:
     scene = problem.network.scene
     if scene.props or recipe_of(problem.engine) is None or problem.scenarios:
         return
-    engine = engine_for(problem.engine, scene.with_props(*centering(scene)))
+    engine = engine_for(problem.engine, scene.with_centering())
     moves = problem.rules
     rules = replace(moves, scene=engine.network.scene) if isinstance(moves, Schedule) else moves
     if look(replace(problem, engine=engine, rules=rules, goals=STEPS)).whole:
