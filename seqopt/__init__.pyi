@@ -16,6 +16,7 @@ from seqopt.problem.criteria import StepCost as StepCost
 from seqopt.problem.problem import Problem as Problem
 from seqopt.problem.requirements import Limit as Limit
 from seqopt.responses.table import analyze as analyze
+from seqopt.scene._props import Prop as Prop
 from seqopt.scene.arch import ArchShape as ArchShape
 from seqopt.scene.arch import arch_scene as arch_scene
 from seqopt.scene.parts import Robot as Robot

@@ -24,13 +24,22 @@ ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0
 def responses(engine, bricks, grips):
     """The four worst responses of a state, solved alone; None where something is loose."""
     held = [node for node in grips if node is not None]
+    props = rigid_props(engine.network.scene, bricks, held)
     try:
-        fields = engine.solve(bricks, np.array([held], dtype=int).reshape(1, -1), Want.ALL)
+        fields = engine.solve(bricks, np.array([held + props], dtype=int).reshape(1, -1), Want.ALL)
     except MechanismError:
         return None
-    forces = lengths(fields.grip_force)[0]
+    forces = lengths(fields.grip_force)[0, : len(held)]
     worst = [CHOSEN_BY[name].of(engine.network, fields)[0] for name in FOUR[1:]]
     return np.array([max(forces, default=0.0), *worst]), dict(zip(held, forces, strict=True))
+
+
+def rigid_props(scene, bricks, held):
+    """The nodes of rigid props that hold: of bricks that stand, until the whole is let go."""
+    if bricks == len(scene.bricks) and not held:
+        return []
+    stand = [node for brick in scene.placed[:bricks] for node in brick.nodes]
+    return [prop.node for prop in scene.props if prop.node in stand]
 
 
 def allowed(engine, rules, bricks, grips):

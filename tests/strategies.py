@@ -11,6 +11,7 @@ from experiments.harness.scenes import running_bond
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.scene._loads import Load
+from seqopt.scene._props import Prop
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import as_vectors, vertices_of
 from seqopt.scene.parts import Anywhere, Robot, Side, Sphere
@@ -237,12 +238,22 @@ def scenes_with_all(draw):
         Load(brick=scene.build_order[0], force=force, position=at, since=last)
         for force, at in draw(st.lists(st.tuples(vectors, near), max_size=2))
     ]
+    blocked = draw(st.lists(st.sampled_from(free), max_size=2, unique=True))
+    props = [
+        Prop(node=node, stiffness=soft, direction=way, capacity=most)
+        for node in free
+        if node not in blocked and draw(st.booleans())
+        for soft in (draw(st.sampled_from([None, 1e6])),)
+        for way in (draw(st.sampled_from([None, (0.0, 0.6, 0.8)])),)
+        for most in (draw(st.sampled_from([None, 250.0])),)
+    ]
     return replace(
         scene,
         bricks=tuple(draw(st.permutations(bricks))),
         joints=tuple(draw(st.permutations(joints))),
         grounds=tuple(grounds),
-        blocked_nodes=tuple(draw(st.lists(st.sampled_from(free), max_size=2, unique=True))),
+        blocked_nodes=tuple(blocked),
+        props=tuple(props),
         loads=tuple(loads),
         wind=draw(vectors),
         gravity=draw(st.sampled_from([(0.0, 0.0, -9.81), (0.0, -1.62, 0.0)])),

@@ -11,6 +11,7 @@ import pandas as pd
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_robots
+from seqopt._cli.words.props import parse_props
 from seqopt.contact.mortar import Mortar
 from seqopt.engines._auto import AutoEngine
 from seqopt.engines.interface import Engine
@@ -18,7 +19,7 @@ from seqopt.engines.registry import LIMITED, make_engine
 from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.network.network import Network
 from seqopt.problem._arms import arm_faults
-from seqopt.problem.requirements import overloads
+from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.report.comparison import idle_note
 from seqopt.responses.table import OUTSIDE, REMEDY
 from seqopt.scene.scene import Scene, in_order
@@ -58,6 +59,8 @@ def asked_scene(options: argparse.Namespace, *, ranged: bool = False) -> Scene:
             "--order search: only the free schedule has it; give optimize --schedule free"
         )
     scene = in_order(load_scene(options.scene), options.order)
+    if options.props is not None:
+        scene = scene.with_props(*parse_props(options.props, scene))
     own = options.grips is None or (ranged and ".." in options.grips)
     return scene if own else parse_grips(options.grips, scene)
 
@@ -114,8 +117,9 @@ def idle_notes(scene: Scene, steps: Sequence[AnyStep]) -> tuple[str, ...]:
 
 
 def exceeded(scene: Scene, *tables: pd.DataFrame) -> tuple[str, ...]:
-    """Return the payloads that are exceeded in responses of steps, in words."""
-    return tuple(str(excess) for table in tables for excess in overloads(scene, table))
+    """Return the payloads, also of props, that are exceeded in responses of steps, in words."""
+    found = ((*overloads(scene, table), *_prop_faults(scene, table)) for table in tables)
+    return tuple(str(excess) for each in found for excess in each)
 
 
 def arm_notes(scene: Scene, builds: Mapping[str, Sequence[Step]]) -> tuple[str, ...]:

@@ -95,7 +95,14 @@ def scene_options(takes: Takes) -> None:
         "or three along its axes, as 1e6x1e6x5e5; turning=N m/rad after a comma keeps held bricks "
         "from turning"
     )
-    declare(takes, {"--order ORDER": order, "--grips STIFFNESS": grips})
+    props = (
+        "nodes that props hold beside the robots, if not as the scene says, until the finished "
+        "structure is let go: as 13,27, or every, one at each brick as centering has; N/m after "
+        "a colon if they are not rigid, as every:1e6; then push for such as only push up, and "
+        "capacity=N"
+    )
+    said = {"--order ORDER": order, "--grips STIFFNESS": grips, "--props NODES": props}
+    declare(takes, said)
 
 
 def engine_options(command: argparse.ArgumentParser) -> Takes:

@@ -79,6 +79,8 @@ def plan_files(
         tables["stability"] = plan.stability()
     if isinstance(plan.graph, Layers):
         tables["responses"] = plan.alternatives()
+    if plan.engine.network.scene.props:
+        tables["props"] = plan.props()
     if rows := trace_rows(plan.trace):
         tables["trace"] = pd.DataFrame(rows)
     if trial is not None:

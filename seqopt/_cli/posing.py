@@ -19,7 +19,8 @@ from seqopt._cli.values import (
     parse_robots,
     parse_rules,
 )
-from seqopt._cli.where import Place, asked_place, between
+from seqopt._cli.words.props import parse_props
+from seqopt._cli.words.where import Place, asked_place, between
 from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
@@ -35,6 +36,7 @@ from seqopt.problem.problem import (
     parse_robust,
 )
 from seqopt.problem.requirements import Criterion
+from seqopt.scene._props import Prop
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, FreeRules, with_robots
@@ -69,6 +71,25 @@ class Asked:
     aim: RobustAim | None = None
     known: Scenarios | None = None
     unseen: Scenarios | None = None
+    fewest: tuple[Prop, ...] | None = None  # candidates, where as few props as can be are asked
+
+
+def fewest_asked(options: argparse.Namespace, scene: Scene) -> tuple[Prop, ...] | None:
+    """Return the candidates where as few props as can be are asked; that aim is then taken out."""
+    aims = [word.strip() for word in (options.aim or "").split(",")]
+    among = getattr(options, "props_among", None)
+    if "props" not in aims:
+        if among is not None:
+            raise ProblemError("--props-among: it goes with --aim props,minmax")
+        return None
+    wrong = aims[0] != "props" or options.command != "optimize"
+    if wrong or scene.props or getattr(options, "bases", None) is not None:
+        raise ProblemError(
+            "aim props: it comes first, and goes with optimize, without --bases or props that are "
+            "given (--props none leaves out those of a scene)"
+        )
+    options.aim = ",".join(aims[1:]) or "minmax"
+    return parse_props(among or "all", scene, "--props-among")
 
 
 def asked_problem(options: argparse.Namespace) -> Asked:
@@ -89,6 +110,8 @@ def asked_problem(options: argparse.Namespace) -> Asked:
     if options.robots.isdecimal():
         scene = with_robots(scene, int(options.robots))
     scene, begin, end = _asked_ends(options, scene)
+    fewest = fewest_asked(options, scene)
+    scene = scene if fewest is None else scene.with_props(*fewest)
     find_postures(scene, getattr(options, "cache", None), options.tell)
     words: dict[str, Any] = {"limits": parse_limits(options.limit, scene)}
     budgets = getattr(options, "budget", [])
@@ -112,7 +135,7 @@ def asked_problem(options: argparse.Namespace) -> Asked:
     if begin.site is not None and not hasattr(options, "change"):
         start = between(every, Place(), end)
         whole = posed(engine, start, criterion, options.aim, **words)
-    return Asked(scene, problem, whole, aim, known, unseen)
+    return Asked(scene, problem, whole, aim, known, unseen, fewest)
 
 
 def _asked_ends(options: argparse.Namespace, scene: Scene) -> tuple[Scene, Place, Place]:

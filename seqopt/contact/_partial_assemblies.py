@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import sparse
 
+from seqopt.contact._prop_grips import added, prop_grips
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import _applied_rows, bare_assembly
 from seqopt.network.network import GROUND, Network
@@ -45,6 +46,8 @@ class PartialAssemblies:
         corners = int(np.searchsorted(whole.contact, contacts))
         pairs = zip(grips, scene.robots, strict=True)
         held = [(node, robot.payload) for node, robot in pairs if node is not None]
+        props = prop_grips(self.network, bricks, held=bool(held))
+        nodes = [*(node for node, _ in held), *props.nodes]
         part: Assembly = Assembly.__new__(Assembly)
         part.__setstate__(  # as one that was checked before
             {
@@ -56,10 +59,11 @@ class PartialAssemblies:
                 "normal": whole.normal[:contacts],
                 "corner": whole.corner[:corners],
                 "contact": whole.contact[:corners],
-                "grip_block": np.array([self._block[node] for node, _ in held], dtype=np.int64),
-                "grip_position": np.array([scene.node_position(n) for n, _ in held]).reshape(-1, 3),
-                "payload": np.array([payload for _, payload in held]),
-                "applied": _applied_rows(self.network, bricks),
+                "grip_block": np.array([self._block[node] for node in nodes], dtype=np.int64),
+                "grip_position": np.array([scene.node_position(n) for n in nodes]).reshape(-1, 3),
+                "payload": np.array([*(payload for _, payload in held), *props.payload]),
+                "applied": added(_applied_rows(self.network, bricks), props.applied),
+                "grip_line": np.concatenate([np.zeros((len(held), 3)), props.line]),
                 "corner_area": whole.corner_area[:corners],
                 "area": whole.area[:contacts],
                 "axes": whole.axes[:contacts],

@@ -41,6 +41,9 @@ class Assembly(FrozenValue):
     applied : (B, 6) float
         Forces and moments about the centroids that act on the blocks beside their weights, N and
         N m; no rows by default: none do.
+    grip_line : (L, 3) float
+        Of the first grips: unit vectors along which alone they exert forces, both ways; zero for
+        one in any direction, as all others are.
 
     Raises
     ------
@@ -60,11 +63,12 @@ class Assembly(FrozenValue):
     grip_position: Floats
     payload: Floats
     applied: Floats = field(default_factory=lambda: np.zeros((0, 6)))
+    grip_line: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
         super().__post_init__()
         numbers = ("centroid", "weight", "normal", "corner", "grip_position", "payload", "applied")
-        for name in numbers:
+        for name in (*numbers, "grip_line"):
             values = getattr(self, name)
             if not isinstance(values, np.ndarray) or not np.isfinite(values).all():
                 raise SceneError(f"assembly: {name} holds a number that is not finite")
@@ -154,7 +158,10 @@ class Assembly(FrozenValue):
     @cached_property
     def grip_map(self) -> sparse.csr_array:
         """Wrenches on the blocks from grip forces, (6B, 3G); as `contact_map`."""
-        axes = np.broadcast_to(np.eye(3), (len(self.payload), 3, 3))
+        axes = np.tile(np.eye(3), (len(self.payload), 1, 1))
+        for i in np.flatnonzero(self.grip_line.any(axis=1)).tolist():
+            axes[i] = 0.0
+            axes[i, 0] = self.grip_line[i]
         return frozen(self._wrenches(self.grip_block, self.grip_position, axes))
 
     def _wrenches(self, block: Ints, point: Floats, axes: Floats) -> sparse.csr_array:

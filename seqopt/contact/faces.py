@@ -8,10 +8,12 @@ middle of the overlap.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from seqopt.arrays import Floats
+from seqopt.contact._prop_grips import PropGrips, added, prop_grips
 from seqopt.contact.assembly import Assembly
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network
@@ -112,25 +114,27 @@ def step_assembly(
     SceneError
         If the bricks of a joint do not touch there: see `seqopt.contact.faces`.
     """
-    placed, acting = network.scene.placed, network.springs.acting(bricks)
-    contacts = [*map((Contacts(network) if known is None else known).__getitem__, acting.tolist())]
     pairs = zip(grips, network.scene.robots, strict=True)
-    held = [(node, r) for node, r in pairs if node is not None]
+    held = [(node, robot.payload) for node, robot in pairs if node is not None]
+    bare = bare_assembly(network, bricks, known)
+    props = prop_grips(network, bricks, held=bool(held))
+    return _with_grips(bare, network, held, props)
+
+
+def _with_grips(
+    bare: Assembly, network: Network, held: Sequence[tuple[int, float]], props: PropGrips
+) -> Assembly:
+    """Return an assembly with grips of robots, nodes and payloads, N, and of props."""
+    placed = network.scene.placed
     block = {node: i for i, brick in enumerate(placed) for node in brick.nodes}
-    return Assembly(
-        block_name=tuple(brick.name for brick in placed[:bricks]),
-        # of the boxes, as their faces: means of inner nodes differ from them by rounding
-        centroid=np.array([brick.position for brick in placed[:bricks]]),
-        weight=network.weight[:bricks],
-        contact_name=tuple(name for name, _, _ in contacts),
-        bodies=network.springs.bodies[acting].reshape(-1, 2),
-        normal=np.array([normal for _, normal, _ in contacts]).reshape(-1, 3),
-        corner=np.concatenate([np.empty((0, 3)), *(face for _, _, face in contacts)]),
-        contact=np.repeat(np.arange(len(contacts)), [len(face) for _, _, face in contacts]),
-        grip_block=np.array([block[node] for node, _ in held], dtype=np.int64),
-        grip_position=np.array([network.scene.node_position(n) for n, _ in held]).reshape(-1, 3),
-        payload=np.array([robot.payload for _, robot in held]),
-        applied=_applied_rows(network, bricks),
+    nodes = [*(node for node, _ in held), *props.nodes]
+    return replace(
+        bare,
+        grip_block=np.array([block[node] for node in nodes], dtype=np.int64),
+        grip_position=np.array([network.scene.node_position(n) for n in nodes]).reshape(-1, 3),
+        payload=np.array([*(payload for _, payload in held), *props.payload]),
+        applied=added(bare.applied, props.applied),
+        grip_line=np.concatenate([np.zeros((len(held), 3)), props.line]),
     )
 
 
@@ -159,7 +163,23 @@ def bare_assembly(network: Network, bricks: int, known: Contacts | None = None) 
     SceneError
         If the bricks of a joint do not touch there: see `seqopt.contact.faces`.
     """
-    return step_assembly(network, bricks, (None,) * len(network.scene.robots), known)
+    placed, acting = network.scene.placed, network.springs.acting(bricks)
+    contacts = [*map((Contacts(network) if known is None else known).__getitem__, acting.tolist())]
+    return Assembly(
+        block_name=tuple(brick.name for brick in placed[:bricks]),
+        # of the boxes, as their faces: means of inner nodes differ from them by rounding
+        centroid=np.array([brick.position for brick in placed[:bricks]]),
+        weight=network.weight[:bricks],
+        contact_name=tuple(name for name, _, _ in contacts),
+        bodies=network.springs.bodies[acting].reshape(-1, 2),
+        normal=np.array([normal for _, normal, _ in contacts]).reshape(-1, 3),
+        corner=np.concatenate([np.empty((0, 3)), *(face for _, _, face in contacts)]),
+        contact=np.repeat(np.arange(len(contacts)), [len(face) for _, _, face in contacts]),
+        grip_block=np.zeros(0, dtype=np.int64),
+        grip_position=np.zeros((0, 3)),
+        payload=np.zeros(0),
+        applied=_applied_rows(network, bricks),
+    )
 
 
 def _contact(

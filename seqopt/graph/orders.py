@@ -158,16 +158,18 @@ def whole_bound(problem: AllOrders) -> float:
     if free.goals[0].measure is not Measure.PEAK:
         return -np.inf
     numbers = node_numbers(free.network)
-    places = [i for i, n in enumerate(numbers, 1) if n not in problem.scene.blocked_nodes]
+    scene = problem.scene
+    taken = {*scene.blocked_nodes, *(prop.node for prop in scene.props)}
+    places = [i for i, n in enumerate(numbers, 1) if n not in taken]
     least = -np.inf
-    kinds = range(len(problem.scene.grip_kinds.turns))
+    of_robots = {*scene.grip_kinds.of_robot[: len(scene.robots)].tolist()}
     every = [  # whoever holds them
         place + k * len(numbers)
-        for k in kinds
+        for k in sorted(of_robots)
         for place in places
-        if can_hold(problem.scene, k, numbers[place - 1])
+        if can_hold(scene, k, numbers[place - 1])
     ]
-    fewest = max(1, free.free_rules.least_grips)
+    fewest = max(1, free.free_rules.least_grips - len(scene.props))
     sets = _sets(every, fewest, free.space.robots, len(numbers))
     if len(sets):
         least = float(_values(free, sets).min())

@@ -65,13 +65,14 @@ def require_alike(nominal: Scene, scene: Scene, number: int) -> None:
         ends = tuple((ground.brick, ground.closes_with) for ground in it.grounds)
         nodes = tuple((brick.name, brick.nodes) for brick in it.placed)
         robots = tuple(robot.name for robot in it.robots)
-        return joints, ends, nodes, robots, it.blocked_nodes, (*it.grip_kinds.of_robot,)
+        props = tuple(prop.node for prop in it.props)
+        return joints, ends, nodes, robots, props, it.blocked_nodes, (*it.grip_kinds.of_robot,)
 
     if meant(nominal) != meant(scene):
         raise ProblemError(
-            f"scenario {number}: it has other bricks, nodes, joints, robots or another build order "
-            f"than {nominal.name}, or other robots give way alike; vary stiffnesses, densities and "
-            "positions alone"
+            f"scenario {number}: it has other bricks, nodes, joints, robots or props, or another "
+            f"build order than {nominal.name}, or other robots give way alike; vary stiffnesses, "
+            "densities and positions alone"
         )
 
 

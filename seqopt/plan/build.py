@@ -12,6 +12,7 @@ from seqopt._showing import Page, Shown, display
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.responses._enough import Enough, what_was_enough
+from seqopt.responses._props import props_table
 from seqopt.responses._tolerance import tolerance_table
 from seqopt.responses.table import Departure, LinearRange, grips_table
 from seqopt.sequence.steps import Step
@@ -99,6 +100,15 @@ class ShownBuild(Shown):
         ``mortar``: of all joints; or its name, ``dry``, ``epoxy`` or ``bond=PASCAL``.
         """
         return step_verdicts(self.engine.network, self.steps, find_mortar(mortar))
+
+    def props(self) -> pd.DataFrame:
+        """Return what every prop of the scene bears, and from when to when it holds.
+
+        Result: a row per prop: ``node``, ``brick``, ``from_step``, ``to_step``,
+        ``largest_force_N``, ``at_step``, and of one that only pushes ``least_push_N``, negative
+        where it would have to pull; no rows where there are no props.
+        """
+        return props_table(self.engine, self.steps)
 
     def tolerances(self) -> pd.DataFrame:
         """Return how far every grip may be from where it should be, in the worst direction.

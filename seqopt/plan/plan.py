@@ -476,7 +476,9 @@ def _letting_go(plan: Plan) -> int:
         return 0
     count = 0
     for step in reversed(plan.steps):
-        if step.kind is not StepKind.RELEASE or len(step.held) >= rules.least_grips:
+        props = plan.engine.network.scene.standing_props(step.bricks, held=bool(step.held))
+        grips = len(step.held) + len(props)
+        if step.kind is not StepKind.RELEASE or grips >= rules.least_grips:
             break
         count += 1
     return count

@@ -20,10 +20,17 @@ from seqopt.arrays import Floats
 from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.problem.requirements import Criterion, Limit, _with_other_limits, as_limits
+from seqopt.network.network import Network
+from seqopt.problem.requirements import (
+    Criterion,
+    Limit,
+    _prop_limits,
+    _with_other_limits,
+    as_limits,
+)
 from seqopt.problem.standing import MARGINS, Standing
 from seqopt.responses._tolerance import is_tolerance
-from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, robot_response
+from seqopt.responses.quantities import NO_TOLERANCE, PROP_EXCESS, TOLERANCE, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
@@ -418,7 +425,8 @@ class Problem(Shown):
     resources: Resources = HERE
 
     def __post_init__(self) -> None:
-        """Let a tolerance keep to the limits on tension and displacements, too."""
+        """Let a tolerance keep to other limits, and props to what they may bear."""
+        object.__setattr__(self, "limits", _with_prop_limits(self.limits, self.engine))
         said = [(each, _with_other_limits([each.response], self.limits)[0]) for each in self.limits]
         goals = [(each, _with_other_limits([each.response], self.limits)[0]) for each in self.goals]
         limits = tuple(replace(each, response=name) for each, name in said)
@@ -467,6 +475,15 @@ class Problem(Shown):
     def graphs(self) -> dict[str, Any]:
         """The graphs of choices that were made for it, which keep what was computed."""
         return {}
+
+
+def _with_prop_limits(limits: tuple[Limit, ...], engine: Engine) -> tuple[Limit, ...]:
+    """Return limits, with that on what the props of an engine's scene bear."""
+    network = getattr(engine, "network", None)
+    if not isinstance(network, Network):  # it is refused later
+        return limits
+    kept = tuple(each for each in limits if each.response != PROP_EXCESS)
+    return (*kept, *_prop_limits(network.scene))
 
 
 def _in_values(words: Mapping[str, Any]) -> dict[str, Any]:

@@ -15,11 +15,14 @@ import pandas as pd
 
 from seqopt.arrays import Bools, Floats, Terse
 from seqopt.engines.interface import Engine
+from seqopt.engines.registry import make_engine, recipe_of
 from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.network import Network
+from seqopt.responses._props import EXCESS_COLUMN
 from seqopt.responses._tolerance import Allowed, is_tolerance, misfits_along
 from seqopt.responses.quantities import (
     NO_TOLERANCE,
+    PROP_EXCESS,
     RESPONSES,
     _steps_in_words,
     length_text,
@@ -141,14 +144,23 @@ class SceneFacts:
 
     @cached_property
     def _reached(self) -> list[dict[str, float]]:
-        """The largest responses of every fixed method that can build the scene."""
-        network, found = self.engine.network, []
+        """The largest responses of every fixed method that can build the scene without props."""
+        engine, found = _bare(self.engine), []
+        network = engine.network
         for method in METHODS.values():
             with suppress(StepError, MechanismError):
-                table = analyze(self.engine, method(network))
+                table = analyze(engine, method(network))
                 along = ((name, _response_along(network.scene, table, name)) for name in SCALED)
                 found.append({name: float(np.nanmax(values)) for name, values in along})
         return found
+
+
+def _bare(engine: Engine) -> Engine:
+    """Return an engine of the same kind for its scene without props, if it is one by name."""
+    recipe, scene = recipe_of(engine), engine.network.scene
+    if recipe is None or not scene.props:
+        return engine
+    return make_engine(recipe.engine, scene.with_props(), **recipe.options)  # type: ignore[arg-type]
 
 
 ChoiceResponses = Mapping[str, Floats]
@@ -288,6 +300,17 @@ def payload_limits(scene: Scene) -> tuple[Limit, ...]:
     return tuple(Limit(robot_response(robot.name), robot.payload) for robot in scene.robots)
 
 
+_LITTLE = 1e-4  # of the mean weight of a brick: by how much props may bear more than they may
+
+
+def _prop_limits(scene: Scene) -> tuple[Limit, ...]:
+    """Return the limit that keeps props within what they may bear; none where all bear anything."""
+    if all(prop.capacity is None and prop.direction is None for prop in scene.props):
+        return ()
+    weight = sum(b.mass for b in scene.bricks) * math.hypot(*scene.gravity) * scene.weight_factor
+    return (Limit(PROP_EXCESS, _LITTLE * (weight / len(scene.bricks) or 1.0)),)
+
+
 @dataclass(frozen=True, repr=False)
 class ResponsesAsked(Terse):
     """The responses that criterion, limits and further wishes ask for."""
@@ -351,6 +374,8 @@ class Excess:
         if is_tolerance(self.limit.response):
             least = 1 / self.largest if self.largest < NO_TOLERANCE else 0.0
             return f"tolerance is only {length_text(least)} of {length_text(bound)} ({where})"
+        if self.limit.response == PROP_EXCESS:
+            return f"a prop bears up to {self.largest:.1f} N more than it may, or pulls ({where})"
         if not self.robot:
             return f"{self.limit.response} is up to {self.largest:.6g} of {bound:.6g} ({where})"
         return (
@@ -381,6 +406,11 @@ def overloads(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
     return tuple(replace(excess, robot=names[excess.limit.response]) for excess in found)
 
 
+def _prop_faults(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
+    """Return in which steps props bear more than they may; see `_excesses`."""
+    return _excesses(scene, table, _prop_limits(scene))
+
+
 def _response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:
     """Return a response of every step (steps,) as limits name it, but ``F_move``.
 
@@ -390,6 +420,8 @@ def _response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:
         return np.asarray(np.maximum(-table[RESPONSES["F_min"].column].to_numpy(float), 0.0))
     if is_tolerance(name):
         return misfits_along(table)
+    if name == PROP_EXCESS:
+        return table[EXCESS_COLUMN].to_numpy(float)
     if name in RESPONSES:
         response = RESPONSES[name]
         return table[response.column].to_numpy(float) / response.scale

@@ -30,7 +30,9 @@ from seqopt.network.network import Network
 from seqopt.report._robots import Arms, Cell, _known_arms, _require_arms
 from seqopt.report._style import SMALL, WIDTH, new_picture, styled
 from seqopt.report.draw import (
+    PROP_MARK,
     View,
+    _draw_props,
     _draw_robots,
     draw_bricks,
     draw_grips,
@@ -101,6 +103,7 @@ def scene_picture(scene: Scene, bricks: int | None = None, width: float = WIDTH)
     figure, (axes,) = _panels(_seen_box(scene), 1, width)
     if count < most:
         draw_bricks(axes, network, most, VIEW, alpha=0.15)
+    _draw_props(axes, network.scene, count, held=True, view=VIEW)
     draw_bricks(axes, network, count, VIEW)
     axes.set_title(f"{scene.name}: {count} of {most} bricks")
     return figure
@@ -164,6 +167,7 @@ def steps_picture(
             key |= _mark_grips(axes, scene, step.grips)
         _frame(axes, scene, step, steps[-1].number, box)
     handles = [key[robot] for robot in sorted(key)]
+    handles += [Line2D([], [], **PROP_MARK, ms=8, label="prop holds")] if scene.props else []
     handles += [] if largest is None else force_key(largest)
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=4)
@@ -200,6 +204,7 @@ def _draw_step(
         how |= {"edge_force": fields.edge_force[0], "largest_force": largest_force}
         draw_network(axes, network, bricks, VIEW, **how)
         return
+    _draw_props(axes, network.scene, bricks, held=bool(step.held), view=VIEW)
     if fields is not None:
         draw_bricks(axes, network, bricks, VIEW, alpha=0.15)
         how["twist"] = fields.brick_twist[0]

@@ -14,6 +14,7 @@ import numpy as np
 from seqopt.arms._drawn import PosedArm, idle_arm
 from seqopt.arrays import Floats
 from seqopt.errors import ExtraError, ProblemError, SceneError
+from seqopt.scene._props import Prop
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.scene.scene import Scene
@@ -27,6 +28,7 @@ _APART = 0.35  # of bases on one side from each other, likewise
 _HIGH = 0.12  # of a shoulder above its foot, over the reach
 _SPARE = 1.02  # by which two links are longer than what they must span
 _LONGEST = 0.4  # of a link, over the size of the structure
+_STEEP = 0.2  # rise of a prop, over its length, from which on it stands on the ground
 _TOOL = 0.5  # of a tool outside of a brick, over the longest side of the brick
 _FOLDED = ((0.75, -0.45), (0.35, 0.1), (0.2, 0.1))  # elbow, wrist, tip: up and ahead, over a link
 
@@ -116,6 +118,17 @@ class Cell:
             far = float(np.linalg.norm(self.corners - foot, axis=1).max())
             out[robot.name] = (foot + _HIGH * far * self.up, far)
         return out
+
+    def prop(self, prop: Prop) -> Floats:
+        """Return the ends of a prop, its node first and its foot, (2, 3), m.
+
+        It stands on the ground along the way in which it pushes, or is a short strut that way.
+        """
+        at = np.array(self.scene.node_position(prop.node))
+        along = self.up if prop.direction is None else np.array(prop.direction)
+        rise, height = float(along @ self.up), float(at @ self.up) - self.level
+        far = height / rise if rise > _STEEP else _BESIDE * self.size
+        return np.array([at, at - far * along])
 
     def arm(self, robot: Robot, node: int | None) -> Floats | None:
         """Return the points of a robot's arm that holds a node, or of one that is idle.

@@ -26,7 +26,7 @@ from seqopt.plan.solving import solve
 from seqopt.problem._arms import arm_faults
 from seqopt.problem.criteria import RankSum, WorstRatio
 from seqopt.problem.problem import Aim
-from seqopt.problem.requirements import Criterion, overloads
+from seqopt.problem.requirements import Criterion, _prop_faults, overloads
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._tolerance import COLUMN, is_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
@@ -196,7 +196,7 @@ def _add_largest(
     for name, steps in tables.items():
         over = overloads(scene, steps)
         rows[name].update(largest(scene, steps), overloaded=bool(over))
-        notes += [f"{name}: {excess}" for excess in over]
+        notes += [f"{name}: {excess}" for excess in (*over, *_prop_faults(scene, steps))]
         if scene.has_arms:
             found = arm_faults(scene, parse_plan(scene, csv_text(steps), name))
             notes += [f"{name}: {fault}" for fault in found]

@@ -31,6 +31,7 @@ from seqopt.report._robots import ROBOT_COLORS, Cell
 from seqopt.report._style import BLUE, SMALL, VERMILION
 from seqopt.scene.boxes import boxes, vertices_of
 from seqopt.scene.parts import Brick
+from seqopt.scene.scene import Scene
 from seqopt.scene.shape import normal_of
 
 HALO = (withStroke(linewidth=2.5, foreground="white"),)
@@ -52,6 +53,8 @@ MARKED = np.array([0.46, 0.63, 0.76])
 ROBOT_MARKERS = "XPDs"
 GROUND, ARM = "#efece6", 3.2  # color; width of an arm, points
 PALE, THROUGH = 0.55, 0.6  # of the color of an arm's bodies; opacity of those before bricks
+PROP = "#8a8478"
+PROP_MARK: dict[str, Any] = {"marker": "^", "color": PROP, "mec": "white", "ls": "none"}
 LINE = 11.0  # points from one line of text to the next
 NEAR = (0.3, 0.08)  # share of a picture within which labels are neighbors, aside and up
 
@@ -329,6 +332,18 @@ def _draw_bodies(axes: Axes, arm: PosedArm, view: View, *, color: str, order: fl
         face = to_rgb(INK) if k == last else tuple(1 - PALE * (1 - np.array(to_rgb(color))))
         fill = (*face, THROUGH if order > 1 else 1.0)
         axes.add_patch(Polygon(around, fc=fill, ec=color, lw=0.7, joinstyle="round", zorder=order))
+
+
+def _draw_props(axes: Axes, scene: Scene, bricks: int, *, held: bool, view: View) -> None:
+    """Draw the props that hold while so many bricks stand, behind the structure.
+
+    ``held``: whether a robot holds any.
+    """
+    cell = Cell(scene)
+    for prop in scene.standing_props(bricks, held=held):
+        x, y = view.axes()[:2] @ cell.prop(prop).T
+        axes.plot(x, y, color=PROP, lw=3.5, solid_capstyle="butt", zorder=0.4)
+        axes.plot(x[:1], y[:1], **PROP_MARK, ms=7, zorder=4.5)
 
 
 def grip_mark(robot: int) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Want
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.network.network import GROUND, Network, PartKind
-from seqopt.problem.requirements import Excess, overloads
+from seqopt.problem.requirements import Excess, _prop_faults, overloads
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
 from seqopt.responses._tolerance import each_tolerance, held_in_steps, is_linear
 from seqopt.responses.quantities import _number_text, length_text
@@ -131,6 +131,9 @@ def _structure_data(network: Network) -> dict[str, object]:
             {"name": robot.name, "payload": robot.payload, "color": color}
             for robot, color in zip(scene.robots, cycle(ROBOT_COLORS), strict=False)
         ],
+        "props": [
+            {"line": _rounded(Cell(scene).prop(prop)), "node": prop.node} for prop in scene.props
+        ],
         "up": list(scene.up),
         "level": Cell(scene).level,
     }
@@ -211,9 +214,10 @@ def _off(engine: Engine, build: Build) -> list[str]:
 
 def _marks(scene: Scene, build: Build) -> list[str]:
     """Return payloads that every step exceeds, and the linear range that it leaves, in words."""
-    over, out = build.overloads(scene), []
+    over, props, out = build.overloads(scene), _prop_faults(scene, build.table), []
     for step in build.steps:
         said = [f"{each.robot} exceeds its payload" for each in over if step.number in each.steps]
+        said += ["a prop bears more than it may" for each in props if step.number in each.steps]
         left = [each.what for each in build.departures if step.number in each.steps]
         said += [f"{OUTSIDE}: {', '.join(left)}"] if left else []
         said += [f"falls {each.how}" for each in build.verdicts[-1:] if each.falls(step.number)]

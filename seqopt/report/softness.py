@@ -112,7 +112,8 @@ def _largest(engine: Engine, tables: Mapping[str, pd.DataFrame]) -> dict[str, di
         grips = np.array([numbers for numbers, _ in states], dtype=np.int64).reshape(
             len(states), count
         )
-        solved = solve_sets(engine, Block(bricks, grips, tuple(_NAMES), screen=False))
+        props = scene.prop_numbers(bricks, held=bool(count))
+        solved = solve_sets(engine, Block(bricks, grips, tuple(_NAMES), screen=False, props=props))
         for row, ((_, robots), builds) in zip(solved, states.items(), strict=True):
             forces = row[len(_NAMES) :]
             found = {name: value * _UNITS[name] for name, value in zip(_NAMES, row, strict=False)}

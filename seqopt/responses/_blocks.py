@@ -39,8 +39,15 @@ from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
 from seqopt.errors import FileError, MemoryShortError, SceneError
 from seqopt.responses._arms import for_arms
+from seqopt.responses._props import excess_of, with_props
 from seqopt.responses._tolerance import allowed_by, is_tolerance, misfits
-from seqopt.responses.quantities import CHOSEN_BY, lengths, require_finite, robot_response
+from seqopt.responses.quantities import (
+    CHOSEN_BY,
+    PROP_EXCESS,
+    lengths,
+    require_finite,
+    robot_response,
+)
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.work._threads import one_thread
 from seqopt.work._workers import free_memory
@@ -56,11 +63,12 @@ class Block(FrozenValue):
     grips: Ints  # (S, r); numbers of grips, as `seqopt.Scene.grip_numbers` has them
     names: tuple[str, ...]  # responses of `seqopt.responses.quantities.CHOSEN_BY`
     screen: bool = True  # whether six digits are enough
+    props: tuple[int, ...] = ()  # numbers of grips that all of them have beside these
 
     @cached_property
     def key(self) -> str:
         """Its content, condensed."""
-        exact = () if self.screen else ("exact",)
+        exact = (*(() if self.screen else ("exact",)), *self.props)
         mark = hashlib.sha256(repr((self.bricks, self.names, self.grips.shape, *exact)).encode())
         mark.update(self.grips.astype("<i8").tobytes())
         return mark.hexdigest()
@@ -92,17 +100,21 @@ class Answers(FrozenValue):
 
 def answer(engine: Engine, block: Block) -> Answers:
     """Return the responses of a block of states. Raises what the engine does."""
-    asked = [CHOSEN_BY[name] for name in block.names if not is_tolerance(name)]
+    asked = [CHOSEN_BY[name] for name in block.names if name in CHOSEN_BY]
     want = reduce(or_, (r.needs for r in asked), Want.SCREEN if block.screen else Want(0))
     before = Counter(tally_of(engine))
+    grips, robots = with_props(block.grips, block.props), block.grips.shape[1]
     with one_thread():  # as many threads everywhere: sums in other orders differ in the last bit
-        fields = engine.solve(block.bricks, block.grips, want)
-    forces = require_finite("grip force", lengths(fields.grip_force), block.bricks)
+        fields = engine.solve(block.bricks, grips, want)
+    forces = require_finite("grip force", lengths(fields.grip_force), block.bricks)[:, :robots]
     network, bricks = engine.network, block.bricks
     values = {r.name: require_finite(r.name, r.of(network, fields), bricks) for r in asked}
     for name in filter(is_tolerance, block.names):
         with one_thread():
-            values[name] = misfits(engine, bricks, block.grips, allowed_by(name))
+            values[name] = misfits(engine, bricks, grips, allowed_by(name))
+    if PROP_EXCESS in block.names:
+        props = [network.scene.prop_of_number[number] for number in block.props]
+        values[PROP_EXCESS] = excess_of(props, fields.grip_force[:, robots:])
     return Answers(values, forces, tuple((Counter(tally_of(engine)) - before).items()))
 
 
@@ -332,9 +344,12 @@ class Batch(FrozenValue):
     def blocks(self) -> Iterator[Block]:
         """Yield the states in blocks, one at least."""
         asked = sorted(frozenset().union(*self.names))
-        names = tuple(name for name in asked if name in CHOSEN_BY or is_tolerance(name))
+        known = (*CHOSEN_BY, PROP_EXCESS)
+        names = tuple(name for name in asked if name in known or is_tolerance(name))
+        bricks = self.steps[0].bricks
+        props = self.schedule.scene.prop_numbers(bricks, held=True)
         for start in range(0, max(len(self.states), 1), BLOCK):
-            yield Block(self.steps[0].bricks, self.states[start : start + BLOCK].copy(), names)
+            yield Block(bricks, self.states[start : start + BLOCK].copy(), names, props=props)
 
     @property
     def count(self) -> int:

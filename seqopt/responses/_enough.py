@@ -108,6 +108,11 @@ def _left_out(
     tables = builds.values()
     if any(table[f"{robot.name}_node"].notna().any() for table in tables for robot in robots):
         yield f"that robots give way{_off(within, builds)}"
+    props = within.engine.network.scene.props
+    if any(prop.stiffness is None for prop in props):
+        yield "that props give way"
+    if any(prop.direction for prop in props):
+        yield "that props lift off which only push (plans in which one would pull are not allowed)"
     if not staged and any(len(table) > 1 for table in tables):
         yield "what earlier steps lock in"
     if not isinstance(within.engine, DiscreteEngine):

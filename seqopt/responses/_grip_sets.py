@@ -154,7 +154,9 @@ class GripSets:
         """Return responses and forces of sets (S, r), those that are new solved now: (S, R + r)."""
 
         def solve(new: Ints) -> Floats:
-            sets = Block(bricks, self._number[nodes[new]], self.names, self._screen)
+            grips = self._number[nodes[new]]
+            props = self._engine.network.scene.prop_numbers(bricks, held=bool(nodes.shape[1]))
+            sets = Block(bricks, grips, self.names, self._screen, props)
             return solve_sets(self._engine, sets, self._resources, self._store)
 
         codes = np.zeros(len(nodes), dtype=np.int64)  # a number for every set of its own

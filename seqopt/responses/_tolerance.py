@@ -25,7 +25,7 @@ from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.responses._worst_direction import proven_rates, worst_misplacement, worst_rates
 from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, length_text
-from seqopt.responses.table import _grips_of
+from seqopt.responses.table import _grips_of, _node
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 
@@ -214,7 +214,10 @@ def _tied(engine: Engine, bricks: int, grips: Ints) -> Bools:
 def step_tolerance(engine: Engine, step: Step, allowed: Allowed = ROBOTS_ALONE) -> Tolerance:
     """Return how far the grips of a step may be off, with its proof."""
     scene = engine.network.scene
-    holding = [r for r, node in zip(scene.robots, step.grips, strict=True) if node is not None]
+    pairs = zip(scene.robots, step.grips, strict=True)
+    holding = [robot.name for robot, node in pairs if node is not None]
+    props = scene.standing_props(step.bricks, held=bool(holding))
+    holding += [prop.label for prop in props]
     grips = _grips_of(scene, step)
     if not holding:
         return Tolerance(np.inf, np.inf)
@@ -229,7 +232,7 @@ def step_tolerance(engine: Engine, step: Step, allowed: Allowed = ROBOTS_ALONE) 
         if rates[0, at] > rate:
             rate = float(rates[0, at])
             far = worst_misplacement(group.change[:, at], direction[:, at])[0] / rate
-            what = f"payload of {holding[at].name}" if group.what == "payload" else group.what
+            what = f"payload of {holding[at]}" if group.what == "payload" else group.what
             worst = Tolerance(1 / rate, 0.0, what, tuple(map(tuple, far.tolist())))
     return replace(worst, proven=1 / proven if proven else np.inf)
 
@@ -240,13 +243,16 @@ _Held = tuple[int, int, tuple[int, ...]]  # a step's number, its bricks, its gri
 def held_in_table(scene: Scene, table: pd.DataFrame) -> list[_Held]:
     """Return what is held in every step of a table of `seqopt.analyze`."""
     nodes = table[[f"{robot.name}_node" for robot in scene.robots]].to_numpy(object)
-    held = (scene.grip_numbers([int(n) if pd.notna(n) else None for n in row]) for row in nodes)
-    return [*zip(map(int, table["step"]), map(int, table["bricks"]), held, strict=True)]
+    bricks = table["bricks"].astype(int).tolist()
+    held = (
+        scene.grip_numbers([_node(n) for n in row], b) for row, b in zip(nodes, bricks, strict=True)
+    )
+    return [*zip(map(int, table["step"]), bricks, held, strict=True)]
 
 
 def held_in_steps(scene: Scene, steps: Sequence[Step]) -> list[_Held]:
     """Return what is held in every step."""
-    return [(step.number, step.bricks, scene.grip_numbers(step.grips)) for step in steps]
+    return [(s.number, s.bricks, scene.grip_numbers(s.grips, s.bricks)) for s in steps]
 
 
 def is_linear(engine: Engine) -> bool:

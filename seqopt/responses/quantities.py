@@ -61,6 +61,10 @@ TOLERANCE = "tolerance"
 carries more than its payload, or a limit is exceeded. Counted by its reciprocal, 1/m."""
 NO_TOLERANCE = 1e30  # its reciprocal where there is none
 
+PROP_EXCESS = "prop_excess"
+"""A response that is there where a scene has props: by how much the force of any is more than it
+may be, N: beyond its capacity, or a pull of one that only pushes."""
+
 
 _SLACK = 1e-6  # an edge is in tension above this share of the mean weight of a brick
 _LEVEL = 1e-9  # share of a force that may point down where it counts as level
@@ -97,7 +101,7 @@ def lengths(vectors: Floats) -> Floats:
     return np.asarray(np.sqrt(_squared(vectors)))
 
 
-_TAKEN = {"rob", "max", "move", "largest", "each"}  # beside RESPONSES: other meanings of F_
+_TAKEN = {"rob", "prop", "max", "move", "largest", "each"}  # beside RESPONSES: other meanings of F_
 _MARKS = set("[]=,;")  # of the language of criteria, limits and tables
 
 

@@ -22,6 +22,7 @@ from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.network import Network
+from seqopt.responses._props import prop_cells
 from seqopt.responses.quantities import (
     RESPONSES,
     _steps_in_words,
@@ -130,7 +131,8 @@ class LinearRange:
         """Return the fields of a step, all of them, and remember what it is asked of them."""
         found = self._of(fields)
         if not (self._breaks and found[2] > 0):  # else others than those of rigid bricks
-            self._known[step.bricks, self._network.scene.grip_numbers(step.grips)] = found
+            numbers = self._network.scene.grip_numbers(step.grips, step.bricks)
+            self._known[step.bricks, numbers] = found
         return fields
 
     def of_builds(self, tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[Departure, ...]]:
@@ -157,8 +159,8 @@ class LinearRange:
             return np.full((len(table), 4), -np.inf)  # whoever goes far is unstable there
         scene = self._network.scene
         nodes = table[[f"{robot.name}_node" for robot in scene.robots]].to_numpy(object)
-        held = (scene.grip_numbers([int(n) if pd.notna(n) else None for n in r]) for r in nodes)
-        keys = [*zip(map(int, table["bricks"]), held, strict=True)]
+        pairs = zip(table["bricks"].astype(int).tolist(), nodes, strict=True)
+        keys = [(b, scene.grip_numbers([_node(n) for n in row], b)) for b, row in pairs]
         for key in keys:  # in order: engines grow with the build
             if key not in self._known:
                 asked = np.array([key[1]], dtype=np.int64).reshape(1, -1)
@@ -278,7 +280,12 @@ def step_fields(engine: Engine, step: Step, want: Want = Want.RESPONSES) -> Fiel
 
 def _grips_of(scene: Scene, step: Step) -> Ints:
     """Return the grips of a step as engines take them: one set, (1, r)."""
-    return np.array([scene.grip_numbers(step.grips)], dtype=np.int64).reshape(1, -1)
+    return np.array([scene.grip_numbers(step.grips, step.bricks)], dtype=np.int64).reshape(1, -1)
+
+
+def _node(cell: object) -> int | None:
+    """Return the node that a cell of a table names, None if it is empty."""
+    return int(cell) if pd.notna(cell) else None  # type: ignore[call-overload]
 
 
 @contextmanager
@@ -327,6 +334,7 @@ def _row(network: Network, step: Step, fields: Fields) -> dict[str, object]:
     for response in RESPONSES.values():
         values = require_finite(response.name, response.of(network, fields), step.bricks)
         row[response.column] = values[0] * response.scale
+    row |= prop_cells(scene, step, fields.grip_force[0, len(step.held) :])
     acts = network.springs.since[network.springs.support] <= step.bricks
     carried = np.array([support_forces(network, fields)[0], support_moments(fields)[0]])
     cells = np.where(acts, carried, np.nan).T  # of ground ends; NaN where one does not act yet

@@ -15,6 +15,7 @@ from seqopt.errors import SceneError
 from seqopt.scene._checks import check, not_negative, printable, short, vector, wholes
 from seqopt.scene._grip_kinds import GripKinds, grip_kinds
 from seqopt.scene._loads import Load
+from seqopt.scene._props import Prop, centered, settled_props
 from seqopt.scene.parts import Brick, Ground, Joint, Reach, Robot
 
 if TYPE_CHECKING:
@@ -105,7 +106,8 @@ def _check_loads(loads: Sequence[Load], bricks: Mapping[int, Brick]) -> None:
             raise SceneError(f"{load.label}: position is {where}; move it to its brick")
 
 
-_KINDS = {"bricks": Brick, "joints": Joint, "grounds": Ground, "robots": Robot, "loads": Load}
+_PARTS = (Brick, Joint, Ground, Robot, Load, Prop)
+_KINDS = {f"{part.__name__.lower()}s": part for part in _PARTS}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,6 +136,9 @@ class Scene(Shown):
         earthquake, a lean.
     weight_factor : float
         By which all weights are multiplied; not the wind.
+    props : tuple of Prop
+        What holds nodes beside the robots, from when their bricks stand until the finished
+        structure is let go.
 
     Raises
     ------
@@ -162,6 +167,7 @@ class Scene(Shown):
     loads: tuple[Load, ...] = ()
     wind: Vector = (0.0, 0.0, 0.0)
     weight_factor: float = 1.0
+    props: tuple[Prop, ...] = ()
 
     def __post_init__(self) -> None:
         check(self, "scene", **{name: partial(_parts, kind=kind) for name, kind in _KINDS.items()})
@@ -180,6 +186,7 @@ class Scene(Shown):
         by_name = {brick.name: brick for brick in self.bricks}
         _check_springs((*self.joints, *self.grounds), by_name)
         _check_loads(self.loads, by_name)
+        object.__setattr__(self, "props", settled_props(self.props, self._free_bricks))
         if math.hypot(*self.wind) > _STORM:
             raise SceneError(f"{where}: wind is {list(self.wind)}; give shares of the weight")
 
@@ -217,14 +224,24 @@ class Scene(Shown):
         """The brick that each inner node belongs to."""
         return {node: brick for brick in self.bricks for node in brick.nodes}
 
+    @property
+    def _free_bricks(self) -> dict[int, Brick]:
+        """The brick of each node that is not blocked."""
+        blocked = {*self.blocked_nodes}
+        return {n: brick for n, brick in self.brick_of_node.items() if n not in blocked}
+
     def node_position(self, node: int) -> Vector:
         """Return where an inner node lies."""
         return self.brick_of_node[node].node_position(node)
 
     def within_reach(self, robot: Robot) -> tuple[tuple[int, ...], ...]:
-        """Return the nodes, not blocked, that a robot reaches, brick by brick in build order."""
+        """Return the nodes that a robot reaches, brick by brick in build order.
+
+        Nodes that are blocked, or held by props, are not among them.
+        """
         if robot.reach not in self._within_reach:
-            blocked, covers = {*self.blocked_nodes}, robot.reach.covers
+            covers = robot.reach.covers
+            blocked = {*self.blocked_nodes, *(prop.node for prop in self.props)}
             self._within_reach[robot.reach] = tuple(
                 tuple(n for n in b.nodes if n not in blocked and covers(b.node_position(n)))
                 for b in self.placed
@@ -304,18 +321,70 @@ class Scene(Shown):
         robots = (replace(robot, arm=arm, **ways) for robot, arm in pairs)  # type: ignore[arg-type]
         return replace(self, robots=tuple(robots))
 
+    def with_props(self, *props: Prop) -> Scene:
+        """Return the same scene with other props, ``*props``: all of the new scene.
+
+        Examples
+        --------
+        >>> import seqopt
+        >>> seqopt.load_scene("arch25").with_props(seqopt.Prop(node=13)).props
+        (Prop(node=13),)
+        """
+        return replace(self, props=props)
+
+    def with_centering(self, stiffness: float | Vector | None = None) -> Scene:
+        """Return the same scene with a prop at every brick, as centering has, and no others.
+
+        It holds the node at which the brick is not placed; a brick of which this is blocked has
+        none. ``stiffness``: as of `Prop`.
+
+        Examples
+        --------
+        >>> import seqopt
+        >>> props = seqopt.load_scene("arch25").with_centering(1e6).props
+        >>> len(props), props[0].node
+        (24, 3)
+        """
+        return self.with_props(*centered(self.placed, self.blocked_nodes, stiffness))
+
+    def standing_props(self, bricks: int, *, held: bool) -> tuple[Prop, ...]:
+        """Return the props that hold while so many bricks stand, in the scene's order.
+
+        ``held``: whether a robot holds any; the finished structure has none if nobody does.
+        """
+        if bricks == len(self.bricks) and not held:
+            return ()
+        since, of = self.since, self.brick_of_node
+        return tuple(prop for prop in self.props if since[of[prop.node].name] <= bricks)
+
     @cached_property
     def grip_kinds(self) -> GripKinds:
-        """How its robots give way where they hold."""
-        return grip_kinds(self.robots, [*self.brick_of_node])
+        """How its robots give way where they hold, and after them its props."""
+        holders = [*self.robots, *(prop.as_robot for prop in self.props)]
+        return grip_kinds(holders, [*self.brick_of_node])
 
-    def grip_numbers(self, grips: Sequence[int | None]) -> tuple[int, ...]:
+    @cached_property
+    def prop_of_number(self) -> dict[int, Prop]:
+        """Its props in order, by the numbers of their grips; see `grip_numbers`."""
+        nodes = np.array([prop.node for prop in self.props], dtype=np.int64)
+        holders = range(len(self.robots), len(self.robots) + len(self.props))
+        return dict(zip(self.grip_kinds.numbers(nodes, holders).tolist(), self.props, strict=True))
+
+    def prop_numbers(self, bricks: int, *, held: bool) -> tuple[int, ...]:
+        """Return the numbers of the grips of `standing_props`."""
+        standing = self.standing_props(bricks, held=held)
+        return tuple(n for n, prop in self.prop_of_number.items() if prop in standing)
+
+    def grip_numbers(
+        self, grips: Sequence[int | None], bricks: int | None = None
+    ) -> tuple[int, ...]:
         """Return the numbers by which engines are asked about grips of the robots.
 
         They are those of the nodes; where robots are not equally stiff, numbers also say which
         stiffness a grip has.
 
-        ``grips``: the node of every robot of the scene in order, None of one that holds none.
+        ``grips``: the node of every robot of the scene in order, None of one that holds none;
+        ``bricks``: how many stand, where grips of the props that hold then are to follow.
 
         Examples
         --------
@@ -331,7 +400,8 @@ class Scene(Shown):
         """
         robots = [i for i, node in enumerate(grips) if node is not None]
         nodes = np.array([node for node in grips if node is not None], dtype=np.int64)
-        return tuple(self.grip_kinds.numbers(nodes, robots).tolist())
+        own = tuple(self.grip_kinds.numbers(nodes, robots).tolist())
+        return own if bricks is None else own + self.prop_numbers(bricks, held=bool(robots))
 
     def plot(self, bricks: int | None = None) -> Figure:
         """Draw the scene, or its first ``bricks`` in build order and the others pale."""

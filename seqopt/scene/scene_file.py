@@ -25,6 +25,7 @@ from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import cut, reading_json, short
 from seqopt.scene._loads import Load
+from seqopt.scene._props import Prop
 from seqopt.scene.arm import Arm
 from seqopt.scene.library.arch_form import ArchForm, arch, barrel_vault, chain
 from seqopt.scene.library.dome import DomeShape, dome
@@ -106,9 +107,11 @@ _VERSION = 1
 _UNSAID = (
     *("thickness", "face", "shape", "node_offsets", "movement", "position", "since"),
     *("stiffness", "rotational_stiffness"),  # of robots
+    *("direction", "capacity"),  # of props
 )
 """Left out of a file where there is none."""
-_UNLOADED = {"loads": (), "wind": (0.0, 0.0, 0.0), "weight_factor": 1.0}  # not said either
+_UNLOADED = {"loads": (), "wind": (0.0, 0.0, 0.0), "weight_factor": 1.0, "props": ()}
+# not said either
 _REACHES: dict[str, type[Reach]] = {"anywhere": Anywhere, "side": Side, "sphere": Sphere}
 _DATA = resources.files("seqopt").joinpath("data")
 
@@ -346,6 +349,7 @@ def _scene_from_dict(document: dict[str, Any]) -> Scene:
     content["joints"] = [Joint(**joint) for joint in content["joints"]]
     content["grounds"] = [Ground(**ground) for ground in content["grounds"]]
     content["loads"] = [Load(**load) for load in content.get("loads", ())]
+    content["props"] = [Prop(**prop) for prop in content.get("props", ())]
     content["robots"] = [
         Robot(
             **robot
@@ -373,7 +377,7 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     for key, usual in _UNLOADED.items():
         if document[key] == usual:
             del document[key]
-    kinds = ("bricks", "joints", "grounds", "robots", "loads")
+    kinds = ("bricks", "joints", "grounds", "robots", "loads", "props")
     for part in (part for kind in kinds for part in document.get(kind, ())):
         for key in _UNSAID:
             if part.get(key, "") is None:

@@ -77,14 +77,19 @@ class RuleBook:
 
     def fault(self, bricks: int, grips: Grips) -> str:
         """Return which rule a state breaks, in a few words, the ending aside; empty if none."""
-        held = [node for node in grips if node is not None]
+        scene = self.network.scene
+        stand = {brick.name for brick in scene.placed[:bricks]}
+        if len(stand) == len(scene.placed) and all(node is None for node in grips):
+            stand.clear()  # props are struck
+        propped = [n for p in scene.props if (n := scene.brick_of_node[p.node].name) in stand]
+        held = [scene.brick_of_node[node].name for node in grips if node is not None] + propped
         if bricks > 1 and len(held) < self.rules.least_grips:
             return f"{len(held)} grips, fewer than least_grips={self.rules.least_grips}"
         on = any(grips[r] in self.newest_nodes[r, bricks] for r in self.team)
+        on |= bricks > 0 and scene.placed[bricks - 1].name in propped
         if not on and self.rules.newest is not Newest.FREE:
             return f"nobody holds the newest brick (newest={self.rules.newest.value})"
-        names = {self.network.scene.brick_of_node[node].name for node in held}
-        if any(not names & island for island in self._islands[bricks]):
+        if any(not {*held} & island for island in self._islands[bricks]):
             return "a part that no joint ties to the ground is held by nobody"
         return ""
 

@@ -288,9 +288,19 @@ class FreeSpace(StateRows):
 
     def lawful(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) keep the rules as long as the build goes on, (n,)."""
+        propped = self._propped(bricks)
+        ok = self._lawful(bricks, states, propped)
+        if propped and bricks == self.levels:  # where nobody holds, props are struck
+            bare = self.grips(states) == 0
+            ok[bare] = self._lawful(bricks, states[bare], ())
+        return ok
+
+    def _lawful(self, bricks: int, states: Ints, propped: Sequence[int]) -> Bools:
+        """Return the same with props at bricks, by place in build order from 0."""
         held = states[:, : self.robots]
-        ok = np.asarray(self.grips(states) >= (self.rules.least_grips if bricks > 1 else 0))
-        if self.rules.newest is not Newest.FREE:
+        least = self.rules.least_grips - len(propped) if bricks > 1 else 0
+        ok = np.asarray(self.grips(states) >= least)
+        if self.rules.newest is not Newest.FREE and bricks - 1 not in propped:
             nodes = 2 * bricks + np.array([-1, 0])
             newest = np.zeros(len(states), dtype=bool)
             for kind, (first, end) in zip(self.kinds, self.slots, strict=True):
@@ -298,8 +308,16 @@ class FreeSpace(StateRows):
                     newest |= (held[:, first:end] == node).any(axis=1)
             ok &= newest
         for bricks_of in self._loose[bricks]:
+            if not {*bricks_of}.isdisjoint(propped):
+                continue
             ok &= np.isin((held - 1) // 2, bricks_of).any(axis=1)
         return ok
+
+    def _propped(self, bricks: int) -> list[int]:
+        """Return the bricks that props hold while so many stand, by place in build order from 0."""
+        scene = self.network.scene
+        props = scene.standing_props(bricks, held=True) if bricks else ()
+        return [scene.since[scene.brick_of_node[prop.node].name] - 1 for prop in props]
 
     def ended(self, states: Ints) -> Bools:
         """Return which states with all bricks end the build, (n,)."""

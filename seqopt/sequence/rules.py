@@ -49,13 +49,13 @@ class FreeRules:
     Parameters
     ----------
     robots : tuple of str
-        Names of the robots that take part, two to five; by default all of the scene.
+        Names of the robots that take part, one to five; by default all of the scene.
     placers : tuple of str
         Names of the robots that may place a brick; by default all that take part.
     least_grips : int
-        Least number of nodes held, from the second brick on.
+        Least number of nodes held, from the second brick on, by robots and props together.
     newest : Newest or str
-        Where the newest brick is held.
+        Where the newest brick is held, unless a prop holds it.
     payload : Payload or str
         Whether payloads are kept.
     regrips : int or None
@@ -151,19 +151,21 @@ class FreeRules:
                     f"robot {name!r} does not exist{hint}; give some of {', '.join(known)}"
                 )
         team = {name: i for i, name in enumerate(known) if name in self.robots or not self.robots}
-        if not 2 <= len(team) <= _MOST_ROBOTS:
+        if not 1 <= len(team) <= _MOST_ROBOTS:
             raise StepError(
-                f"the free schedule: {len(team)} robots take part; name two to {_MOST_ROBOTS}"
+                f"the free schedule: {len(team)} robots take part; name one to {_MOST_ROBOTS}"
             )
         outside = [name for name in self.placers if name not in team]
         if outside:
             raise StepError(
                 f"rule placers: {outside[0]} takes no part; name some of {', '.join(team)}"
             )
-        if self.least_grips > len(team):
+        most = len(team) + len(scene.props)
+        if self.least_grips > most:
+            beside = f" and {len(scene.props)} props" if scene.props else ""
             raise StepError(
-                f"rule least_grips: {self.least_grips} grips of {len(team)} robots; "
-                f"give at most {len(team)}"
+                f"rule least_grips: {self.least_grips} grips of {len(team)} robots{beside}; "
+                f"give at most {most}"
             )
         return tuple(team.values())
 
@@ -211,7 +213,7 @@ _LOOSEST = (
 
 
 def with_robots(scene: Scene, count: int) -> Scene:
-    """Return a scene with two to five robots: its own first, then mobile ones.
+    """Return a scene with one to five robots: its own first, then mobile ones.
 
     Further robots reach every node, have the largest payload of the scene's own, and give way as
     the first of them does.
@@ -222,8 +224,8 @@ def with_robots(scene: Scene, count: int) -> Scene:
     >>> [robot.name for robot in with_robots(seqopt.load_scene("arch25"), 4).robots]
     ['rob1', 'rob2', 'rob3', 'rob4']
     """
-    if not isinstance(count, Integral) or not 2 <= count <= _MOST_ROBOTS:
-        raise StepError(f"{short(count)} robots: the free schedule takes two to {_MOST_ROBOTS}")
+    if not isinstance(count, Integral) or not 1 <= count <= _MOST_ROBOTS:
+        raise StepError(f"{short(count)} robots: the free schedule takes one to {_MOST_ROBOTS}")
     robots = list(scene.robots[:count])
     names = {robot.name for robot in robots}
     payload = max((robot.payload for robot in scene.robots), default=float("nan"))

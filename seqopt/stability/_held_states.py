@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.contact._prop_grips import added, prop_grips
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import Contacts, bare_assembly
 from seqopt.errors import plugins
@@ -238,12 +239,23 @@ _Settled = Callable[[Floats], Bools]
 """Says which brackets (S, 2) are narrow enough."""
 
 
-def node_assembly(network: Network, bricks: int, known: Contacts | None = None) -> Assembly:
-    """Return a partial structure with a grip without payload at every inner node."""
+def node_assembly(
+    network: Network, bricks: int, known: Contacts | None = None, *, held: bool = True
+) -> Assembly:
+    """Return a partial structure with a grip without payload at every inner node.
+
+    ``held``: whether a robot holds any of these, so that props hold.
+    """
     bare = bare_assembly(network, bricks, known)
-    nodes = network.inner[:bricks].ravel()
+    nodes, props = network.inner[:bricks].ravel(), prop_grips(network, bricks, held=held)
+    line = np.zeros((len(nodes) if props.line.any() else 0, 3))
+    if len(line):
+        numbers = [node for brick in network.scene.placed[:bricks] for node in brick.nodes]
+        line[[numbers.index(node) for node in props.nodes]] = props.line
     return replace(
         bare,
+        applied=added(bare.applied, props.applied),
+        grip_line=line,
         grip_block=np.repeat(np.arange(bricks), 2),
         grip_position=network.node_position[nodes],
         payload=np.zeros(len(nodes)),

@@ -125,6 +125,11 @@ def load_factors(
             f"scene {network.scene.name}: no load acts on it; give it loads or wind to learn how "
             "much of them it bears"
         )
+    if any(prop.direction for prop in network.scene.props):
+        raise SceneError(
+            f"scene {network.scene.name}: load factors know no props that only push; leave out "
+            "their directions"
+        )
     known = Contacts(network)
     return tuple(
         load_factor(step_assembly(network, step.bricks, step.grips, known), mortar)

@@ -17,16 +17,18 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar, find_mortar
+from seqopt.errors import SceneError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.stability._held_states import CompileHeld, HeldStates, compile_held, node_assembly
 from seqopt.stability._prover import DIRECTIONS, FINE, NEAR, in_every_direction, sideways
-from seqopt.stability._screens import FALLS, STANDS, Screen, held_places
+from seqopt.stability._screens import FALLS, STANDS, Part, Screen, held_parts
 from seqopt.stability.assessment import ROUGHEST, bonded
 from seqopt.stability.limit_analysis import CAP, GAP, Case
 
 _Cases = Callable[[Assembly], list[Case]]
+_PUSHED = "the least payload is not found where props only push"
 _Grips = tuple[ArrayLike, ArrayLike | None]  # held, payload
 
 
@@ -60,7 +62,7 @@ class Margins:
     ) -> None:
         self.network, self.mortar = network_of(network), find_mortar(mortar)
         self._compile, self._contacts = compiled, Contacts(self.network)
-        self._levels: dict[tuple[str, int], tuple[HeldStates, ...]] = {}
+        self._levels: dict[tuple[str, Part], tuple[HeldStates, ...]] = {}
         self.screens = {self.mortar.friction: Screen(self.network, self.mortar, 0.0, compiled)}
 
     @property
@@ -77,20 +79,27 @@ class Margins:
         """
         bare = Mortar(friction=self.mortar.friction)
         bracket = self._least("bond", lambda each: [bonded(each, bare)], bricks, (held, payload))
-        return bracket * self._levels["bond", bricks][0].assembly.stress_scale
+        return bracket * self._bare(bricks).stress_scale
 
     def grip(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
         """Return the least payload, the same for all who hold, with the mortar.
 
         ``payload`` counts only in what a motion's rounding is charged with. Result (S, 2): between
-        which values it lies, N; infinite if none is enough.
+        which values it lies, N; infinite if none is enough. Not where props only push.
         """
+        if any(prop.direction for prop in self.network.scene.props):
+            raise SceneError(f"{_PUSHED}; leave payloads out of the margins")
 
         def cases(assembly: Assembly) -> list[Case]:
             return [replace(bonded(assembly, self.mortar).fixed(), payload=(0.0, 1.0))]
 
         bracket = self._least("grip", cases, bricks, (held, payload))
-        return bracket * self._levels["grip", bricks][0].assembly.scales[0]
+        return bracket * self._bare(bricks).scales[0]
+
+    def _bare(self, bricks: int) -> Assembly:
+        """Return a structure with the scales of all in which as many bricks stand."""
+        known = (level for (_, part), level in self._levels.items() if part[0] == bricks)
+        return next(known)[0].assembly
 
     def tilt(self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None) -> Floats:
         """Return the tilt that grip sets survive in every direction.
@@ -166,13 +175,18 @@ class Margins:
 
     def _brackets(self, name: str, cases: _Cases, bricks: int, grips: _Grips) -> list[Floats]:
         """Return the brackets (S, 2) of z of every case."""
-        places, loads = held_places(self.network, bricks, *grips)
-        if (name, bricks) not in self._levels:
-            assembly = node_assembly(self.network, bricks, self._contacts)
-            self._levels[name, bricks] = tuple(
-                HeldStates(assembly, case, self._compile) for case in cases(assembly)
-            )
-        return [s.bracket(places, loads, _narrow) for s in self._levels[name, bricks]]
+        out: list[Floats] = []
+        for rows, part, places, loads in held_parts(self.network, bricks, *grips):
+            if (name, part) not in self._levels:
+                assembly = node_assembly(self.network, bricks, self._contacts, held=part[1])
+                self._levels[name, part] = tuple(
+                    HeldStates(assembly, case, self._compile) for case in cases(assembly)
+                )
+            states = self._levels[name, part]
+            out = out or [np.zeros((len(np.asarray(grips[0])), 2)) for _ in states]
+            for each, own in zip(out, states, strict=True):
+                each[rows] = own.bracket(places, loads, _narrow)
+        return out
 
 
 def _narrow(bracket: Floats) -> Bools:

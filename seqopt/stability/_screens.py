@@ -9,11 +9,13 @@ program, whose cones are inscribed polyhedra, is solved for few of them.
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.contact._prop_grips import prop_grips
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar, find_mortar
@@ -29,6 +31,9 @@ from seqopt.stability.limit_analysis import EXACT, Answer
 STANDS, FALLS, OPEN = 1, -1, 0
 
 
+Part = tuple[int, bool]  # how many bricks stand, and whether the props hold that could
+
+
 class Proofs:
     """What screens of one scene share: what one proves, another need not ask.
 
@@ -39,10 +44,10 @@ class Proofs:
 
     def __init__(self, network: Network) -> None:
         self.contacts = Contacts(network)
-        self.upright: dict[tuple[int, Mortar], HeldStates] = {}
-        self.tilted: dict[tuple[int, Mortar], TiltedStates] = {}
+        self.upright: dict[tuple[Part, Mortar], HeldStates] = {}
+        self.tilted: dict[tuple[Part, Mortar], TiltedStates] = {}
         self.keeps = False
-        self.answers = defaultdict[int, list[tuple[Answer, Floats]]](list)
+        self.answers = defaultdict[Part, list[tuple[Answer, Floats]]](list)
 
 
 class Screen:
@@ -81,7 +86,7 @@ class Screen:
         self.network, self.mortar = network_of(network), find_mortar(mortar)
         self.tilt = tilt
         self._compile, self._proofs = compiled, proofs or Proofs(self.network)
-        self._assemblies: dict[int, Assembly] = {}
+        self._assemblies: dict[Part, Assembly] = {}
 
     @property
     def solved(self) -> int:
@@ -100,44 +105,50 @@ class Screen:
         same. Result (S,): 1 where it is proven that the structure stands, -1 where it is proven
         that it falls, and 0 where neither is. Raises `GripError` as `held_places` does.
         """
-        places, loads = held_places(self.network, bricks, held, payload)
-        out = _verdicts(self._upright(bricks).bracket(places, loads, _decided))
-        rows = np.flatnonzero(out == STANDS) if self.tilt else ()
-        if len(rows):
-            tilted = self._tilted(bricks)
-            out[rows] = _of_both(*tilted.survive(np.tan(self.tilt), places[rows], loads[rows]))
+        out = np.zeros(len(np.asarray(held)), dtype=np.int8)
+        for own, part, places, loads in held_parts(self.network, bricks, held, payload):
+            found = _verdicts(self._upright(part).bracket(places, loads, _decided))
+            rows = np.flatnonzero(found == STANDS) if self.tilt else ()
+            if len(rows):
+                survived = self._tilted(part).survive
+                found[rows] = _of_both(*survived(np.tan(self.tilt), places[rows], loads[rows]))
+            out[own] = found
         return out
 
     def recalled(
         self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None
     ) -> NDArray[np.int8]:
         """Return the same by what is known already: no program is solved."""
-        places, loads = held_places(self.network, bricks, held, payload)
-        out = _verdicts(self._upright(bricks).known(places, loads))
-        rows = np.flatnonzero(out == STANDS) if self.tilt else ()
-        if len(rows):
-            tilted = self._tilted(bricks)
-            out[rows] = _of_both(*tilted.known(np.tan(self.tilt), places[rows], loads[rows]))
+        out = np.zeros(len(np.asarray(held)), dtype=np.int8)
+        for own, part, places, loads in held_parts(self.network, bricks, held, payload):
+            found = _verdicts(self._upright(part).known(places, loads))
+            rows = np.flatnonzero(found == STANDS) if self.tilt else ()
+            if len(rows):
+                known = self._tilted(part).known
+                found[rows] = _of_both(*known(np.tan(self.tilt), places[rows], loads[rows]))
+            out[own] = found
         return out
 
-    def _upright(self, bricks: int) -> HeldStates:
-        known, key = self._proofs.upright, (bricks, self.mortar)
+    def _upright(self, part: Part) -> HeldStates:
+        known, key = self._proofs.upright, (part, self.mortar)
         if key not in known:
-            answers = self._proofs.answers[bricks] if self._proofs.keeps else None
-            known[key] = _lacking(self._assembly(bricks), self.mortar, self._compile, answers)
+            answers = self._proofs.answers[part] if self._proofs.keeps else None
+            known[key] = _lacking(self._assembly(part), self.mortar, self._compile, answers)
         return known[key]
 
-    def _tilted(self, bricks: int) -> TiltedStates:
-        known, key = self._proofs.tilted, (bricks, self.mortar)
+    def _tilted(self, part: Part) -> TiltedStates:
+        known, key = self._proofs.tilted, (part, self.mortar)
         if key not in known:
             up = self.network.scene.up
-            known[key] = TiltedStates(self._assembly(bricks), self.mortar, up, self._compile)
+            known[key] = TiltedStates(self._assembly(part), self.mortar, up, self._compile)
         return known[key]
 
-    def _assembly(self, bricks: int) -> Assembly:
-        if bricks not in self._assemblies:
-            self._assemblies[bricks] = node_assembly(self.network, bricks, self._proofs.contacts)
-        return self._assemblies[bricks]
+    def _assembly(self, part: Part) -> Assembly:
+        if part not in self._assemblies:
+            bricks, propped = part
+            contacts = self._proofs.contacts
+            self._assemblies[part] = node_assembly(self.network, bricks, contacts, held=propped)
+        return self._assemblies[part]
 
 
 def _lacking(
@@ -194,3 +205,27 @@ def held_places(
         raise GripError("payload: it is negative or no number; give N")
     free = sets == 0
     return np.where(free, most, sets - 1).astype(np.int64), np.where(free, 0.0, loads)
+
+
+def held_parts(
+    network: Network, bricks: int, held: ArrayLike, payload: ArrayLike | None
+) -> Iterator[tuple[Ints, Part, Ints, Floats]]:
+    """Yield rows of grip sets (n,), of which structure, and what `held_places` gives with props.
+
+    Props hold beside robots; of the finished structure that nobody holds they are struck.
+    """
+    places, loads = held_places(network, bricks, held, payload)
+    if not network.scene.props:
+        yield np.arange(len(places)), (bricks, True), places, loads
+        return
+    numbers = [node for brick in network.scene.placed for node in brick.nodes]
+    last = bricks == len(network.inner)
+    robots = (loads > 0).any(axis=1) if last else np.ones(len(places), dtype=bool)
+    for propped in (True, False):
+        rows = np.flatnonzero(robots == propped)
+        props = prop_grips(network, bricks, held=propped)
+        at = np.tile([numbers.index(node) for node in props.nodes], (len(rows), 1))
+        most = np.tile(props.payload, (len(rows), 1))
+        if len(rows):
+            sets = np.hstack([places[rows], at.astype(np.int64)])
+            yield rows, (bricks, propped), sets, np.hstack([loads[rows], most])

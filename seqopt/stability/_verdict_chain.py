@@ -74,6 +74,7 @@ class VerdictChain:
     def __call__(self, bricks: int, grips: Grips) -> tuple[Assembly, Proven, Way]:
         """Return a partial structure, its case proven, and how."""
         assembly, held = self._parts(bricks, grips), [n for n in grips if n is not None]
+        held += [-1 - i for i in range(len(assembly.payload) - len(held))]  # props
         case = self._ask(assembly)
         tries = self._tries(assembly, case, held)
         with one_thread():

@@ -66,7 +66,7 @@ class Stability(Shown, FrozenValue):
         for bonds and for grips at their payload by what weighs less once it is turned.
     grip : float
         The largest grip force, made as small as equilibrium with the mortar allows, N; inf if no
-        payload is enough, 0 if nothing grips.
+        payload is enough, 0 if nothing grips, NaN where props only push.
     motion : (B, 6) float
         How it fails: by itself if it does not stand, and otherwise when pulled to the limit in the
         worst direction. Translation (m) and rotation (rad) of the blocks; the largest translation,
@@ -176,7 +176,9 @@ def _least_bond(prove: Prover, mortar: Mortar, stand: Proven) -> float:
 
 
 def _least_payload(prove: Prover, fixed: Case) -> float:
-    """Return the largest grip force where it is smallest, N."""
+    """Return the largest grip force where it is smallest, N; NaN where a grip only pushes."""
+    if prove.assembly.grip_line.any():
+        return np.nan
     if not len(prove.assembly.payload):
         return 0.0
     least = prove(replace(fixed, sense=Sense.SMALLEST, payload=(0.0, 1.0)))

@@ -92,7 +92,7 @@ def test_the_margin_search_plan_is_in_degrees(capsys, tmp_path, arch):
         (["--rule", "speed=2"], 2, "--rule speed=2 does not exist; give one of newest"),
         (["--rule", "regrips=few"], 2, "rule regrips: 'few'"),
         (["--aim", "speed"], 2, "aim 'speed' does not exist"),
-        (["--robots", "7"], 2, "7 robots: the free schedule takes two to 5"),
+        (["--robots", "7"], 2, "7 robots: the free schedule takes one to 5"),
         (["--robots", "rob9,rob1"], 2, "robot 'rob9' does not exist"),
         (["--option", "width=0"], 2, "options width=0, growth=1.1: give a whole number"),
         (["--option", "speed=1"], 2, "--option speed=1: schedule_search has width"),

@@ -37,6 +37,7 @@ PAGES = (
             "certificate",
             "infeasible",
             "driving",
+            "props",
         )
     ),
 )

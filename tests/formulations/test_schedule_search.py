@@ -446,7 +446,7 @@ def test_the_short_cut_does_what_the_long_way_does():
         ({"formulation": "pareto_zones"}, "states of a build are asked for; use .*schedule_search"),
         ({"workers": 0}, "workers is 0; give a whole number from 1"),
         ({"rules": {"regrips": 0}}, "rules {'regrips': 0}: give a seqopt.FreeRules"),
-        ({"robots": 9}, "9 robots: the free schedule takes two to 5"),
+        ({"robots": 9}, "9 robots: the free schedule takes one to 5"),
         ({"robots": "rob9"}, "robot 'rob9' does not exist; give some of rob1"),
         ({"width": 3, "depth": 1}, "option depth: schedule_search has width"),
         ({"schedule": "loop", "newest": "free"}, "option newest: only the free schedule has it"),

@@ -39,7 +39,7 @@ VALUES = {
 }
 CASES = [(what, field.name) for what, value in VALUES.items() for field in fields(value)]
 OPEN = {("scene", "name"), ("scene", "provenance"), ("robot", "name"), ("arch", "closed")}
-EMPTY = {"joints", "robots", "blocked_nodes", "loads"}  # what a scene need not have
+EMPTY = {"joints", "robots", "blocked_nodes", "loads", "props"}  # what a scene need not have
 ODD = ["x", "", [], {}, object(), {"x"}, float("nan"), -float("inf"), 10**400, [[1.0], 2.0], b"x"]
 
 

@@ -39,7 +39,7 @@ def test_wrong_rules_get_one_line(rules, said):
     ("rules", "said"),
     [
         ({"robots": ("rob9", "rob1")}, "robot 'rob9' does not exist"),
-        ({"robots": ("rob1",)}, "1 robots take part; name two to 5"),
+        ({"robots": ("rob1",)}, "least_grips: 2 grips of 1 robots; give at most 1"),
         ({"least_grips": 4}, "rule least_grips: 4 grips of 3 robots; give at most 3"),
         ({"robots": ("rob1", "rob2"), "placers": ("rob3",)}, "rule placers: rob3 takes no part"),
     ],
@@ -53,8 +53,8 @@ def test_further_robots_are_mobile():
     scene = small_arch(4)
     assert [robot.name for robot in with_robots(scene, 5).robots][3:] == ["rob4", "rob5"]
     assert len(with_robots(scene, 2).robots) == 2
-    for count in (1, 6, 2.5):
-        with pytest.raises(StepError, match="two to 5"):
+    for count in (0, 6, 2.5):
+        with pytest.raises(StepError, match="one to 5"):
             with_robots(scene, count)
 
 

@@ -132,7 +132,7 @@ def test_a_motion_rules_out_every_set_that_it_leaves_at_rest(arch25):
     screen = Screen(network, DRY)
     assert screen.stands(14, [[2, 28]]) == FALLS
     sets = pairs_and_triples(14)
-    states = screen._upright(14)
+    states = screen._upright((14, True))
     known = states._known.bracket(*held_places(network, 14, sets, None))
     ruled_out = known[:, 0] > EXACT
     assert screen.solved == states.solved <= 2
@@ -144,7 +144,7 @@ def test_a_motion_rules_out_every_set_that_it_leaves_at_rest(arch25):
 def test_motions_and_forces_prove_what_the_certificates_checks_say(arch25):
     """The batch formulas against `bound` and `violation`, which look at one assembly."""
     network = build_network(arch25)
-    states = _lacking(Screen(network, DRY)._upright(5).assembly, DRY, compile_held)
+    states = _lacking(Screen(network, DRY)._upright((5, True)).assembly, DRY, compile_held)
     assembly, case = states.assembly, states._case
     for grips in ([1, 9], [5, 9], [2, 8]):
         payload = np.zeros(10)

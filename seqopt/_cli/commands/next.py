@@ -6,7 +6,7 @@ import argparse
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.options import declare, form_options
-from seqopt._cli.where import read_place
+from seqopt._cli.words.where import read_place
 from seqopt.errors import StepError
 from seqopt.plan.policy import FILE, Advice, Policy
 from seqopt.responses._tolerance import value_text

@@ -21,7 +21,6 @@ from seqopt._cli.asked import (
     scene_facts,
     strictly,
 )
-from seqopt._cli.bases import asked_places
 from seqopt._cli.options import (
     LIMIT,
     RULE,
@@ -38,10 +37,12 @@ from seqopt._cli.outputs import ALWAYS, plan_files, require_out, write_outputs, 
 from seqopt._cli.posing import Asked, asked_problem
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import parse_options, parse_size, parse_time_limit
+from seqopt._cli.words.bases import asked_places
 from seqopt._files import csv_text
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.states.states import States
 from seqopt.plan._bases import FoundBases, choose_bases
+from seqopt.plan._fewest_props import FoundProps, fewest_props
 from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation, formulation_names
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.out_of_sample import Trial, judge_unseen, worst_values
@@ -85,7 +86,8 @@ BUDGET = {
     "free: steps=N, regrips=N, travel=METERS or sum(RESPONSE)=VALUE"
 }
 AIM = {
-    "--aim NAME,NAME": "what is to be as small as possible, the most important first: minmax (the "
+    "--aim NAME,NAME": "what is to be as small as possible, the most important first: props (how "
+    "many are needed, at which nodes), minmax (the "
     "worst step by the criterion, by default worst-ratio), sum, steps, regrips, travel, bond, "
     "friction, tilt, a response, or sum(RESPONSE) (free: by default minmax; other schedules: by "
     "default the total of what their moves cost); with --order search, the best order of the "
@@ -131,6 +133,10 @@ BASES = {
     "the best plan that they allow: among places of a grid around the bricks (grid:METERS for its "
     "spacing), or those of a CSV file with the columns robot, x, y, z, heading_deg"
 }
+FEWEST = {
+    "--props-among NODES": "with --aim props: at which nodes props may be, and what they bear, as "
+    "--props; all of them by default, as all:1e6,push"
+}
 MEMORY = {
     "--cache DIR": "keep answers there and use what is there: a run that was ended goes on",
     "--max-memory SIZE": "what responses and costs may take, as 500MB or 2GB (default: four fifths "
@@ -145,7 +151,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     declare(command.add_argument_group("what is allowed"), LIMIT | BUDGET)
     form_options(command, strict=True, builds=True)
     states = "what plans are compared by, state after state, with any schedule"
-    declare(command.add_argument_group(states), AIM | STANDING)
+    declare(command.add_argument_group(states), AIM | FEWEST | STANDING)
     declare(command.add_argument_group("with --schedule free"), RULE | BASES | POLICY)
     criterion_options(command)
     engine_options(command)
@@ -187,6 +193,7 @@ class Found:
     prover: BuildProver
     bases: FoundBases | None = None
     whole: str = ""
+    props: FoundProps | None = None
 
     @cached_property
     def trial(self) -> Trial | None:
@@ -217,6 +224,7 @@ class Found:
             "models_paper_count": _paper_count(self.plan),
             "stability": {each.mortar: each.facts() for each in self.own},
         }
+        out |= {} if self.props is None else {"fewest_props": self.props.described()}
         known, unseen = self.asked.known, self.asked.unseen
         if known is None or unseen is None:
             return out
@@ -249,20 +257,24 @@ def find(options: argparse.Namespace) -> Found:
         return solve(problem, formulation, time_limit=limit, progress=tell, **how)
 
     bases = None if options.bases is None else _bases(options, asked.problem, choose)
-    plan = choose(asked.problem) if bases is None else bases.plan
+    props = None if asked.fewest is None else _props(options, asked, choose)
+    outer = bases or props
+    plan = choose(asked.problem) if outer is None else outer.plan
     prover = asked_prover(options, plan.engine.network)
-    return Found(asked, plan, assemble, prover, bases, _from_empty(asked.whole, plan, choose))
+    whole = _from_empty(asked.whole, plan, choose)
+    return Found(asked, plan, assemble, prover, bases, whole, props)
 
 
 def answered(options: argparse.Namespace, found: Found) -> Answer:
     """Write a plan, and return what it is worth."""
-    plan, bases = found.plan, found.bases
+    plan, outer = found.plan, found.bases or found.props
 
     def files() -> dict[str, bytes | str]:
         made = plan_files(plan, found.report, found.prover, found.trial)
         if getattr(options, "policy", False):
             made[FILE] = find_policy(found.asked.problem, options.tell).content()
-        return made if bases is None else made | {"bases.csv": csv_text(bases.tried)}
+        name = "bases.csv" if found.props is None else "fewest_props.csv"
+        return made if outer is None else made | {name: csv_text(outer.tried)}
 
     return _answer(options, found, write_outputs(options, files))
 
@@ -284,6 +296,16 @@ def _values(plan: Plan) -> str:
     values = [f"{name} {value_text(name, v)}" for name, v in plan.objective.items()]
     steps = [] if "steps" in plan.objective else [f"{len(plan.steps)} steps"]
     return ", ".join([*values, *steps])
+
+
+def _props(
+    options: argparse.Namespace, asked: Asked, choose: Callable[[Problem], Plan]
+) -> FoundProps:
+    """Return the best plan of the fewest props."""
+    if options.no_proof:
+        raise ProblemError("--no-proof: props are compared by proven plans; leave it out")
+    assert asked.fewest is not None
+    return fewest_props(asked.problem, asked.fewest, choose, options.tell)
 
 
 def _bases(
@@ -317,7 +339,7 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
     over = () if stopped else exceeded(scene, table)
     lines = [f"{_said(found)}; {written_to(options.out)}"]
     lines += [f"stability, {each}" for each in found.own]
-    lines += [] if found.bases is None else [wrapped(found.bases.said)]
+    lines += [wrapped(each.said) for each in (found.bases, found.props) if each is not None]
     lines += [wrapped(found.whole)] if found.whole else []
     facts: dict[str, object] = {
         "scene": scene_facts(scene),
@@ -326,6 +348,8 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
     }
     if found.bases is not None:
         facts["bases"] = found.bases.tried
+    if found.props is not None:
+        facts["fewest_props"] = found.props.tried
     if plan.order is not None:
         order = plan.order.selection.order
         facts["order"] = order

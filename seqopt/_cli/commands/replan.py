@@ -25,7 +25,7 @@ from seqopt._cli.options import (
 )
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import number_word
-from seqopt._cli.where import Place
+from seqopt._cli.words.where import Place
 from seqopt._files import read_text
 from seqopt.errors import FileError, InfeasibleError, StepError
 from seqopt.plan._replan import compared, without

@@ -15,6 +15,7 @@ from seqopt._cli.outputs import keep_apart
 from seqopt._files import write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
+from seqopt.scene._props import Prop
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, dump_scene, load_scene
@@ -77,6 +78,7 @@ def _network_facts(network: Network) -> dict[str, object]:
         "grips_N_per_m": {robot.name: robot.stiffness for robot in scene.robots},
         "grips_Nm_per_rad": {robot.name: robot.rotational_stiffness for robot in scene.robots},
         "joints_Nm_per_rad": {r.name: r.arm.joint_stiffness for r in scene.robots if r.arm},
+        "props": [prop.node for prop in scene.props],
         "reaches": {robot.name: type(robot.reach).__name__.lower() for robot in scene.robots},
         "provenance": scene.provenance,
     }
@@ -100,7 +102,15 @@ def _list(options: argparse.Namespace) -> Answer:
     return Answer(facts=facts, text="\n".join(lines))
 
 
-def _grip(robot: Robot) -> str:
+def _bears(prop: Prop) -> str:
+    """Return what a prop bears, in words."""
+    out = _grip(prop).replace(", grip of", ":", 1) or ": rigid"
+    if prop.direction is not None:
+        out += ", pushes along ({:g}, {:g}, {:g}) only".format(*prop.direction)
+    return out + ("" if prop.capacity is None else f", up to {prop.capacity:g} N")
+
+
+def _grip(robot: Robot | Prop) -> str:
     """Return how stiff a robot's grip is, in words; nothing where it is rigid."""
 
     def said(stiffness: Any) -> str:
@@ -108,9 +118,9 @@ def _grip(robot: Robot) -> str:
         return " x ".join(f"{one:g}" for one in each)
 
     out = "" if robot.stiffness is None else f", grip of {said(robot.stiffness)} N/m"
-    if robot.rotational_stiffness is not None:
+    if isinstance(robot, Robot) and robot.rotational_stiffness is not None:
         out += f", which resists turning by {said(robot.rotational_stiffness)} N m/rad"
-    if robot.arm is not None and robot.arm.joint_stiffness:
+    if isinstance(robot, Robot) and robot.arm is not None and robot.arm.joint_stiffness:
         out += f", joints of {' x '.join(f'{k:g}' for k in robot.arm.joint_stiffness)} N m/rad"
     return out
 
@@ -123,6 +133,8 @@ def _described(scene: Scene, facts: dict[str, Any]) -> Iterator[str]:
         reach = facts["reaches"][robot.name]
         at = "" if robot.arm is None else ", arm at ({:g}, {:g}, {:g})".format(*robot.arm.position)
         yield f"{robot.name}: payload {robot.payload:g} N, reach {reach}{at}{_grip(robot)}"
+    for prop in scene.props:
+        yield f"{prop.label}{_bears(prop)}"
     yield f"weight: {facts['weight_N']:.1f} N"
     if scene.loading:
         yield f"beside the weight: {scene.loading}"

@@ -7,9 +7,10 @@
     F_sup_N: "support force, N", M_sup_Nm: "support moment, N m", F_max_N: "largest tension in an edge, N",
     F_min_N: "largest compression in an edge, N", F_avg_N: "mean force of the edges, N", T_pct: "edges in tension, %",
     "D_max_1e-3mm": "largest displacement, 1e-3 mm", "D_avg_1e-3mm": "mean displacement, 1e-3 mm", "D_std_1e-3mm": "spread of displacements, 1e-3 mm",
+    props: "props that hold", F_prop_N: "largest force of a prop, N", prop_excess_N: "more than props may bear, N",
   };
   const KINDS = { place: "place", release: "release", reposition: "reposition" };
-  const CLAY = 0xcc8560, NEW = 0xe8b04a, TENSION = 0xc8102e, COMPRESSION = 0x1f5fa8, LARGEST = 32767;
+  const CLAY = 0xcc8560, PROP = 0x8a8478, NEW = 0xe8b04a, TENSION = 0xc8102e, COMPRESSION = 0x1f5fa8, LARGEST = 32767;
 
   // fields come as whole numbers, compressed
   function unzip(text) {
@@ -93,6 +94,14 @@
         foot.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), new THREE.Vector3(...structure.up));
         this.scene.add(foot);
       }
+      this.props = structure.props.map(({ line, node }) => {
+        const [head, foot] = line.map((place) => new THREE.Vector3(...place)), along = head.clone().sub(foot);
+        const pole = new THREE.Mesh(new THREE.CylinderGeometry(size * 0.45, size * 0.45, Math.max(along.length(), 1e-9), 12), new THREE.MeshLambertMaterial({ color: PROP }));
+        pole.position.copy(head).add(foot).multiplyScalar(0.5);
+        pole.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), along.normalize());
+        this.scene.add(pole);
+        return { pole, brick: structure.nodes[node].brick };
+      });
       this.arrows = structure.grounds.map((ground) => {
         const arrow = new THREE.Group(), paint = new THREE.MeshBasicMaterial({ color: 0x222222, depthTest: false, transparent: true });
         const shaft = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 8), paint), head = new THREE.Mesh(new THREE.ConeGeometry(1, 1, 12), paint);
@@ -236,6 +245,8 @@
         const { at: place, brick } = structure.nodes[node];
         ball.position.set(...this.moved(build, s, brick, place, options, p));
       });
+      const struck = step.bricks === structure.bricks.length && step.grips.every((node) => node === null);
+      this.props.forEach(({ pole, brick }) => { pole.visible = !struck && rank(build, brick) < step.bricks; });
       this.showRobots(build, s, options);
       this.draw();
     }

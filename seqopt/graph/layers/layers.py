@@ -32,7 +32,7 @@ from seqopt.problem.requirements import (
 )
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses._tolerance import is_tolerance, with_tolerances
-from seqopt.responses.quantities import robot_response
+from seqopt.responses.quantities import PROP_EXCESS, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.responses.table import analyze
 from seqopt.sequence.schedule import OpenGrip, Schedule
@@ -353,7 +353,11 @@ def candidate_layers(
     ProblemError
         If there is no such response, or no grip is open.
     """
-    known = {*CHOICE_RESPONSES, *map(robot_response, robots_of(engine, schedule, criterion))}
+    known = {
+        *CHOICE_RESPONSES,
+        PROP_EXCESS,
+        *map(robot_response, robots_of(engine, schedule, criterion)),
+    }
     asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), as_limits(limits), tuple(also))
     names = {name for move in schedule.moves for name in asked(move.bricks)}
     if unknown := {name for name in names if not is_tolerance(name)} - known:

@@ -37,7 +37,7 @@ from seqopt.problem.requirements import (
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._grip_sets import GripSets
 from seqopt.responses._tolerance import is_tolerance
-from seqopt.responses.quantities import TOLERANCE, robot_response
+from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import as_float, short
 from seqopt.scene.scene import Scene
@@ -168,7 +168,7 @@ class States(Shown):
             names += self.criterion.wanted(1)
         names += [limit.response for limit in self.limits]
         own = sorted({name for name in names if is_tolerance(name)} - {TOLERANCE})
-        return tuple(name for name in (*STATE_RESPONSES, *own) if name in names)
+        return tuple(name for name in (*STATE_RESPONSES, PROP_EXCESS, *own) if name in names)
 
     @property
     def aims(self) -> tuple[Goal, ...]:
@@ -500,7 +500,7 @@ def _checked(limits: Sequence[Limit], network: Network) -> tuple[Limit, ...]:
     limits = as_limits(limits)
     robots = {robot_response(robot.name) for robot in network.scene.robots}
     for limit in limits:
-        _require(limit.response, {*STATE_RESPONSES, *robots}, "limit")
+        _require(limit.response, {*STATE_RESPONSES, PROP_EXCESS, *robots}, "limit")
     return limits
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.states.states import States
+from seqopt.plan.judge._prop_rules import props_that_hold
 from seqopt.problem.problem import LARGEST, Goal
 from seqopt.problem.requirements import state_costs
 from seqopt.responses._blocks import Block
@@ -55,7 +56,8 @@ def _worst(problem: States, bricks: int, grips: Ints, most: float, *, rough: boo
 def _asked(problem: States, bricks: int, grips: Ints, *, rough: bool) -> Answers:
     """Return the same of one scenario; nothing that is kept anywhere is believed."""
     names = tuple(name for name in problem.named if name != LARGEST)
-    block = Block(bricks, grips, names, screen=rough)
+    held = props_that_hold(problem.network.scene, bricks, grips.shape[1])
+    block = Block(bricks, grips, names, rough, tuple(number for number, _ in held))
     rows = solve_sets(problem.engine, block, problem.resources)
     found, forces = dict(zip(names, rows.T, strict=False)), rows[:, len(names) :]
     found[LARGEST] = forces.max(axis=1, initial=0.0)

@@ -28,7 +28,7 @@ from seqopt.plan.search._margin_search import WORST, bisected, with_margin
 from seqopt.problem.problem import STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
-from seqopt.responses.quantities import length_text
+from seqopt.responses.quantities import PROP_EXCESS, length_text
 from seqopt.scene.arm import Arm
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule
@@ -76,6 +76,8 @@ def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
 
 STEPS = (Goal(Measure.STEPS),)
 STANDING = "no requirement to stand"
+PROPS = "props that bear any force, both ways"
+CENTERING = "a prop at every brick, if not fewer"
 ARMS = "arms that reach more, or stand elsewhere"
 APART = "arms that are out of each other's way (slimmer, or elsewhere)"
 Look = Callable[[States], Explorer]
@@ -171,7 +173,7 @@ def _what_helps(problem: States, look: Look) -> str:
     if {*ways} <= {ARMS, APART}:  # of the same arms two rules may ask less
         arms = (ARMS, APART) if ways else ()
         pairs = (pair for pair in _pairs(problem, look) if not pair.endswith(arms))
-        ways = [*ways, *islice(pairs, 1)]
+        ways = [*ways, *islice(pairs, 1), *(() if ways else _propped(problem, look))]
     if not ways:
         return ", whatever two rules or limits are loosened; extend a reach or add a robot"
     return f"; it becomes possible with {' or '.join(_enough(problem, w, look) for w in ways)}"
@@ -197,6 +199,18 @@ def _opening(problem: States, look: Look) -> Iterator[str]:
         rest = tuple(other for other in problem.limits if other is not limit)
         if look(replace(problem, limits=rest)).whole:
             yield limit.response
+
+
+def _propped(problem: States, look: Look) -> Iterator[str]:
+    """Yield that props help, if one at every brick does."""
+    scene = problem.network.scene
+    if scene.props or recipe_of(problem.engine) is None or problem.scenarios:
+        return
+    engine = engine_for(problem.engine, scene.with_centering())
+    moves = problem.rules
+    rules = replace(moves, scene=engine.network.scene) if isinstance(moves, Schedule) else moves
+    if look(replace(problem, engine=engine, rules=rules, goals=STEPS)).whole:
+        yield CENTERING
 
 
 def _with_arms(problem: States, changed: Callable[[Arm | None], Arm | None]) -> States:
@@ -236,7 +250,7 @@ def _enough(problem: States, way: str, look: Look) -> str:
         return f"a bond of {math.ceil(enough / digit) * digit:.10g} Pa"
     found = [limit for limit in problem.limits if limit.response == way]
     if not found or not (way in STATE_RESPONSES or is_tolerance(way)):
-        return f"no limit on {way}" if found else way
+        return way if not found else PROPS if way == PROP_EXCESS else f"no limit on {way}"
     rest = tuple(limit for limit in problem.limits if limit not in found)
     least = worst_least(replace(problem, limits=rest), way, look)
     if is_tolerance(way):

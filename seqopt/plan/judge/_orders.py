@@ -134,8 +134,10 @@ def _of_the_whole(problem: AllOrders) -> float:
     Minus infinity where there are too many grip sets to look at.
     """
     free = problem.judging(problem.scene.build_order)
-    nodes = [n for n in node_numbers(free.network) if n not in problem.scene.blocked_nodes]
-    held = range(max(1, free.free_rules.least_grips), free.space.robots + 1)
+    taken = {*problem.scene.blocked_nodes, *(prop.node for prop in problem.scene.props)}
+    nodes = [n for n in node_numbers(free.network) if n not in taken]
+    fewest = max(1, free.free_rules.least_grips - len(problem.scene.props))
+    held = range(fewest, free.space.robots + 1)
     least = -np.inf
     if sum(comb(len(nodes), count) for count in held) <= MOST_SETS:
         least = min((_least(free, nodes, count) for count in held), default=np.inf)

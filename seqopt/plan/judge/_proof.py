@@ -320,6 +320,20 @@ class Proof:
         self.states = max(self.states, graph.states)
         return is_beyond(graph, caps) if caps else not graph.ends[reached(graph)].any()
 
+    def stops_at(self, values: Sequence[float] = ()) -> int | None:
+        """Return with how many bricks every plan ends that is as good, at the latest, unfinished.
+
+        ``values``: of goals; of the first alone, if it is about a worst step, or of none. States
+        with fewer bricks are all that this depends on. Result: None where a plan may be as good.
+        """
+        levels, tables = _Levels(self._passable, {}, Asked(values, ())), self._passable.tables
+        parts = np.repeat(np.arange(tables.last + 1), [*map(len, levels.states)])
+        graph = levels.graph()
+        seen = reached(graph)
+        if graph.ends[seen].any():
+            return None
+        return tables.bricks_at(min(int(parts[seen].max()) + 1, tables.last))
+
     def _cuts(self, margins: Sequence[float]) -> bool:
         """Return whether states that are proven to fall, or to lack margins, leave no path.
 

@@ -69,6 +69,8 @@ class RuleTables:
         names = [book.network.scene.robots[r].name for r in book.team]
         self._able = [not self._rules.placers or name in self._rules.placers for name in names]
         self._book, self._place = book, place
+        holders = [prop.node for prop in book.network.scene.props]
+        self._propped = np.isin(self.nodes, holders)  # of places; none of a node that is none
         self._postures = PostureRules(book.network.scene, book.team)
         self._known: dict[int, _Places] = {}
 
@@ -211,14 +213,24 @@ class RuleTables:
 
     def keep(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) keep the rules as long as the build goes on, from 1 brick."""
+        ok = self._keep(bricks, states, self._propped)
+        if bricks == self.last and self._propped.any():  # where nobody holds, props are struck
+            bare = (states[:, : self.robots] <= 0).all(axis=1)
+            ok[bare] = self._keep(bricks, states[bare], np.zeros_like(self._propped))
+        return ok
+
+    def _keep(self, bricks: int, states: Ints, props: Bools) -> Bools:
+        """Return the same with props at places."""
         grips = states[:, : self.robots].clip(min=0)
         ok = np.ones(len(states), dtype=bool)
+        propped = props[: 2 * bricks + 1]
         if bricks > 1:
-            ok &= np.count_nonzero(grips, axis=1) >= self._rules.least_grips
-        if self._rules.newest is not Newest.FREE:
+            ok &= np.count_nonzero(grips, axis=1) + propped.sum() >= self._rules.least_grips
+        if self._rules.newest is not Newest.FREE and not propped[-2:].any():
             ok &= self._of(bricks).holds[np.arange(self.robots), grips].any(axis=1)
         for part in self._of(bricks).parts:
-            ok &= part[grips].any(axis=1)
+            if not (part & props).any():
+                ok &= part[grips].any(axis=1)
         return ok
 
     def ends(self, bricks: int, states: Ints) -> Bools:

@@ -21,13 +21,15 @@ from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.judge._posture_rules import check_postures
 from seqopt.plan.judge._proof import BELOW, Hint, Proof
+from seqopt.plan.judge._prop_rules import check_props
 from seqopt.plan.judge._rule_moves import check_scheduled
 from seqopt.plan.judge._standing_proof import proven_margins, require_margin
 from seqopt.plan.judge.certificate import Certificate
 from seqopt.problem.problem import LARGEST, Goal, Measure
 from seqopt.problem.standing import _size, slack
+from seqopt.responses._props import EXCESS_COLUMN
 from seqopt.responses._tolerance import is_tolerance, misfits_along, with_tolerances
-from seqopt.responses.quantities import CHOSEN_BY
+from seqopt.responses.quantities import CHOSEN_BY, PROP_EXCESS
 from seqopt.responses.table import analyze, force_column
 from seqopt.sequence._rule_check import check_free
 from seqopt.sequence.schedule import Schedule
@@ -163,6 +165,7 @@ def plan_values(
     """
     if problem.each:
         return _in_all(problem, steps, [plan_values(each, steps, claimed) for each in problem.each])
+    check_props(problem.engine, steps)
     columns = _state_columns(problem, steps, analyze(problem.engine, steps))
     _require_limits(problem, columns)
     margins = _margins(problem, steps)
@@ -221,6 +224,8 @@ def _state_columns(
     for name in problem.named:
         if name == "C_max":
             out[name] = np.maximum(0.0, -table["F_min_N"].to_numpy(float))
+        elif name == PROP_EXCESS:
+            out[name] = table[EXCESS_COLUMN].to_numpy(float)
         elif is_tolerance(name):
             out[name] = misfits_along(with_tolerances(problem.engine, steps, table, name))
         elif name != LARGEST:

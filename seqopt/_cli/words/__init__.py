@@ -1,0 +1,1 @@
+"""Words of options that are read with their scene."""

@@ -1,0 +1,196 @@
+"""How few props a build needs, and where: the best plan of the smallest sets that allow one.
+
+Sets are looked at by their size, and in build order. A judge says of each with how many bricks all
+of its plans end unfinished, or pass a state worse than the best plan so far. Which props hold is
+until then the same for all sets with the same first props: these are ruled out together. Every set
+that is left is solved, with its proof.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from math import comb, inf
+
+import pandas as pd
+
+from seqopt.arrays import Terse
+from seqopt.errors import InfeasibleError, ProblemError, StepError
+from seqopt.plan._bases import _bound, _is_below, _value
+from seqopt.plan._kept import moved
+from seqopt.plan.judge._proof import Proof
+from seqopt.plan.plan import Plan
+from seqopt.plan.solving import states_of
+from seqopt.problem.problem import Measure, Problem
+from seqopt.scene._props import Prop
+from seqopt.scene.scene import Scene
+from seqopt.work.progress import Tell
+
+_MOST = 2_000  # sets that are looked at, one by one
+_Set = tuple[int, ...]  # candidates by index, ascending
+
+
+@dataclass(frozen=True, repr=False)
+class FoundProps(Terse):
+    """The best plan with as few props as any needs, and what became of each set.
+
+    ``problem``: with the props of the plan; ``tried``: a row for every set that was looked at:
+    its ``nodes``, ``outcome``, and by goal what is known; ``sets``: how many there are of as many
+    props or fewer; ``proven``: whether none of these, nor any with fewer, allows a better plan.
+    """
+
+    plan: Plan
+    problem: Problem
+    tried: pd.DataFrame
+    sets: int
+    proven: bool
+
+    @property
+    def count(self) -> int:
+        """How many props the plan has."""
+        return len(self.problem.scene.props)
+
+    @property
+    def said(self) -> str:
+        """What was chosen, and what ruled the rest out, in words."""
+        nodes = ", ".join(str(prop.node) for prop in self.problem.scene.props)
+        solved = int(self.tried["outcome"].str.startswith("solved").sum())
+        looked = len(self.tried)
+        where = f" at node{'s' * (self.count > 1)} {nodes}" if nodes else ""
+        end = "no set of as many or fewer is better" if self.proven else "another may be better"
+        return (
+            f"props: {self.count}{where}; {self.sets} sets of as many or fewer: {solved} solved, "
+            f"{looked - solved} ruled out by a cut, {self.sets - looked} with these; {end}"
+        )
+
+    def described(self) -> dict[str, object]:
+        """Return the same for a summary, ready for JSON."""
+        solved = int(self.tried["outcome"].str.startswith("solved").sum())
+        return {
+            "props": self.count,
+            "nodes": [prop.node for prop in self.problem.scene.props],
+            "sets": self.sets,
+            "solved": solved,
+            "cut": len(self.tried) - solved,
+            "proven": self.proven,
+        }
+
+
+def fewest_props(
+    problem: Problem,
+    candidates: Sequence[Prop],
+    solved: Callable[[Problem], Plan],
+    tell: Tell = lambda _: None,
+) -> FoundProps:
+    """Return the best plan of the smallest sets of props that allow any.
+
+    ``problem``: whose plans are compared by the worst or the total of states; ``candidates``: at
+    different nodes; ``solved``: returns the proven plan of a problem. Raises `InfeasibleError` if
+    no set allows a plan, `ProblemError` if too many have to be looked at.
+    """
+    if problem.orders is not None:
+        raise ProblemError("aim props: they are chosen for one order; leave out the search of it")
+    scene = problem.scene
+    since = {prop: scene.since[scene.brick_of_node[prop.node].name] for prop in candidates}
+    order = sorted(candidates, key=lambda prop: since[prop])
+    return _Search(problem, order, [since[prop] for prop in order], solved, tell).found()
+
+
+class _Search:
+    """Looks at sets of props, the smallest first, and keeps the best plan so far."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        candidates: Sequence[Prop],
+        since: Sequence[int],
+        solved: Callable[[Problem], Plan],
+        tell: Tell,
+    ) -> None:
+        self._problem, self._candidates, self._since = problem, candidates, since
+        self._solved, self._tell = solved, tell
+        self._best: tuple[float, ...] = ()
+        self._plan: Plan | None = None
+        self._of: Problem = problem
+        self._rows: list[dict[str, object]] = []
+        self._left: list[tuple[float, ...]] = []  # bounds of sets whose best plan is not proven
+        self._cuts: dict[int, set[_Set]] = {}  # first props of sets without a better plan
+
+    def found(self) -> FoundProps:
+        """Return the best plan of the smallest sets that allow any."""
+        count, sets = len(self._candidates), 0
+        for size in range(count + 1):
+            sets += comb(count, size)
+            whole = all(map(self._look, self._sets(size, ())))
+            if self._plan is not None:
+                proven = whole and not any(_is_below(bound, self._best) for bound in self._left)
+                rows = pd.DataFrame(self._rows)
+                return FoundProps(self._plan, self._of, rows, sets, proven)
+            if not whole:
+                raise ProblemError(
+                    f"aim props: {_MOST} sets were looked at, and none of up to {size} props was "
+                    "found to allow a plan; allow fewer nodes with --props-among"
+                )
+        raise InfeasibleError(
+            f"props: none of {sets} sets of up to {count} props allows a plan; allow other nodes, "
+            "or loosen a rule or limit"
+        )
+
+    def _sets(self, size: int, chosen: _Set) -> Iterator[_Set]:
+        """Yield the sets that begin with some, ascending, and that no cut rules out until then."""
+        count = len(self._candidates)
+        if len(chosen) == size:
+            if not self._is_cut(chosen, len(self._problem.scene.bricks)):
+                yield chosen
+            return
+        first = chosen[-1] + 1 if chosen else 0
+        for i in range(first, count - (size - len(chosen)) + 1):
+            if self._is_cut(chosen, self._since[i] - 1):
+                return  # so are all with later ones
+            yield from self._sets(size, (*chosen, i))
+
+    def _is_cut(self, chosen: _Set, bricks: int) -> bool:
+        """Return whether sets that have these props alone up to a brick count are ruled out."""
+        return any(
+            self._until(chosen, stop) in self._cuts[stop] for stop in self._cuts if stop <= bricks
+        )
+
+    def _until(self, chosen: _Set, bricks: int) -> _Set:
+        return tuple(i for i in chosen if self._since[i] <= bricks)
+
+    def _look(self, chosen: _Set) -> bool:
+        """Rule out a set and its like, or solve it; return whether there is time for another."""
+        props = [self._candidates[i] for i in chosen]
+        nodes = " ".join(str(prop.node) for prop in props)
+        self._tell(f"props, {len(self._rows)} sets looked at, now {nodes or 'none'}")
+        outcome, value = self._outcome(chosen, self._problem.scene.with_props(*props))
+        named = zip(self._problem.goals, value, strict=False)
+        known = {str(goal): goal.shown(number) for goal, number in named}
+        self._rows.append({"nodes": nodes, "outcome": outcome, **known})
+        return len(self._rows) < _MOST
+
+    def _outcome(self, chosen: _Set, scene: Scene) -> tuple[str, tuple[float, ...]]:
+        """Return what is known of a set, in words, and the values of its best plan."""
+        try:
+            problem = moved(self._problem, scene)
+            stop = Proof(states_of(problem)).stops_at(self._wanted())
+            if stop is not None:
+                self._cuts.setdefault(stop, set()).add(self._until(chosen, stop))
+                why = "no plan" if self._plan is None else "none as good"
+                return f"{why}, by {stop} bricks", ()
+            plan = self._solved(problem)
+        except (InfeasibleError, StepError) as error:
+            return f"no plan: {error}", (inf,)
+        value, bound = _value(plan), _bound(plan)
+        if _is_below(bound, value):
+            self._left.append(bound)
+        if self._plan is None or _is_below(value, self._best):
+            self._plan, self._of, self._best = plan, problem, value
+        return "solved", value
+
+    def _wanted(self) -> tuple[float, ...]:
+        """Return what the first goal of a plan must not exceed, if states say so."""
+        first = self._problem.goals[0]
+        if self._plan is None or first.of_margins or first.measure is not Measure.PEAK:
+            return ()
+        return self._best[:1]

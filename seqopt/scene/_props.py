@@ -1,0 +1,122 @@
+"""Props: grips without a robot, as of centering, falsework and struts.
+
+A prop holds its node from when its brick stands until the finished structure is let go: then it is
+struck with the last grips of robots. So bricks that stand, and whether a robot holds any, say which
+props do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+from seqopt.arrays import Terse, Vector
+from seqopt.errors import SceneError
+from seqopt.scene._checks import check, positive, unless_none, vector, whole
+from seqopt.scene.parts import Brick, Robot, _each_way
+
+_NEAR = 1.0  # of a node from where a prop is said to be, over the smallest side of its brick
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Prop(Terse):
+    """What holds a node of a brick that stands, as a robot would, and stays there.
+
+    Parameters
+    ----------
+    node : int, optional
+        The inner node that it holds.
+    position : Vector, optional
+        In place of a node: a point, m; the nearest node is held.
+    stiffness : float or Vector, optional
+        As of a `Robot`, N/m; rigid by default.
+    direction : Vector, optional
+        In which it pushes, of any length, if it cannot pull; by default it does both.
+    capacity : float, optional
+        Largest force that it bears, N; by default any.
+
+    Raises
+    ------
+    SceneError
+        If neither a node nor a position is given, or both, or a value is no such number.
+
+    Examples
+    --------
+    >>> Prop(node=13, direction=(0, 0, 2))
+    Prop(node=13, direction=(0, 0, 1))
+    """
+
+    node: int = None  # type: ignore[assignment]  # that next to the position
+    position: Vector | None = None
+    stiffness: float | Vector | None = None
+    direction: Vector | None = None
+    capacity: float | None = None
+
+    def __post_init__(self) -> None:
+        check(self, "prop", node=unless_none(whole), position=unless_none(vector))
+        if (self.node is None) == (self.position is None):
+            raise SceneError("prop: give the node that it holds, or a position near one")
+        newtons = unless_none(partial(positive, unit="N"))
+        ways = unless_none(partial(_each_way, unit="N/m, or none if rigid"))
+        check(self, self.label, stiffness=ways, direction=unless_none(_unit), capacity=newtons)
+
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+        return f"prop at {f'node {self.node}' if self.position is None else list(self.position)}"
+
+    @property
+    def as_robot(self) -> Robot:
+        """A robot that gives way and carries as much."""
+        payload = math.nextafter(math.inf, 0) if self.capacity is None else self.capacity
+        return Robot(name=self.label, payload=payload, stiffness=self.stiffness)
+
+
+def _unit(where: str, values: Iterable[float]) -> Vector:
+    """Return a direction as a unit vector."""
+    x, y, z = vector(where, values)
+    size = math.hypot(x, y, z)
+    if not size > 0:
+        raise SceneError(f"{where} is {[x, y, z]}; give one that is not zero")
+    return x / size + 0.0, y / size + 0.0, z / size + 0.0  # no zero with a minus
+
+
+def settled_props(props: Sequence[Prop], bricks: Mapping[int, Brick]) -> tuple[Prop, ...]:
+    """Return props, those that are said by a position at the nodes next to these.
+
+    ``bricks``: by node.
+    """
+    out = tuple(p if p.position is None else _at_node(p, p.position, bricks) for p in props)
+    for i, prop in enumerate(out):
+        if prop.node not in bricks:
+            known = f"{min(bricks)} to {max(bricks)}"
+            raise SceneError(f"{prop.label}: there is no such node; give one of {known}")
+        if prop.node in [other.node for other in out[:i]]:
+            raise SceneError(f"{prop.label}: another one holds it; give each its own node")
+    return out
+
+
+def _at_node(prop: Prop, position: Vector, bricks: Mapping[int, Brick]) -> Prop:
+    """Return a prop at the node next to a position."""
+    away, node = min((math.dist(b.node_position(n), position), n) for n, b in bricks.items())
+    most = _NEAR * min(bricks[node].dimensions)
+    if away > most:
+        raise SceneError(
+            f"{prop.label}: the nearest node, {node}, is {away:.3g} m away; give a point at most "
+            f"{most:.3g} m from one"
+        )
+    return replace(prop, node=node, position=None)
+
+
+def centered(
+    bricks: Iterable[Brick], blocked: Sequence[int], stiffness: float | Vector | None
+) -> tuple[Prop, ...]:
+    """Return a prop for every brick, at a node that leaves the one at which it is placed free.
+
+    A brick of which no other node is free has none.
+    """
+    taken = {*blocked}
+    free = [[n for n in b.nodes if n not in taken and n != b.placing_node] for b in bricks]
+    return tuple(Prop(node=nodes[0], stiffness=stiffness) for nodes in free if nodes)

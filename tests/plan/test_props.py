@@ -1,0 +1,206 @@
+"""Plans with props: by brute force, judged, and with as few props as any needs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt import Prop
+from seqopt.errors import InfeasibleError, SolverError, StepError
+from seqopt.plan._fewest_props import fewest_props
+from seqopt.plan.judge._proof import Proof
+from seqopt.plan.judge._prop_rules import check_props, props_that_hold
+from seqopt.plan.judge.schedules import judge_schedule
+from seqopt.plan.solving import states_of
+from seqopt.responses.quantities import PROP_EXCESS
+from seqopt.sequence._rule_check import check_free
+from tests.brute_force import ONES, best_values
+from tests.builders import small_arch
+
+UP = (0.0, 0.0, 1.0)
+LOOSE = seqopt.FreeRules(least_grips=1)
+
+
+def free_nodes(scene):
+    nodes = (node for brick in scene.placed for node in brick.nodes)
+    return [node for node in nodes if node not in scene.blocked_nodes]
+
+
+def posed(scene, rules=LOOSE, aim="minmax,steps", **words):
+    engine = seqopt.make_engine("compliance", scene)
+    return seqopt.pose(engine, rules, ONES, aim, **words)
+
+
+def weak(count, payload, robots=2):
+    """An arch whose robots carry little, each reaching all."""
+    scene = small_arch(count)
+    return scene.with_robots(*(replace(r, payload=payload) for r in scene.robots[:robots]))
+
+
+@pytest.mark.parametrize("rules", [LOOSE, seqopt.FreeRules(), seqopt.FreeRules(newest="free")])
+@pytest.mark.parametrize("nodes", [(5,), (3, 8)])
+def test_the_best_plan_with_props_is_that_of_brute_force(rules, nodes):
+    scene = weak(4, 300.0).with_props(*(Prop(node=node) for node in nodes if node < 8))
+    engine = seqopt.make_engine("compliance", scene)
+    best = best_values(engine, rules, "minmax,steps")
+    if best is None:
+        with pytest.raises(InfeasibleError):
+            seqopt.solve(posed(scene, rules))
+        return
+    plan = seqopt.solve(posed(scene, rules))
+    assert plan.certificate.values == pytest.approx(best)
+    assert plan.certificate.gap == 0
+
+
+@pytest.mark.parametrize("payload", [45.0, 75.0, 120.0])
+def test_the_fewest_props_are_those_of_brute_force(payload):
+    scene = weak(5, payload)
+    nodes = free_nodes(scene)
+    found = fewest_props(posed(scene), [Prop(node=n) for n in nodes], seqopt.solve)
+    values = None
+    for count in range(3):
+        each = []
+        for chosen in combinations(nodes, count):
+            with_props = scene.with_props(*(Prop(node=n) for n in chosen))
+            each.append(best_values(seqopt.make_engine("compliance", with_props), LOOSE, "minmax"))
+        if any(each):
+            values = min(value for value in each if value is not None)
+            break
+    assert values is not None
+    assert found.count == count
+    assert found.plan.certificate.values[0] == pytest.approx(values[0])
+    assert found.proven
+    cut = found.described()
+    assert cut["solved"] + cut["cut"] == len(found.tried) <= cut["sets"]
+
+
+def test_the_tested_builds_need_props():
+    """The control of the test above: none, some, and different numbers of props are needed."""
+    nodes = free_nodes(weak(5, 1.0))
+    counts = [
+        fewest_props(posed(weak(5, payload)), [Prop(node=n) for n in nodes], seqopt.solve).count
+        for payload in (45.0, 120.0)
+    ]
+    assert counts[0] > counts[1]
+
+
+def test_no_props_of_any_number_help_a_robot_too_weak():
+    scene = weak(3, 1.0)
+    with pytest.raises(InfeasibleError, match="none of 4 sets of up to 2 props allows a plan"):
+        fewest_props(posed(scene), [Prop(node=3), Prop(node=4)], seqopt.solve)
+
+
+def test_what_stops_all_plans_is_the_same_for_sets_with_the_same_first_props():
+    """The claim that rules out sets together, for a later prop that could change nothing."""
+    scene = weak(5, 45.0)
+    stop = Proof(states_of(posed(scene))).stops_at()
+    assert stop is not None
+    for node in [n for brick in scene.placed[stop:] for n in brick.nodes]:
+        again = Proof(states_of(posed(scene.with_props(Prop(node=node))))).stops_at()
+        assert again == stop
+
+
+def test_one_robot_builds_on_centering():
+    scene = small_arch(5)
+    one = scene.with_robots(scene.robots[-1]).with_centering()
+    rules = seqopt.FreeRules(least_grips=0, newest="free")
+    plan = seqopt.solve(posed(one, rules))
+    assert [len(step.held) for step in plan.steps] == [1, 0] * 5
+    assert plan.certificate.gap == 0
+    assert plan.steps[-1].held == ()
+    assert plan.responses()["props"].tolist()[-1] == 0  # they are struck with the last grip
+
+
+def test_rules_count_props_as_grips():
+    scene = small_arch(4).with_props(Prop(node=3))
+    network = seqopt.build_network(scene)
+    plan = seqopt.solve(posed(scene, seqopt.FreeRules(newest="free")))
+    check_free(network, seqopt.FreeRules(newest="free"), plan.steps)
+    alone = [s for s in plan.steps if len(s.held) == 1 and s.bricks >= 2]
+    assert alone  # a robot and the prop are two grips
+    bare = seqopt.build_network(scene.with_props())
+    with pytest.raises(StepError, match="fewer than least_grips=2"):
+        check_free(bare, seqopt.FreeRules(newest="free"), plan.steps)
+
+
+def test_a_plan_whose_prop_is_missing_is_refused():
+    scene = weak(5, 120.0).with_props(Prop(node=5))
+    plan = seqopt.solve(posed(scene))
+    states = states_of(posed(scene.with_props()))
+    with pytest.raises((SolverError, StepError)):
+        judge_schedule(states, plan.selection, plan.steps)
+    judge_schedule(states_of(posed(scene)), plan.selection, plan.steps)  # the control
+
+
+def test_a_plan_whose_prop_pulls_is_refused_where_it_may_only_push():
+    scene = small_arch(5)
+    problem = posed(scene.with_props(Prop(node=5)))
+    plan = seqopt.solve(problem)
+    force = plan.props()["largest_force_N"][0]
+    up = [Prop(node=5, direction=UP)]
+    pull = [scene.with_props(Prop(node=5, direction=tuple(-x for x in UP)))]
+    pull += [scene.with_props(*up)]
+    engines = [seqopt.make_engine("compliance", each) for each in pull]
+    least = [seqopt.GivenSequence(each, plan.steps).props()["least_push_N"][0] for each in engines]
+    assert min(least) < -1e-2 * force  # it pulls in one of the ways
+    at = int(np.argmin(least))
+    with pytest.raises(SolverError, match="may only push"):
+        check_props(engines[at], plan.steps)
+    with pytest.raises(SolverError, match="may only push"):
+        judge_schedule(states_of(posed(pull[at])), plan.selection, plan.steps)
+    weakest = seqopt.make_engine("compliance", scene.with_props(Prop(node=5, capacity=0.5)))
+    with pytest.raises(SolverError, match=r"bears .* N of 0\.5 N"):
+        check_props(weakest, plan.steps)
+
+
+@pytest.mark.parametrize("loop", [False, True])
+def test_plans_keep_props_to_what_they_may_bear(loop):
+    """A limit of the states, and of candidates; without it the best plan does not keep to it."""
+    scene = small_arch(6)
+    node = next(n for n in scene.placed[3].nodes if n != scene.placed[3].placing_node)
+    found = {}
+    for way in (None, UP, (0.0, 0.0, -1.0)):
+        engine = seqopt.make_engine("compliance", scene.with_props(Prop(node=node, direction=way)))
+        moves = seqopt.three_robot_loop(engine.network) if loop else LOOSE
+        problem = seqopt.pose(engine, moves, ONES, () if loop else "minmax")
+        assert [limit.response for limit in problem.limits] == [PROP_EXCESS] * (way is not None)
+        try:
+            plan = seqopt.solve(problem)
+        except InfeasibleError:
+            continue
+        found[way] = plan
+        assert plan.responses()["prop_excess_N"].max() < 1e-2
+        check_props(engine, plan.steps)
+    assert found.keys() - {None}  # a plan keeps to it
+    assert all(plan.certificate.gap <= 1e-9 for plan in found.values())
+
+
+def test_the_judge_finds_the_props_that_hold_by_itself():
+    scene = small_arch(5).with_props(Prop(node=7, stiffness=1e6), Prop(node=4, capacity=80.0))
+    for bricks in range(1, 6):
+        for robots in (0, 1):
+            own = [number for number, _ in props_that_hold(scene, bricks, robots)]
+            assert own == [*scene.prop_numbers(bricks, held=bool(robots))]
+
+
+def test_scenarios_and_orders_go_with_props():
+    scene = weak(4, 300.0).with_props(Prop(node=5))
+    scenes = seqopt.scenarios(scene, count=3, seed=1)
+    over = seqopt.solve(posed(scene, scenarios=scenes))
+    alone = [
+        seqopt.solve(posed(each, aim="minmax")).certificate.values[0] for each in scenes.scenes
+    ]
+    assert over.certificate.values[0] >= max(alone) * (1 - 1e-9)
+    best = seqopt.solve(posed(scene, aim="minmax", orders="tied"))
+    assert best.certificate.values[0] <= seqopt.solve(posed(scene)).certificate.values[0] + 1e-9
+
+
+def test_props_make_plans_stand_dry():
+    scene = small_arch(5)
+    plan = seqopt.solve(posed(scene.with_props(Prop(node=5)), stands="dry"))
+    assert {verdict.value for verdict in plan.verdicts("dry")} == {"stands"}
+    assert np.isfinite(plan.certificate.bounds).all()
