@@ -112,7 +112,7 @@ def _wants_states(options: argparse.Namespace) -> bool:
     if options.schedule == FREE or options.aim or options.stands or options.order == SEARCH:
         return True
     named = getattr(options, "formulation", None)
-    return named is not None and find_formulation(named).on in (On.STATES, On.ORDERS)
+    return named is not None and find_formulation(named).on in (On.STATES, On.ORDERS, On.TIMES)
 
 
 def _criterion(options: argparse.Namespace, *, of_states: bool) -> Criterion | None:

@@ -179,7 +179,9 @@ class Plan(ShownBuild):
     def gap(self) -> float | None:
         """What is proven to be left between value and bound, over the value; None without proof."""
         early = isinstance(self.selection, StatePath) and self.selection.stopped
-        return None if self.certificate is None or early else self.certificate.gap
+        if self.certificate is None or (early and not isfinite(self.certificate.gap)):
+            return None
+        return self.certificate.gap
 
     @property
     def ended(self) -> End:
@@ -218,7 +220,9 @@ class Plan(ShownBuild):
             return Status.FEASIBLE
         if proof is None:
             return Status.UNPROVEN
-        judged_exact = isinstance(graph, States) and not (graph.budgets or graph.totals)
+        judged_exact = isinstance(graph, States) and not (
+            graph.budgets or graph.totals or graph.is_timed
+        )
         exact = judged_exact and self.formulation.kind is not FormulationKind.HEURISTIC
         if exact or proof.gap <= TOLERANCE:
             return Status.OPTIMAL
@@ -447,7 +451,7 @@ def _bounds(plan: Plan) -> dict[str, float | None]:
     proof, chosen = plan.certificate, plan.selection
     bounds: tuple[float, ...] = () if proof is None else proof.bounds
     if isinstance(chosen, StatePath):
-        early = proof is None or chosen.stopped
+        early = proof is None or (chosen.stopped and not isfinite(proof.gap))
         bounds = (chosen.bound if early else bounds)[: len(plan.states.aims)]
     found = plan._by_goal(bounds) if bounds else {}
     return {name: bound if isfinite(bound) else None for name, bound in found.items()}

@@ -26,6 +26,7 @@ from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import cut, reading_json, short
 from seqopt.scene._loads import Load
 from seqopt.scene.arm import Arm
+from seqopt.scene.durations import Durations
 from seqopt.scene.library.arch_form import ArchForm, arch, barrel_vault, chain
 from seqopt.scene.library.dome import DomeShape, dome
 from seqopt.scene.library.vault import VaultShape, herringbone_vault
@@ -351,6 +352,7 @@ def _scene_from_dict(document: dict[str, Any]) -> Scene:
             **robot
             | {"reach": _reach(robot.get("reach", {"kind": "anywhere"}))}
             | ({"arm": Arm(**robot["arm"])} if robot.get("arm") else {})
+            | ({"durations": Durations(**robot["durations"])} if robot.get("durations") else {})
         )
         for robot in content["robots"]
     ]
@@ -381,6 +383,10 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     names = {cls: kind for kind, cls in _REACHES.items()}
     for entry, robot in zip(document["robots"], scene.robots, strict=True):
         entry["reach"] = {"kind": names[type(robot.reach)], **entry["reach"]}
+        if robot.durations is None:
+            del entry["durations"]
+        elif robot.durations.speed is None:
+            del entry["durations"]["speed"]
         if robot.arm is None:
             del entry["arm"]
         else:

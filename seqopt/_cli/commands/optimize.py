@@ -228,7 +228,7 @@ def run(options: argparse.Namespace) -> Answer:
     formulation = as_formulation(options.formulation or usual(asked.problem))
     how = _how(options, formulation)
     assemble = time.perf_counter() - start
-    tell = options.tell if formulation.on is On.STATES else within(options.tell, limit)
+    tell = options.tell if formulation.on in (On.STATES, On.TIMES) else within(options.tell, limit)
 
     def choose(problem: Problem) -> Plan:
         return solve(problem, formulation, time_limit=limit, progress=tell, **how)

@@ -46,6 +46,32 @@ def steps_of(space: FreeSpace | ScheduleSpace, states: Sequence[Sequence[int]]) 
     return check_sequence(space.network.scene, out)
 
 
+def steps_in_hands(
+    space: FreeSpace | ScheduleSpace,
+    states: Sequence[Sequence[int]],
+    grips: Sequence[Sequence[int]],
+) -> tuple[Step, ...]:
+    """Return the same by the robots that grips say, places (one per robot), if they say any.
+
+    Raises `SolverError` if they are not those of the states.
+    """
+    steps = steps_of(space, states)
+    if not grips:
+        return steps
+    numbers = [None, *node_numbers(space.network)]
+    if [len(row) for row in grips] != [len(step.grips) for step in steps] or not all(
+        0 <= n < len(numbers) for row in grips for n in row
+    ):
+        raise SolverError("the grips of robots are none of this scene, or not of every state")
+    out = []
+    for step, row in zip(steps, grips, strict=True):
+        own = replace(step, grips=tuple(numbers[n] for n in row))
+        if {*own.held} != {*step.held}:
+            raise SolverError(f"step {step.number}: robots hold other nodes than its state says")
+        out.append(own)
+    return check_sequence(space.network.scene, out)
+
+
 def _scheduled_steps(space: ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:
     """Return the checked steps of states of a schedule, one for each of its steps."""
     rows = np.array([row[1:] for row in states if len(row) == space.robots + 1], dtype=np.int64)

@@ -12,7 +12,7 @@ from seqopt._showing import Shown
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, StepError
 from seqopt.graph.scenarios import engine_for, require_alike
 from seqopt.network.network import Network
 from seqopt.problem.criteria import RankSum
@@ -46,6 +46,7 @@ from seqopt.sequence._schedule_space import ScheduleSpace
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Grips
+from seqopt.sequence.timing import require_durations
 from seqopt.stability.assessment import Stability
 
 FREE_TITLE = "free schedule"
@@ -144,10 +145,22 @@ class States(Shown):
     @cached_property
     def space(self) -> FreeSpace | ScheduleSpace:
         """Its states and moves."""
-        parks = any(goal.measure is Measure.TRAVEL for goal in self.goals)
+        parks = self.parks
         if isinstance(self.rules, Schedule):
             return ScheduleSpace(self.network, self.rules, self.caps, parks)
-        return free_space(self.network, self.rules, self.caps, parks=parks)
+        return free_space(self.network, self.rules, self.caps, parks=parks, timed=self.is_timed)
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether it is asked how long the build takes."""
+        return any(goal.measure is Measure.MAKESPAN for goal in self.goals)
+
+    @property
+    def parks(self) -> bool:
+        """Whether it counts where a free robot was last: for its travel, or the time of it."""
+        robots = self.network.scene.robots
+        speeds = self.is_timed and any(r.durations and r.durations.speed for r in robots)
+        return speeds or any(goal.measure is Measure.TRAVEL for goal in self.goals)
 
     @cached_property
     def caps(self) -> Mapping[str, float]:
@@ -430,7 +443,7 @@ def build_states(
     if any(goal.of_states and not goal.response for goal in named):
         criterion = _of_states(engine, criterion)
     standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
-    return _asked(States(engine, rules, criterion, named, limits, standing))
+    return _asked(_in_time(States(engine, rules, criterion, named, limits, standing)))
 
 
 def within(problem: States, caps: Mapping[str, float]) -> States:
@@ -452,14 +465,14 @@ def within(problem: States, caps: Mapping[str, float]) -> States:
         if goal.measure is Measure.PEAK or (goal.of_states and not goal.response):
             raise ProblemError(
                 f"budget {goal}: it is no total of moves or of a response; give steps, regrips, "
-                "travel or sum(RESPONSE), or set a limit"
+                "travel, makespan or sum(RESPONSE), or set a limit"
             )
         if not 0 <= as_float(cap) < np.inf:
             raise ProblemError(f"budget {goal}={short(cap)}: give a number from 0")
     if problem.budgets:
         raise ProblemError("the problem has budgets already; give all of them at once")
     caps_of = tuple(float(cap) for cap in caps.values())
-    return replace(problem, goals=(*problem.goals, *goals), budgets=caps_of)
+    return _in_time(replace(problem, goals=(*problem.goals, *goals), budgets=caps_of))
 
 
 def over_scenarios(
@@ -486,6 +499,18 @@ def over_scenarios(
         require_alike(problem.network.scene, scene, number)
     engines = tuple(engine_for(problem.engine, scene) for scene in scenes)
     return replace(problem, scenarios=engines, over=over)
+
+
+def _in_time(problem: States) -> States:
+    """Return a problem; where it counts how long robots take, that must be known of all."""
+    if problem.is_timed:
+        scene, rules = problem.network.scene, problem.rules
+        free = isinstance(rules, FreeRules)
+        try:
+            require_durations(scene, rules.team(scene) if free else None)
+        except StepError as error:
+            raise ProblemError(f"{Measure.MAKESPAN.value}: {error}") from None
+    return problem
 
 
 def _asked(problem: States) -> States:

@@ -158,6 +158,7 @@ class On(Enum):
     SCENARIOS = "layers of candidates in many scenarios"
     STATES = "the states of a build"
     ORDERS = "the states of all orders"
+    TIMES = "the states of a build in time"
     FRONTS = "Pareto sets"
 
 
