@@ -1,24 +1,23 @@
 r"""How long a build takes, by constraint programming (CP-SAT): exact.
 
-A plan is a path through states, so a circuit with an arc from its end to the start, and a loop at
-every state that it does not pass. With :math:`y_a \in \{0, 1\}` for every act, which takes
-:math:`p_a` to be prepared and :math:`d_a` to be done, whole :math:`T_v` for when state :math:`v` is
-reached and :math:`\rho_{v r}` since when robot :math:`r` is free in it,
+A plan is a path through states, step by step. With :math:`y_{i a} \in \{0, 1\}` for every act that
+can be step :math:`i`, which takes :math:`p_a` to be prepared and :math:`d_a` to be done, whole
+:math:`T_i` for when the step ends and :math:`\rho_{i r}` since when robot :math:`r` is free after it,
 
 .. math::
 
-   \min \; C \quad\text{s.t.}\quad & \operatorname{circuit}(y), \qquad
-   y_a \Rightarrow T_w \ge T_v + d_a, \quad T_w \ge \rho_{v r} + p_a + d_a, \\
-   & y_a \Rightarrow \rho_{w s} \ge \rho_{v s} \; (s \text{ stays free}), \quad
-   \rho_{w s} \ge T_v + d_a \; (s \text{ lets go}), \qquad C \ge T_v \text{ at an end},
+   \min \; T_N \quad\text{s.t.}\quad & \text{what comes to a state leaves it, or ends there}, \qquad
+   \textstyle\sum_a y_{i a} \le 1, \qquad T_i \ge T_{i-1} + \sum_a d_a y_{i a}, \\
+   & r \text{ takes a grip} \Rightarrow T_i \ge \rho_{i-1, r} + \sum_a (p_a + d_a) \, y_{i a}, \\
+   & r \text{ stays free} \Rightarrow \rho_{i r} \ge \rho_{i-1, r}, \qquad
+   r \text{ lets go} \Rightarrow \rho_{i r} \ge T_i .
 
-for every act :math:`a` of robot :math:`r` from :math:`v` to :math:`w`. That no robot does two
-things at once follows, and is said as well, since it bounds what is left to decide: over the robots
-of a kind,
+That no robot does two things at once follows, and is said as well, since it bounds what is left to
+decide: over the robots of a kind,
 
 .. math::
 
-   \lvert K \rvert \, C \ge \sum_a y_a \bigl( d_a \, \#\{ r \in K \text{ holds or acts} \}
+   \lvert K \rvert \, T_N \ge \sum_{i, a} y_{i a} \bigl( d_a \, \#\{ r \in K \text{ holds or acts} \}
    + p_a \, [r_a \in K] \bigr) .
 
 Moves that are on no path which prices allow to end before the first plan are left out. Times are
@@ -34,16 +33,15 @@ from typing import Any
 import numpy as np
 
 from formulations.times._labels import Caps, Sweep
-from formulations.times._prices import useful
 from formulations.times._stages import Asked, Chosen, in_time
-from seqopt.arrays import Bools, Ints
+from seqopt.arrays import Ints
 from seqopt.errors import ExtraError, ProblemError
 from seqopt.graph.paths import distances
-from seqopt.graph.timed import NOW
-from seqopt.plan.calling.formulation import FormulationKind
+from seqopt.graph.timed import HELD, NOW
+from seqopt.plan.calling.formulation import FormulationKind, Watch
 
 FINEST = 1000  # parts of a second
-OFTEN = 1000  # acts after which it is asked whether time is over
+WORKERS = 8  # ways to search that take turns
 
 
 def _solver() -> ModuleType:
@@ -59,113 +57,189 @@ def _solver() -> ModuleType:
 
 @dataclass(frozen=True, eq=False)
 class _Scaled:
-    """Acts of the moves that are left, in whole parts of a second.
+    """What acts take, in whole parts of a second.
 
-    ``act`` (a,): numbers of acts; ``prepares``, ``acts`` (a,): what they take; ``parts``: of a
-    second; ``slack``: by how much a build may be shorter than its parts say, s.
+    ``prepares``, ``acts`` (a,): what they take; ``parts``: of a second; ``slack``: by how much a
+    build may be longer than its parts say, s.
     """
 
-    act: Ints
     prepares: Ints
     acts: Ints
     parts: int
     slack: float
 
 
-def _scaled(asked: Asked, kept: Bools) -> _Scaled:
+def _scaled(asked: Asked, steps: int) -> _Scaled:
+    """Return what acts take, rounded down where it is no whole number; of builds of such steps."""
     timed = asked.timed
-    act = np.flatnonzero(kept[timed.move])
-    move = timed.move[act]
-    times = np.stack([timed.prepares[move], timed.acts[move]])
+    times = np.stack([timed.prepares[timed.move], timed.acts[timed.move]])
     for parts in (1, 2, 10, 100, FINEST):
         whole = np.rint(times * parts)
         if np.allclose(whole, times * parts, rtol=0.0, atol=1e-9):
-            return _Scaled(act, *whole.astype(np.int64), parts, 0.0)
-    steps = int(timed.graph.states)
-    longest = min(steps, 20 * int(timed.levels.max() + 1))
-    return _Scaled(act, *np.floor(times * FINEST).astype(np.int64), FINEST, 2 * longest / FINEST)
+            return _Scaled(*whole.astype(np.int64), parts, 0.0)
+    return _Scaled(*np.floor(times * FINEST).astype(np.int64), FINEST, 2.0 * steps / FINEST)
+
+
+@dataclass(frozen=True, eq=False)
+class _Layers:
+    """Which moves can be the first, second, … of a build that ends before some time.
+
+    ``moves`` (tuple of (m_i,) int): by how many were taken before.
+    """
+
+    moves: tuple[Ints, ...]
+
+
+def _layers(asked: Asked, most: float) -> _Layers:
+    """Return moves by how many were taken before, as far as prices leave room for them."""
+    timed, graph = asked.timed, asked.timed.graph
+    move = np.flatnonzero(asked.kept)
+    source, target = graph.source[move], graph.target[move]
+    costs = [timed.work[move] @ each for each in asked.prices.each]
+    before = [np.where(np.arange(graph.states) == 0, 0.0, np.inf) for _ in costs]
+    slack, found = 1e-9 * abs(most), list[Ints]()
+    while True:
+        room = np.ones(len(move), dtype=bool)
+        sums = [own[source] + cost for own, cost in zip(before, costs, strict=True)]
+        for total, left in zip(sums, asked.prices.left, strict=True):
+            room &= total + left[target] <= most + slack
+        if not room.any():
+            break
+        found.append(np.flatnonzero(room))
+        before = [np.full(graph.states, np.inf) for _ in costs]
+        for own, total in zip(before, sums, strict=True):
+            np.minimum.at(own, target[room], total[room])
+    on, out = graph.ends.copy(), list[Ints]()
+    for rows in reversed(found):
+        rows = rows[on[target[rows]]]
+        out.append(move[rows])
+        on = graph.ends.copy()
+        on[source[rows]] = True
+    return _Layers(tuple(out[::-1]))
 
 
 class _Program:
     """The program of a build in time that is to end before a first one."""
 
-    def __init__(self, asked: Asked, cp: ModuleType, kept: Bools, scaled: _Scaled) -> None:
-        self._asked, self._kept, self._scaled, self._cp = asked, kept, scaled, cp
+    def __init__(self, asked: Asked, cp: ModuleType, scaled: _Scaled, most: float) -> None:
+        self._asked, self._scaled, self._cp, self._most = asked, scaled, cp, most
         self._model: Any = cp.CpModel()
-        timed = asked.timed
-        most = asked.first.value if asked.first.path else asked.caps.time
-        most = min(most, asked.caps.time, float(timed.work[:, 0].sum() + timed.prepares.sum()))
-        self._most = int(np.floor(most * scaled.parts + 1e-6))
-        better = 1 if asked.first.path and most == asked.first.value else 0
-        self._end = self._model.new_int_var(0, self._most - better, "")
-        graph = timed.graph.only(kept)
-        acts = timed.acts[kept] * scaled.parts
-        self._soon = np.floor(distances(graph, acts))
-        self._late = self._most - np.floor(distances(graph, acts, back=True))
+        self.taken: list[tuple[Any, int]] = []  # whether a move is taken, and which
 
-    def build(self) -> bool:
+    def build(self, layers: _Layers) -> bool:
         """Write the program down; return whether time was not over before it was done."""
-        timed, model, scaled = self._asked.timed, self._model, self._scaled
-        used = np.isfinite(self._soon) & (self._soon <= self._late)
-        self._when = {v: self._time(v) for v in np.flatnonzero(used).tolist()}
-        self._since: dict[tuple[int, int], Any] = {
-            (v, c): model.new_int_var(0, self._most, "")
-            for v in self._when
-            for c in np.flatnonzero(timed.free[v]).tolist()
-        }
-        model.add(self._when[0] == 0)
-        self.taken = [model.new_bool_var("") for _ in scaled.act]
-        arcs = []
-        for number, act in enumerate(scaled.act.tolist()):
-            if number % OFTEN == 0 and self._asked.watch.over:
+        timed, model = self._asked.timed, self._model
+        columns = range(timed.free.shape[1])
+        parts = self._scaled.parts
+        better = 1 if self._asked.first.path else 0
+        last = int(np.floor(self._most * parts + 1e-6)) - better
+        now, since = model.new_constant(0), [model.new_constant(0) for _ in columns]
+        here: dict[int, list[Any]] = {0: [model.new_constant(1)]}
+        over: list[Any] = []  # whether the build is over by then
+        self._end = model.new_int_var(0, last, "end")
+        soon, left = self._around()
+        first = np.searchsorted(timed.move, np.arange(len(timed.graph.source) + 1))
+        for moves in layers.moves:
+            if self._asked.watch.over:
                 return False
-            move = int(timed.move[act])
-            pair = int(timed.graph.source[move]), int(timed.graph.target[move])
-            if {*pair} <= self._when.keys():
-                arcs.append((*pair, self.taken[number]))
-                self._take(number, act, pair)
-            else:
-                model.add(self.taken[number] == 0)
-        for v in self._when:
-            if v:
-                arcs.append((v, v, model.new_bool_var("")))
-            if timed.graph.ends[v]:
-                over = model.new_bool_var("")
-                arcs.append((v, 0, over))
-                model.add(self._end >= self._when[v]).only_enforce_if(over)
-        model.add_circuit(arcs)
+            acts = np.concatenate([np.arange(first[m], first[m + 1]) for m in moves.tolist()])
+            taken = [model.new_bool_var("") for _ in acts]
+            self.taken += [*zip(taken, timed.move[acts].tolist(), strict=True)]
+            source = timed.graph.source[timed.move[acts]].tolist()
+            target = timed.graph.target[timed.move[acts]].tolist()
+            ended = [model.new_bool_var("") for _ in [v for v in here if timed.graph.ends[v]]]
+            self._conserve(here, source, (taken, ended))
+            over += ended
+            model.add(sum(taken) + sum(over) == 1)
+            after = model.new_int_var(0, last, "")
+            fresh = [model.new_int_var(0, last, "") for _ in columns]
+            self._pass_on((now, since), (after, fresh), acts, taken)
+            model.add(after >= sum(t * y for t, y in zip(soon[target], taken, strict=True)))
+            rest = sum(t * y for t, y in zip(left[target], taken, strict=True))
+            model.add(self._end >= after + rest)
+            now, since, here = after, fresh, {}
+            for v, each in zip(target, taken, strict=True):
+                here.setdefault(v, []).append(each)
+        ended = [model.new_bool_var("") for _ in [v for v in here if timed.graph.ends[v]]]
+        self._conserve(here, [], ([], ended))
+        model.add(self._end >= now)
         self._share()
         model.minimize(self._end)
         return True
 
-    def _time(self, v: int) -> Any:
-        return self._model.new_int_var(int(self._soon[v]), int(self._late[v]), "")
+    def _around(self) -> tuple[Ints, Ints]:
+        """Return when states are reached at the earliest, and what is left after them at least.
 
-    def _take(self, number: int, act: int, pair: tuple[int, int]) -> None:
-        """Say what follows from an act."""
-        before, after = pair
-        model, taken, timed = self._model, self.taken[number], self._asked.timed
-        own, column = int(self._scaled.acts[number]), int(timed.column[act])
-        when = self._when[after]
-        model.add(when >= self._when[before] + own).only_enforce_if(taken)
-        if column >= 0:
-            ready = self._since[before, column] + int(self._scaled.prepares[number])
-            model.add(when >= ready + own).only_enforce_if(taken)
-        for c, origin in enumerate(timed.origin[act].tolist()):
-            if origin == NOW:
-                now = self._when[before] + own
-                model.add(self._since[after, c] >= now).only_enforce_if(taken)
-            elif origin >= 0:
-                since = self._since[after, c] >= self._since[before, origin]
-                model.add(since).only_enforce_if(taken)
+        Both follow from prices: nobody is free for longer before than a preparation takes.
+        """
+        timed, prices, parts = self._asked.timed, self._asked.prices, self._scaled.parts
+        graph = timed.graph.only(self._asked.kept)
+        soon, left = np.zeros(graph.states), np.zeros(graph.states)
+        for each, rest in zip(prices.each, prices.left, strict=True):
+            before = distances(graph, timed.work[self._asked.kept] @ each)
+            ahead = timed.free @ (each[1:][timed.kinds] * timed.longest)
+            soon = np.maximum(soon, np.where(np.isfinite(before), before, 0.0))
+            left = np.maximum(left, np.where(np.isfinite(rest), rest - ahead, 0.0))
+        less = self._scaled.slack  # what rounding down may have taken
+        whole = (np.ceil((own - less) * parts - 1e-6).clip(min=0.0) for own in (soon, left))
+        first, then = (own.astype(np.int64) for own in whole)
+        return first, then
+
+    def _conserve(
+        self, here: dict[int, list[Any]], source: list[int], out: tuple[list[Any], list[Any]]
+    ) -> None:
+        """Say that what comes to a state leaves it, or the build is over there."""
+        taken, ended = out
+        leave: dict[int, list[Any]] = {}
+        for v, each in zip(source, taken, strict=True):
+            leave.setdefault(v, []).append(each)
+        ends = [v for v in here if self._asked.timed.graph.ends[v]]
+        for v, each in zip(ends, ended, strict=True):
+            leave.setdefault(v, []).append(each)
+        for v, come in here.items():
+            self._model.add(sum(come) == sum(leave.get(v, [])))
+
+    def _pass_on(
+        self,
+        before: tuple[Any, list[Any]],
+        after: tuple[Any, list[Any]],
+        acts: Ints,
+        taken: list[Any],
+    ) -> None:
+        """Say when a step ends, and since when robots are free after it."""
+        timed, model, scaled = self._asked.timed, self._model, self._scaled
+        (now, since), (then, fresh) = before, after
+        column, origin = timed.column[acts], timed.origin[acts]
+        own = scaled.acts[acts].tolist()
+        model.add(then >= now + sum(a * y for a, y in zip(own, taken, strict=True)))
+        both = (scaled.acts + scaled.prepares)[acts].tolist()
+        for c in range(len(since)):
+            mine = np.flatnonzero(column == c).tolist()
+            if mine:
+                is_own = self._any(mine, taken)
+                length = sum(both[i] * taken[i] for i in mine)
+                model.add(then >= since[c] + length).only_enforce_if(is_own)
+            for o in np.unique(origin[:, c]).tolist():
+                if o == HELD:
+                    continue
+                is_from = self._any(np.flatnonzero(origin[:, c] == o).tolist(), taken)
+                what = then if o == NOW else since[o]
+                model.add(fresh[c] >= what).only_enforce_if(is_from)
+
+    def _any(self, which: list[int], taken: list[Any]) -> Any:
+        """Return whether one of some acts is taken: no more than one of a step is."""
+        out = self._model.new_bool_var("")
+        self._model.add(sum(taken[i] for i in which) == out)
+        return out
 
     def _share(self) -> None:
         """Say that no robot does two things at once, and that sums stay within caps."""
         model, timed, scaled = self._model, self._asked.timed, self._scaled
-        move = timed.move[scaled.act]
+        move = np.array([m for _, m in self.taken], dtype=np.int64)
+        taken = [each for each, _ in self.taken]
         for k, size in enumerate(timed.sizes.tolist()):
             work = np.floor(timed.work[move, k] * scaled.parts + 1e-9).astype(np.int64).tolist()
-            model.add(sum(w * t for w, t in zip(work, self.taken, strict=True)) <= size * self._end)
+            model.add(sum(w * t for w, t in zip(work, taken, strict=True)) <= size * self._end)
         for column, cap in self._asked.caps.sums:
             each = timed.graph.amounts[move, column]
             if not np.array_equal(each, np.rint(each)):
@@ -174,26 +248,26 @@ class _Program:
                     "take makespan_labels"
                 )
             whole = each.astype(np.int64).tolist()
-            model.add(sum(w * t for w, t in zip(whole, self.taken, strict=True)) <= int(cap))
+            model.add(sum(w * t for w, t in zip(whole, taken, strict=True)) <= int(cap))
 
-    def solve(self) -> tuple[Bools, float, bool]:
-        """Return which acts are taken, what no build stays below, s, and whether it is proven.
+    def solve(self) -> tuple[Ints, float, bool]:
+        """Return which moves are taken, what no build stays below, s, and whether that is proven.
 
         None are where no build is better.
         """
         solver: Any = self._cp.CpSolver()
         if np.isfinite(self._asked.watch.left):
             solver.parameters.max_time_in_seconds = max(0.01, self._asked.watch.left)
-        solver.parameters.num_workers = 1  # the same answer every time
-        solver.parameters.linearization_level = 2
+        solver.parameters.num_workers = WORKERS
+        solver.parameters.interleave_search = True  # the same answer every time
         ended = solver.solve(self._model)
-        none = np.zeros(len(self.taken), dtype=bool)
+        none = np.zeros(0, dtype=np.int64)
         if ended == self._cp.INFEASIBLE:
             return none, np.inf, True
         bound = solver.best_objective_bound / self._scaled.parts - self._scaled.slack
         if ended not in (self._cp.OPTIMAL, self._cp.FEASIBLE):
             return none, bound, False
-        found = np.array([solver.boolean_value(each) for each in self.taken])
+        found = np.array([m for each, m in self.taken if solver.boolean_value(each)])
         return found, bound, ended == self._cp.OPTIMAL
 
 
@@ -201,15 +275,17 @@ def _least(asked: Asked) -> Chosen:
     """Return the path of least makespan."""
     cp, first = _solver(), asked.first
     most = min(first.value, asked.caps.time)
-    kept = useful(asked.timed, asked.prices, asked.kept, most) if np.isfinite(most) else asked.kept
-    scaled = _scaled(asked, kept)
-    program = _Program(asked, cp, kept, scaled)
-    if not program.build():
+    if not np.isfinite(most):
+        return first._replace(late=True)  # nothing says how long builds may take
+    layers = _layers(asked, most)
+    scaled = _scaled(asked, len(layers.moves))
+    program = _Program(asked, cp, scaled, most)
+    if not program.build(layers):
         return first._replace(late=True)
-    taken, bound, done = program.solve()
+    moves, bound, done = program.solve()
     bound = max(bound, asked.prices.bound)
-    if taken.any():
-        first = _path(asked, asked.timed.move[scaled.act[taken]])
+    if len(moves):
+        first = min(first, _path(asked, moves), key=lambda each: each.value)
     if done and scaled.slack == 0.0:
         bound = first.value
     return Chosen(first.path, first.value, min(bound, first.value), late=not done)
@@ -220,7 +296,7 @@ def _path(asked: Asked, moves: Ints) -> Chosen:
     kept = np.zeros(len(asked.kept), dtype=bool)
     kept[moves] = True
     caps = Caps(sums=asked.caps.sums)
-    swept = Sweep(asked.timed, asked.prices, kept, caps).run(asked.watch)
+    swept = Sweep(asked.timed, asked.prices, kept, caps).run(Watch())
     return Chosen(swept.path, swept.best, asked.prices.bound)
 
 

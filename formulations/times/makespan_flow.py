@@ -26,7 +26,7 @@ from formulations.times._labels import Caps, Sweep
 from formulations.times._prices import useful
 from formulations.times._stages import Asked, Chosen, in_time
 from seqopt.arrays import Bools
-from seqopt.plan.calling.formulation import FormulationKind
+from seqopt.plan.calling.formulation import FormulationKind, Watch
 
 
 def _bounded(asked: Asked) -> Chosen:
@@ -66,7 +66,7 @@ def _bounded(asked: Asked) -> Chosen:
 def _path(asked: Asked, kept: Bools) -> Chosen:
     """Return the path of some moves with its makespan."""
     caps = Caps(sums=asked.caps.sums)
-    swept = Sweep(asked.timed, asked.prices, kept, caps).run(asked.watch)
+    swept = Sweep(asked.timed, asked.prices, kept, caps).run(Watch())
     return Chosen(swept.path, swept.best, asked.prices.bound)
 
 

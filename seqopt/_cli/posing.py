@@ -6,7 +6,7 @@ import argparse
 from dataclasses import dataclass, replace
 from typing import Any
 
-from seqopt._cli.asked import asked_engine, asked_scene
+from seqopt._cli.asked import asked_engine, asked_scene, in_seconds
 from seqopt._cli.outputs import require_out
 from seqopt._cli.values import (
     asked_criterion,
@@ -86,6 +86,8 @@ def asked_problem(options: argparse.Namespace) -> Asked:
         scene = without_arms(scene)  # bases are chosen afterwards
     if options.robots.isdecimal():
         scene = with_robots(scene, int(options.robots))
+    if getattr(options, "durations", ()):
+        scene = in_seconds(options, scene)
     find_postures(scene, getattr(options, "cache", None), options.tell)
     words: dict[str, Any] = {"limits": parse_limits(options.limit, scene)}
     budgets = getattr(options, "budget", [])
