@@ -15,8 +15,8 @@ import numpy as np
 
 from formulations.times._prices import Prices
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.graph._timed import HELD, NOW, TimedGraph
 from seqopt.graph.paths import distances
-from seqopt.graph.timed import HELD, NOW, TimedGraph
 from seqopt.plan.calling.formulation import Watch
 
 STEPS = -1  # the column that counts moves
@@ -44,16 +44,23 @@ class Labels(NamedTuple):
 
     def only(self, rows: Ints | Bools) -> Labels:
         """Return some of them."""
-        return Labels(*(part[rows] for part in self))
+        every = (self.state[rows], self.end[rows], self.since[rows])
+        return Labels(*every, self.sums[rows], self.before[rows])
 
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         """How many there are."""
         return len(self.state)
 
 
 def _joined(parts: Sequence[Labels]) -> Labels:
-    return Labels(*map(np.concatenate, zip(*parts, strict=True)))
+    return Labels(
+        np.concatenate([part.state for part in parts]),
+        np.concatenate([part.end for part in parts]),
+        np.concatenate([part.since for part in parts]),
+        np.concatenate([part.sums for part in parts]),
+        np.concatenate([part.before for part in parts]),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,39 +125,44 @@ class Sweep:
         any number.
         """
         caps = np.array([self._caps.time, *(cap for _, cap in self._caps.sums)])
-        aim = 0 if goal is None else 1 + goal
-        found, every, count = Swept(), list[Labels](), 0
-        pending: dict[int, list[Labels]] = {int(self._timed.levels[0]): [self._first()]}
-        best = -1
-        for level in range(int(self._timed.levels.max()) + 1):
-            front = pending.pop(level, [])
+        aim, found, count = 0 if goal is None else 1 + goal, Swept(), 0
+        levels, best = self._timed.levels, -1
+        pending: dict[int, list[Labels]] = {int(levels[0]): [self._first()]}
+        for level in range(int(levels.max()) + 1):
             here: list[Labels] = []
-            while front:
-                fresh = self._undominated(_joined(front), here)
-                fresh, least = self._within(fresh, caps, aim)
-                found.left_out = min(found.left_out, least)
-                if width is not None and fresh.count > width:
-                    order = np.argsort(self._bounds(fresh)[:, aim], kind="stable")
-                    fresh, found.narrow = fresh.only(np.sort(order[:width])), True
-                front = []
-                if not fresh.count:
-                    break
-                every.append(fresh)
+            while level in pending:
+                fresh = self._fresh(pending.pop(level), here, (caps, aim, width), found)
                 here.append(fresh)
+                found.kept.append(fresh)
                 value, at = self._at_end(fresh, aim)
                 if value < found.best:
                     found.best, best = value, count + at
                     caps[aim] = min(caps[aim], value * (1 - MARGIN))
-                if watch.over or 0 < most < count + fresh.count:
+                if watch.over or 0 < most < count + fresh.size:
                     raise LateError
                 for after in self._continued(fresh, count):
-                    levels = self._timed.levels[after.state]
-                    for to in np.unique(levels).tolist():
-                        part = after.only(levels == to)
-                        (front if to == level else pending.setdefault(to, [])).append(part)
-                count += fresh.count
-        found.kept, found.path = every, self._path(every, best)
+                    to = levels[after.state]
+                    for further in np.unique(to).tolist():
+                        pending.setdefault(further, []).append(after.only(to == further))
+                count += fresh.size
+        found.path = self._path(found.kept, best)
         return found
+
+    def _fresh(
+        self,
+        met: Sequence[Labels],
+        here: Sequence[Labels],
+        how: tuple[Floats, int, int | None],
+        found: Swept,
+    ) -> Labels:
+        """Return labels that are continued, of those met; note what is left out."""
+        caps, aim, width = how
+        fresh, least = self._within(self._undominated(_joined(met), here), caps, aim)
+        found.left_out = min(found.left_out, least)
+        if width is not None and fresh.size > width:
+            order = np.argsort(self._bounds(fresh)[:, aim], kind="stable")
+            fresh, found.narrow = fresh.only(np.sort(order[:width])), True
+        return fresh
 
     def _first(self) -> Labels:
         columns = self._timed.free.shape[1]
@@ -168,13 +180,16 @@ class Sweep:
     def _within(self, labels: Labels, caps: Floats, aim: int) -> tuple[Labels, float]:
         """Return labels within caps, and the least that others take of what is minimized."""
         bounds = self._bounds(labels)
-        ok = np.isfinite(bounds).all(axis=1) & (bounds <= caps + MARGIN * np.abs(caps)).all(axis=1)
+        most = caps + MARGIN * np.abs(caps)
+        ok = np.asarray((np.isfinite(bounds) & (bounds <= most)).all(axis=1))
         return labels.only(ok), float(bounds[~ok, aim].min(initial=np.inf))
 
     def _at_end(self, labels: Labels, aim: int) -> tuple[float, int]:
         """Return the least value of labels at ends, and which it is."""
         values = labels.end if aim == 0 else labels.sums[:, aim - 1]
         values = np.where(self._timed.graph.ends[labels.state], values, np.inf)
+        if not len(values):
+            return np.inf, 0
         at = int(np.argmin(values))
         return float(values[at]), at
 
@@ -182,14 +197,14 @@ class Sweep:
         """Return what follows from labels, numbered from ``first``, by one act each."""
         out, counts = list[Labels](), np.diff(self._starts)[labels.state]
         cuts = np.searchsorted(np.cumsum(counts), np.arange(0, counts.sum() + CHUNK, CHUNK)[1:])
-        for rows in np.split(np.arange(labels.count), np.unique(cuts)):
-            if len(rows):
+        for rows in np.split(np.arange(labels.size), np.unique(cuts)):
+            if len(rows) and counts[rows].any():
                 out.append(self._acted(labels.only(rows), counts[rows], first + rows))
         return out
 
     def _acted(self, labels: Labels, counts: Ints, numbers: Ints) -> Labels:
         """Return what follows from labels by one act each."""
-        row = np.repeat(np.arange(labels.count), counts)
+        row = np.repeat(np.arange(labels.size), counts)
         firsts = np.repeat(self._starts[labels.state] - np.cumsum(counts) + counts, counts)
         act = firsts + np.arange(len(row))
         move, column = self._move[act], self._column[act]
@@ -212,17 +227,19 @@ class Sweep:
             for column in range(since.shape[1] - 1):
                 swap = self._timed.alike[state, column] & (since[:, column] > since[:, column + 1])
                 rows = np.flatnonzero(swap)
-                since[rows[:, None], [column, column + 1]] = since[rows[:, None], [column + 1, column]]
+                since[rows[:, None], [column, column + 1]] = since[
+                    rows[:, None], [column + 1, column]
+                ]
 
     def _undominated(self, fresh: Labels, known: Sequence[Labels]) -> Labels:
         """Return the labels that no known one, and no other, is nowhere above."""
         states = np.zeros(self._timed.graph.states, dtype=bool)
         states[fresh.state] = True
         old = [labels.only(states[labels.state]) for labels in known]
-        count = sum(labels.count for labels in old)
+        count = sum(labels.size for labels in old)
         every = _joined([*old, fresh])
         keys = np.column_stack([every.end, every.since, every.sums])
-        new = np.arange(every.count) >= count  # of equal ones the known one comes first
+        new = np.arange(every.size) >= count  # of equal ones the known one comes first
         order = np.lexsort((new, *keys.T[::-1], every.state))
         state, keys = every.state[order], keys[order]
         beaten = np.zeros(len(order), dtype=bool)

@@ -14,9 +14,9 @@ import numpy as np
 from scipy.optimize import linprog
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.graph._timed import TimedGraph
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, fewest_moves
-from seqopt.graph.timed import TimedGraph
 from seqopt.plan.calling.formulation import Watch
 
 ROUNDS = 25  # of cutting planes
@@ -91,7 +91,7 @@ def _cheapest(graph: Graph, work: Floats, prices: Floats) -> tuple[Floats, tuple
 def _moves_of(graph: Graph, path: tuple[int, ...]) -> Ints:
     codes = graph.source.astype(np.int64) * graph.states + graph.target
     wanted = np.array((0, *path[:-1])) * graph.states + np.array(path)
-    return np.searchsorted(codes, wanted)
+    return np.asarray(np.searchsorted(codes, wanted))
 
 
 def _highest(planes: Floats, sizes: Floats) -> tuple[Floats, float]:
@@ -107,6 +107,8 @@ def _highest(planes: Floats, sizes: Floats) -> tuple[Floats, float]:
         bounds=[(0.0, None)] * dims + [(None, None)],
         method="highs",
     )
+    if found.x is None or found.fun is None:
+        return 1 / (dims * sizes), np.inf
     prices = np.maximum(found.x[:-1], 0.0)
     return prices / (prices @ sizes), float(-found.fun)
 

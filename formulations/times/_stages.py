@@ -28,17 +28,17 @@ from formulations.times._prices import Prices, best_prices
 from seqopt.arrays import Bools, Terse
 from seqopt.errors import InfeasibleError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
+from seqopt.graph._timed import LabelProof, TimedGraph, timed_graph
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, keep_best, reached, tied
 from seqopt.graph.states._visits import FreeStates, steps_of
 from seqopt.graph.states.states import States
-from seqopt.graph.timed import LabelProof, TimedGraph, timed_graph
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.problem.problem import Measure
 from seqopt.sequence._reassign import reassigned_steps
 from seqopt.sequence._rule_space import FreeSpace, node_numbers
-from seqopt.sequence.timing import step_times
+from seqopt.sequence._timing import step_times
 from seqopt.work.progress import Tell
 
 BEAMS = (100, 1000, 5000)  # widths of the searches for a first path
@@ -93,7 +93,12 @@ class _Stage:
 
 
 def beams(
-    timed: TimedGraph, kept: Bools, caps: Caps, prices: Prices, watch: Watch, goal: int | None = None
+    timed: TimedGraph,
+    kept: Bools,
+    caps: Caps,
+    prices: Prices,
+    watch: Watch,
+    goal: int | None = None,
 ) -> Swept:
     """Return a good path within caps, by ever wider searches; none of it where none is found."""
     best = Swept()
@@ -366,7 +371,13 @@ def _plan(problem: States, visited: Visited, stages: Stages, found: _Stage) -> S
     hint = tuple(rows for *_, rows in visited.states)
     late = "time" if found.late else ""
     return StatePath(
-        states, tuple(values), tuple(bounds), hint, stopped=late, grips=grips, proofs=(*found.proofs,)
+        states,
+        tuple(values),
+        tuple(bounds),
+        hint,
+        stopped=late,
+        grips=grips,
+        proofs=(*found.proofs,),
     )
 
 
@@ -402,4 +413,3 @@ def _by_then(
 def in_time(name: str, summary: str, kind: FormulationKind, choose: Choose) -> Formulation:
     """Return the formulation of time that chooses a path by a function of an `Asked`."""
     return Formulation(name, summary, kind, None, _InTime(choose), on=On.TIMES, takes_budgets=True)
-

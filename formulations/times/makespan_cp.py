@@ -2,7 +2,7 @@ r"""How long a build takes, by constraint programming (CP-SAT): exact.
 
 A plan is a path through states, step by step. With :math:`y_{i a} \in \{0, 1\}` for every act that
 can be step :math:`i`, which takes :math:`p_a` to be prepared and :math:`d_a` to be done, whole
-:math:`T_i` for when the step ends and :math:`\rho_{i r}` since when robot :math:`r` is free after it,
+:math:`T_i` for when the step ends and :math:`\rho_{i r}` since when robot :math:`r` is free then,
 
 .. math::
 
@@ -17,8 +17,8 @@ decide: over the robots of a kind,
 
 .. math::
 
-   \lvert K \rvert \, T_N \ge \sum_{i, a} y_{i a} \bigl( d_a \, \#\{ r \in K \text{ holds or acts} \}
-   + p_a \, [r_a \in K] \bigr) .
+   \lvert K \rvert \, T_N \ge \sum_{i, a} y_{i a}
+   \bigl( d_a \, \#\{ r \in K \text{ holds or acts} \} + p_a \, [r_a \in K] \bigr) .
 
 Moves that are on no path which prices allow to end before the first plan are left out. Times are
 whole numbers of milliseconds at the most; where durations are not, bounds give way by as much.
@@ -36,8 +36,8 @@ from formulations.times._labels import Caps, Sweep
 from formulations.times._stages import Asked, Chosen, in_time
 from seqopt.arrays import Ints
 from seqopt.errors import ExtraError, ProblemError
+from seqopt.graph._timed import HELD, NOW
 from seqopt.graph.paths import distances
-from seqopt.graph.timed import HELD, NOW
 from seqopt.plan.calling.formulation import FormulationKind, Watch
 
 FINEST = 1000  # parts of a second
@@ -76,8 +76,9 @@ def _scaled(asked: Asked, steps: int) -> _Scaled:
     for parts in (1, 2, 10, 100, FINEST):
         whole = np.rint(times * parts)
         if np.allclose(whole, times * parts, rtol=0.0, atol=1e-9):
-            return _Scaled(*whole.astype(np.int64), parts, 0.0)
-    return _Scaled(*np.floor(times * FINEST).astype(np.int64), FINEST, 2.0 * steps / FINEST)
+            return _Scaled(whole[0].astype(np.int64), whole[1].astype(np.int64), parts, 0.0)
+    less = np.floor(times * FINEST).astype(np.int64)
+    return _Scaled(less[0], less[1], FINEST, 2.0 * steps / FINEST)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,8 +111,8 @@ def _layers(asked: Asked, most: float) -> _Layers:
         for own, total in zip(before, sums, strict=True):
             np.minimum.at(own, target[room], total[room])
     on, out = graph.ends.copy(), list[Ints]()
-    for rows in reversed(found):
-        rows = rows[on[target[rows]]]
+    for every in reversed(found):
+        rows = every[on[target[every]]]
         out.append(move[rows])
         on = graph.ends.copy()
         on[source[rows]] = True

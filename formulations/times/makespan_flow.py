@@ -51,9 +51,7 @@ def _bounded(asked: Asked) -> Chosen:
     right[0] = 1.0
     right[graph.states + len(shares) :] = [cap for _, cap in asked.caps.sums]
     cost = np.eye(1, count + 1, count)[0]
-    found = minimize_rows(
-        cost, rows, right, watch=watch, whole=count, equations=graph.states
-    )
+    found = minimize_rows(cost, rows, right, watch=watch, whole=count, equations=graph.states)
     bound = max(asked.prices.bound, scale * found.bound * (1 - 1e-9))
     taken = found.values[: len(moves)] > 0.5
     if taken.any():

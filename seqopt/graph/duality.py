@@ -72,7 +72,7 @@ def least_sum(graph: Graph, costs: Floats) -> float:
     return _sum_bound(graph, costs, distances(graph, costs))
 
 
-def to_go(graph: Graph, costs: Floats) -> Floats:
+def _to_go(graph: Graph, costs: Floats) -> Floats:
     """Return what a sum of costs (m,) from 0 takes at least from states to an end, (n,).
 
     Infinite where no path leads to an end; zero where an inequality does not hold.

@@ -11,12 +11,12 @@ import pandas as pd
 from seqopt._showing import Page, Shown, display
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
-from seqopt.plan.times import reassign, times_table
+from seqopt.plan._times import reassign, times_table
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._tolerance import tolerance_table
 from seqopt.responses.table import Departure, LinearRange, grips_table
+from seqopt.sequence._timing import has_durations, step_times
 from seqopt.sequence.steps import Step
-from seqopt.sequence.timing import has_durations, step_times
 from seqopt.stability._step_verdicts import step_verdicts
 from seqopt.stability.assessment import MARGINS, Verdict
 from seqopt.stability.steps import assess_steps, stability_table
@@ -163,8 +163,8 @@ class ShownBuild(Shown):
         and is shaded by the force of the grip.
 
         ``first``, ``last``: numbers of the first and the last step that are drawn; by default all;
-        ``seconds``: whether time goes along, by default if it is known. Raises `ExtraError` if matplotlib is not installed (extra ``plot``); `StepError` if there
-        are no such steps.
+        ``seconds``: whether time goes along, by default if it is known. Raises `ExtraError` if
+        matplotlib is not installed (extra ``plot``); `StepError` if there are no such steps.
         """
         scene, responses = self.engine.network.scene, self.responses()
         timed = has_durations(scene) if seconds is None else seconds

@@ -368,9 +368,9 @@ class Plan(ShownBuild):
         the ``claimed_gap``; of every one of the ``budgets`` what is there, spent, and what one more
         unit would save; ``limits``, ``rules``, ``scenarios``, what ``stands``; how it ``ended`` and
         what ``stopped`` it; ``steps``, ``steps_before_release`` without those that let all go at
-        the end, ``regrips``, ``makespan`` (s, if it is known how long robots take), ``idle_robots``,
-        which never grip; limits of the linear range that are
-        left, which model was ``enough``, what is known of ``arms``, and payloads that are exceeded;
+        the end, ``regrips``, ``makespan`` (s, if it is known how long robots take),
+        ``idle_robots``, which never grip; limits of the linear range that are left, which model was
+        ``enough``, what is known of ``arms``, and payloads that are exceeded;
         ``models_evaluated``, ``states_in_proof``, ``seconds``;
         of criteria of ranks the sums under both ``objectives`` and of heuristics ``gap_parts``; of
         an order that was sought ``order``, ``orders`` (among which), ``order_status``,

@@ -256,8 +256,9 @@ def parse_goals(text: str) -> tuple[Goal, ...]:
 
     They are ``minmax`` (the worst of the criterion), ``sum`` (over all steps), ``steps``,
     ``regrips``, ``travel``, ``makespan`` (how long the build takes, where robots have durations), a
-    response (its worst) or ``sum(RESPONSE)``; also ``bond`` and ``friction`` (the least with which every state stands), ``tilt`` (the largest that every state
-    survives) and ``tolerance`` (how far grips may be off in every state).
+    response (its worst) or ``sum(RESPONSE)``; also ``bond`` and ``friction`` (the least with which
+    every state stands), ``tilt`` (the largest that every state survives) and ``tolerance`` (how far
+    grips may be off in every state).
 
     Examples
     --------
@@ -327,7 +328,7 @@ def _parse(text: str) -> AskedBudget:
 
 
 def parse_caps(texts: Sequence[str] | str) -> dict[str, float]:
-    """Return caps on totals: ``travel=3.5m``, ``makespan=600s``, ``regrips=2``, ``sum(T_max)=9``."""
+    """Return caps on totals: ``travel=3.5m``, ``makespan=60s``, ``regrips=2``, ``sum(T_max)=9``."""
     out: dict[str, float] = {}
     for text in (texts,) if isinstance(texts, str) else texts:
         found = CAP.fullmatch(text) if isinstance(text, str) else None

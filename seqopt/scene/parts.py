@@ -35,8 +35,8 @@ from seqopt.scene._checks import (
     whole,
     wholes,
 )
+from seqopt.scene._durations import Durations
 from seqopt.scene.arm import Arm
-from seqopt.scene.durations import Durations
 from seqopt.scene.shape import Polyhedron
 
 _UNIT = 1e-9  # how far a direction may be from unit length, or a pair from a right angle

@@ -13,9 +13,9 @@ from seqopt._showing import Shown, display
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import check, not_negative, printable, short, vector, wholes
+from seqopt.scene._durations import _durations_in_words
 from seqopt.scene._grip_kinds import GripKinds, grip_kinds
 from seqopt.scene._loads import Load
-from seqopt.scene.durations import durations_in_words
 from seqopt.scene.parts import Brick, Ground, Joint, Reach, Robot
 
 if TYPE_CHECKING:
@@ -304,7 +304,7 @@ class Scene(Shown):
     def with_durations(self, *words: str) -> Scene:
         """Return the same scene with robots that take as long as words say.
 
-        ``*words``: as of `seqopt.scene.durations.durations_in_words`.
+        ``*words``: as of `seqopt.scene._durations._durations_in_words`.
 
         Examples
         --------
@@ -315,7 +315,7 @@ class Scene(Shown):
         [10.0, 10.0, 25.0]
         """
         names, own = [r.name for r in self.robots], [r.durations for r in self.robots]
-        found = durations_in_words(names, own, words)
+        found = _durations_in_words(names, own, words)
         pairs = zip(self.robots, found, strict=True)
         return replace(self, robots=tuple(replace(r, durations=each) for r, each in pairs))
 

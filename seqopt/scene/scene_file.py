@@ -24,9 +24,9 @@ from seqopt._files import read_text, write_text
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import cut, reading_json, short
+from seqopt.scene._durations import Durations
 from seqopt.scene._loads import Load
 from seqopt.scene.arm import Arm
-from seqopt.scene.durations import Durations
 from seqopt.scene.library.arch_form import ArchForm, arch, barrel_vault, chain
 from seqopt.scene.library.dome import DomeShape, dome
 from seqopt.scene.library.vault import VaultShape, herringbone_vault
@@ -106,7 +106,7 @@ def _named(bricks: list[Brick]) -> str:
 _VERSION = 1
 _UNSAID = (
     *("thickness", "face", "shape", "node_offsets", "movement", "position", "since"),
-    *("stiffness", "rotational_stiffness"),  # of robots
+    *("stiffness", "rotational_stiffness", "arm", "durations", "speed"),  # of robots
 )
 """Left out of a file where there is none."""
 _UNLOADED = {"loads": (), "wind": (0.0, 0.0, 0.0), "weight_factor": 1.0}  # not said either
@@ -376,23 +376,22 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
         if document[key] == usual:
             del document[key]
     kinds = ("bricks", "joints", "grounds", "robots", "loads")
-    for part in (part for kind in kinds for part in document.get(kind, ())):
-        for key in _UNSAID:
-            if part.get(key, "") is None:
-                del part[key]
+    for kind in (kind for kind in kinds if kind in document):
+        document[kind] = tuple(map(_said, document[kind]))
     names = {cls: kind for kind, cls in _REACHES.items()}
     for entry, robot in zip(document["robots"], scene.robots, strict=True):
         entry["reach"] = {"kind": names[type(robot.reach)], **entry["reach"]}
-        if robot.durations is None:
-            del entry["durations"]
-        elif robot.durations.speed is None:
-            del entry["durations"]["speed"]
-        if robot.arm is None:
-            del entry["arm"]
-        else:
+        if robot.durations is not None:
+            entry["durations"] = _said(entry["durations"])
+        if robot.arm is not None:
             usual = {each.name: each.default for each in fields(Arm)}
             entry["arm"] = {k: v for k, v in entry["arm"].items() if v != usual[k]}
     return document
+
+
+def _said(entry: dict[str, Any]) -> dict[str, Any]:
+    """Return an entry without what is none and then left out."""
+    return {key: value for key, value in entry.items() if value is not None or key not in _UNSAID}
 
 
 def dump_scene(scene: Scene) -> str:

@@ -11,11 +11,11 @@ from dataclasses import replace
 from typing import Any, NamedTuple, TypeVar
 
 from seqopt.errors import StepError
-from seqopt.scene.durations import Durations
+from seqopt.scene._durations import Durations
 from seqopt.scene.scene import Scene
+from seqopt.sequence._timing import require_durations, way_seconds
 from seqopt.sequence.schedule import Hold, holds
-from seqopt.sequence.steps import Step, StepKind, check_sequence
-from seqopt.sequence.timing import require_durations, way_seconds
+from seqopt.sequence.steps import Step, check_sequence
 
 FREE = -1  # in the place of the number of a grip
 _Part = TypeVar("_Part")

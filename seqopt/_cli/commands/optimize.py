@@ -89,9 +89,9 @@ BUDGET = {
 AIM = {
     "--aim NAME,NAME": "what is to be as small as possible, the most important first: minmax (the "
     "worst step by the criterion, by default worst-ratio), sum, steps, regrips, travel, makespan "
-    "(how long the build takes, with --durations), bond, friction, tilt, a response, or sum(RESPONSE) (free: by default minmax; other schedules: by "
-    "default the total of what their moves cost); with --order search, the best order of the "
-    "bricks is found too"
+    "(how long the build takes, with --durations), bond, friction, tilt, a response, or "
+    "sum(RESPONSE) (free: by default minmax; other schedules: by default the total of what their "
+    "moves cost); with --order search, the best order of the bricks is found too"
 }
 SEARCH = {
     "--option NAME=VALUE ...": "option of the formulation, as horizon=2 or width=10",

@@ -20,13 +20,13 @@ from seqopt._cli.terminal import wrapped
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
+from seqopt.plan._times import busy_table
 from seqopt.plan.build import GivenSequence
-from seqopt.plan.times import busy_table
 
 DESCRIPTION = (
-    "Say how long a build takes and who does what when. A robot that holds nothing prepares what it "
-    "does next while others hold and act; actions come one after the other, in the order of the "
-    "steps."
+    "Say how long a build takes and who does what when. A robot that holds nothing prepares what "
+    "it does next while others hold and act; actions come one after the other, in the order of "
+    "the steps."
 )
 USAGE = tuple(usage.replace("--out FILE", "--out DIR") for usage in STEPS_USAGE)
 EXAMPLES = (
@@ -69,7 +69,9 @@ def run(options: argparse.Namespace) -> Answer:
     busy = busy_table(scene, build.steps)
     lines = [*_said(scene.name, len(steps), float(given), least)]
     for row in busy.to_dict("records"):
-        spent = (f"{what} {row[f'{what}_s']:.6g} s" for what in ("prepares", "acts", "holds", "idle"))
+        spent = (
+            f"{what} {row[f'{what}_s']:.6g} s" for what in ("prepares", "acts", "holds", "idle")
+        )
         lines.append(f"  {row['robot']}: {', '.join(spent)}")
     if written:
         lines.append(f"written to {options.out}: plan.csv, times.csv")

@@ -43,10 +43,10 @@ from seqopt.scene._checks import as_float, short
 from seqopt.scene.scene import Scene
 from seqopt.sequence._rule_space import FreeSpace, free_space
 from seqopt.sequence._schedule_space import ScheduleSpace
+from seqopt.sequence._timing import require_durations
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Grips
-from seqopt.sequence.timing import require_durations
 from seqopt.stability.assessment import Stability
 
 FREE_TITLE = "free schedule"
@@ -505,9 +505,9 @@ def _in_time(problem: States) -> States:
     """Return a problem; where it counts how long robots take, that must be known of all."""
     if problem.is_timed:
         scene, rules = problem.network.scene, problem.rules
-        free = isinstance(rules, FreeRules)
+        team = rules.team(scene) if isinstance(rules, FreeRules) else None
         try:
-            require_durations(scene, rules.team(scene) if free else None)
+            require_durations(scene, team)
         except StepError as error:
             raise ProblemError(f"{Measure.MAKESPAN.value}: {error}") from None
     return problem

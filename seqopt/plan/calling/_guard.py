@@ -21,10 +21,10 @@ import numpy as np
 from seqopt._interrupts import answered
 from seqopt.arrays import FrozenValue, Ints
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, SolverError, message_of
+from seqopt.graph._timed import LabelProof
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.scenarios import ScenarioLayers, largest_of
-from seqopt.graph.timed import LabelProof
 from seqopt.plan.calling.formulation import (
     WATCH,
     End,
@@ -204,9 +204,16 @@ def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
         visited = tuple(np.asarray(rows) for rows in found.visited)
         prices = tuple(tuple(map(float, each)) for each in found.prices)
         grips = tuple(tuple(operator.index(n) for n in row) for row in found.grips)
-        proofs = tuple(LabelProof(*map(np.asarray, proof)) for proof in found.proofs)
+        proofs = tuple(_arrays(proof) for proof in found.proofs)
         told = (visited, prices, text(found.stopped), grips, proofs)
         return StatePath(states, objective, bound, *told)
+
+
+def _arrays(proof: LabelProof) -> LabelProof:
+    """Return labels as arrays of numbers."""
+    states, labels, prices = proof
+    numbers = [np.array(part, dtype=float) for part in (labels, prices)]
+    return LabelProof(np.array(states, dtype=np.int64), *numbers)
 
 
 def require_fit(

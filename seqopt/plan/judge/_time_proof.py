@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.graph.duality import to_go
+from seqopt.graph.duality import _to_go
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import TIED
 from seqopt.scene.scene import Scene
@@ -89,7 +89,9 @@ class TimedMoves:
     def __init__(self, graph: Graph, rows: Ints, places: Bools, team: Team) -> None:
         self.graph, self.rows, self._places, self.team = graph, rows, places, team
         before, after = rows[graph.source], rows[graph.target]
-        self.gains = np.zeros(after.shape, dtype=np.int64)  # node taken, in the group's first column
+        self.gains = np.zeros(
+            after.shape, dtype=np.int64
+        )  # node taken, in the group's first column
         self._loses = np.zeros(after.shape, dtype=bool)
         for group in team.groups:
             old, new = before[:, group], after[:, group]
@@ -128,9 +130,10 @@ class TimedMoves:
         node = self.gains[moves, group[0]]
         last = -self.rows[self.graph.source[moves], column]
         way = np.linalg.norm(self.team.at[node] - self.team.at[last.clip(min=0)], axis=1)
-        ready = np.where(self._places[moves], *self.team.times[column, [0, 2]])
+        fetch, place, approach, grip, _ = self.team.times[column]
+        ready = np.where(self._places[moves], fetch, approach)
         ready = ready + np.where(last > 0, way, 0.0) * self.team.slow[column]
-        return ready, np.where(self._places[moves], *self.team.times[column, [1, 3]])
+        return ready, np.where(self._places[moves], place, grip)
 
     def work(self, prices: Floats) -> Floats:
         """Return the priced time of moves, (m,): of all and of the robots of columns, (1 + c,)."""
@@ -186,17 +189,15 @@ class Closed:
     + c), which are made such as prove anything; ``limits``: beyond which nothing is better.
     """
 
-    def __init__(
-        self, moves: TimedMoves, amounts: Floats, prices: Floats, limits: Limits
-    ) -> None:
+    def __init__(self, moves: TimedMoves, amounts: Floats, prices: Floats, limits: Limits) -> None:
         self._moves, self._amounts, self._limits = moves, amounts, limits
         graph = moves.graph
         self._prices = np.array([_allowed(each, moves.team) for each in prices]).reshape(
             -1, 1 + moves.rows.shape[1]
         )
-        self._left = [to_go(graph, moves.work(each)) for each in self._prices]
+        self._left = [_to_go(graph, moves.work(each)) for each in self._prices]
         self._sums = np.column_stack(
-            [np.zeros((graph.states, 0)), *(to_go(graph, own) for own in amounts.T)]
+            [np.zeros((graph.states, 0)), *(_to_go(graph, own) for own in amounts.T)]
         )
 
     @property
@@ -229,7 +230,7 @@ class Closed:
         return bool(excused(left).all()) if len(left) else True, len(known[0])
 
     def _leads_to(self, known: tuple[Ints, Floats], label: Ints, move: Ints) -> Ints:
-        """Return states of what follows from labels by moves, pairs (k,), that no label is below."""
+        """Return states of what follows from labels by moves, (k,) each, that none is below."""
         columns = self._moves.rows.shape[1]
         out = [np.zeros(0, dtype=np.int64)]
         for column in (None, *range(columns)):

@@ -10,24 +10,17 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SolverError
+from seqopt.graph._timed import LabelProof
 from seqopt.graph.duality import cut, potentials
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import tied
 from seqopt.graph.states.states import States
-from seqopt.graph.timed import LabelProof
 from seqopt.plan.judge._rule_moves import RuleTables, ScheduleTables
-from seqopt.plan.judge._time_proof import (
-    Closed,
-    Limits,
-    Team,
-    TimedMoves,
-    kept_below,
-    limit_below,
-)
+from seqopt.plan.judge._time_proof import Closed, Limits, Team, TimedMoves, kept_below, limit_below
 from seqopt.problem.problem import Measure
+from seqopt.sequence._timing import require_durations
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
-from seqopt.sequence.timing import require_durations
 
 Fallen = Callable[[int, Ints], Bools]
 
@@ -79,14 +72,22 @@ class TimedStates:
         columns = [r for kind in self.problem.space.kinds for r in kind.robots]
         order = [columns.index(r) for r in self.tables.team]
         count = len(order)
-        if proof.states.ndim != 2 or proof.labels.ndim != 2 or (
-            len(proof.states) != len(proof.labels)
-            or proof.states.shape[1] < 1 + count
-            or proof.labels.shape[1] < 1 + count
+        if (
+            proof.states.ndim != 2
+            or proof.labels.ndim != 2
+            or (
+                len(proof.states) != len(proof.labels)
+                or proof.states.shape[1] < 1 + count
+                or proof.labels.shape[1] < 1 + count
+            )
         ):
             raise SolverError("labels are none of this build: they have other columns")
-        entries = proof.states[:, [*(1 + np.array(order)), *range(1 + count, proof.states.shape[1])]]
-        values = proof.labels[:, [0, *(1 + np.array(order)), *range(1 + count, proof.labels.shape[1])]]
+        entries = proof.states[
+            :, [*(1 + np.array(order)), *range(1 + count, proof.states.shape[1])]
+        ]
+        values = proof.labels[
+            :, [0, *(1 + np.array(order)), *range(1 + count, proof.labels.shape[1])]
+        ]
         team = self._team()
         for group in team.groups:
             own, times = entries[:, group], values[:, [1 + c for c in group]]

@@ -20,9 +20,9 @@ from seqopt.report._pictures import DARK, LANE, LETTER, SHADES
 from seqopt.report._style import SMALL, new_picture, styled
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
+from seqopt.sequence._timing import StepTime, step_times
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.steps import Step
-from seqopt.sequence.timing import StepTime, step_times
 
 PER_STEP, NARROWEST, WIDEST = 0.15, 7.0, 30.0  # inches
 BESIDE = 1.8  # inches that names and the key of shades take

@@ -16,9 +16,9 @@ from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.graph._explore import Visited
 from seqopt.graph.graph import Graph
 from seqopt.graph.states.states import States
+from seqopt.sequence._timing import require_durations
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
-from seqopt.sequence.timing import require_durations
 
 HELD, NOW = -1, -2  # where the readiness of a column comes from: it has none, the end of the act
 
@@ -114,7 +114,7 @@ def timed_graph(problem: States, visited: Visited) -> TimedGraph:
     order = np.argsort(move, kind="stable")
     move, column = move[order], column[order]
     free = rows <= 0
-    alike = free[:, 1:] & (rows[:, 1:] == rows[:, :-1]) & (kinds[1:] == kinds[:-1])
+    alike = np.asarray(free[:, 1:] & (rows[:, 1:] == rows[:, :-1]) & (kinds[1:] == kinds[:-1]))
     origin = _origins(space.slots, found, move, column, parks=space.parks)
     work = _work(space.slots, found, prepares, acts)
     states, longest = (graph, levels, free, alike, kinds), _longest(problem)
@@ -130,8 +130,8 @@ def _moves(problem: States, graph: Graph, rows: Ints, levels: Ints) -> _Moves:
         taken[:, first:end] = (new > 0) & ~(new[:, :, None] == old[:, None]).any(axis=2)
         dropped[:, first:end] = (old > 0) & ~(old[:, :, None] == new[:, None]).any(axis=2)
         had, has = ((old[:, :, None] == each[:, None]).sum(axis=2) for each in (old, new))
-        takes = taken[:, first:end].any(axis=1)[:, None]
-        able[:, first:end] = (old <= 0) & (had > has) & takes
+        able[:, first:end] = (old <= 0) & (had > has)
+        able[~taken[:, first:end].any(axis=1), first:end] = False
     places = levels[graph.target] > levels[graph.source]
     if isinstance(problem.rules, Schedule):
         kinds = [False, *(step.kind is StepKind.PLACE for step in problem.rules.steps)]
@@ -157,7 +157,7 @@ def _times(problem: States, found: _Moves) -> tuple[Floats, Floats]:
     placing = found.places[move]
     prepares[move] = np.where(placing, times[column, 0], times[column, 2])
     acts[move] = np.where(placing, times[column, 1], times[column, 3])
-    move, column = np.nonzero(found.dropped & ~found.taken.any(axis=1)[:, None])
+    move, column = np.nonzero(found.dropped)
     np.maximum.at(acts, move, times[column, 4])
     if not space.parks:
         return prepares, acts

@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from seqopt.errors import StepError
-from seqopt.scene.durations import EXAMPLE, Durations
+from seqopt.scene._durations import EXAMPLE, Durations
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import AnyStep, StepKind
 

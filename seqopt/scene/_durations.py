@@ -78,7 +78,7 @@ _NAMES = tuple(field.name for field in fields(Durations))
 EXAMPLE = "fetch=30,place=10,approach=10,grip=5,release=5"
 
 
-def durations_in_words(
+def _durations_in_words(
     names: Sequence[str], given: Sequence[Durations | None], texts: Sequence[str]
 ) -> tuple[Durations | None, ...]:
     """Return the durations of robots as words say, those before being for all, or as given.
@@ -88,7 +88,7 @@ def durations_in_words(
 
     Examples
     --------
-    >>> found = durations_in_words(["a", "b"], [None, None], [EXAMPLE, "b:slower=2.5"])
+    >>> found = _durations_in_words(["a", "b"], [None, None], [EXAMPLE, "b:slower=2.5"])
     >>> [each.release for each in found]
     [5.0, 12.5]
     """
@@ -125,5 +125,5 @@ def _changed(text: str, words: str, before: Durations | None) -> Durations:
             f"durations {text}: {', '.join(lacking)} not given, nor in the scene; give all, as "
             f"{EXAMPLE}"
         )
-    found = Durations(**said) if before is None else replace(before, **said)  # type: ignore[arg-type]
+    found = Durations(**said) if before is None else replace(before, **said)
     return found if factor is None else found.slower(factor)

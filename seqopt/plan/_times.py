@@ -11,9 +11,9 @@ from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence._reassign import reassigned_steps
+from seqopt.sequence._timing import step_times
 from seqopt.sequence.schedule import Hold
 from seqopt.sequence.steps import Step, idle_robots
-from seqopt.sequence.timing import step_times
 
 
 def times_table(scene: Scene, steps: Sequence[Step]) -> pd.DataFrame:
@@ -50,9 +50,12 @@ def times_table(scene: Scene, steps: Sequence[Step]) -> pd.DataFrame:
 
 
 def busy_table(scene: Scene, steps: Sequence[Step]) -> pd.DataFrame:
-    """Return what robots do with their time: ``prepares_s``, ``acts_s``, ``holds_s``, ``idle_s``."""
+    """Return how long each robot ``prepares_s``, ``acts_s``, ``holds_s`` and is ``idle_s``."""
     times = step_times(scene, steps)
-    out = {robot.name: dict.fromkeys(("prepares_s", "acts_s", "holds_s"), 0.0) for robot in scene.robots}
+    out = {
+        robot.name: dict.fromkeys(("prepares_s", "acts_s", "holds_s"), 0.0)
+        for robot in scene.robots
+    }
     before: Sequence[int | None] = (None,) * len(scene.robots)
     end = 0.0
     for step, time in zip(steps, times, strict=True):
