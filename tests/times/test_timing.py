@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 
 import pytest
 from hypothesis import given, settings
@@ -43,7 +43,7 @@ def test_times_are_those_of_the_longest_way(durations, name):
     scene, steps = timed(durations), STEPS[name]
     times = step_times(scene, steps)
     assert times[-1].end == pytest.approx(makespan(scene, steps))
-    for before, after in zip(times, times[1:], strict=False):
+    for before, after in pairwise(times):
         assert before.end <= after.start <= after.end
     busy = busy_table(scene, steps).set_index("robot")
     work = busy[["prepares_s", "acts_s", "holds_s"]].sum(axis=1)
@@ -95,7 +95,7 @@ def best_of_all(scene, steps):
             for row in rows[hold.first - 1 : hold.last]:
                 fits &= row[robot] is None
                 row[robot] = hold.node
-        for before, after in zip(rows, rows[1:], strict=False):
+        for before, after in pairwise(rows):
             fits &= all(
                 None in pair or pair[0] == pair[1] for pair in zip(before, after, strict=True)
             )
