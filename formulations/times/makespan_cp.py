@@ -50,7 +50,8 @@ def _solver() -> ModuleType:
         from ortools.sat.python import cp_model  # noqa: PLC0415  # an extra
     except ModuleNotFoundError:
         raise ExtraError(
-            "makespan_cp needs OR-tools, which is not installed: pip install 'seqopt[cp]'"
+            "makespan_cp needs OR-tools, which is not installed, or not for this Python: pip "
+            "install 'seqopt[cp]' with Python 3.11 or 3.12"
         ) from None
     return cp_model
 

@@ -20,9 +20,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from seqopt.errors import StepError
+from seqopt.errors import ProblemError, StepError
 from seqopt.scene._durations import EXAMPLE, Durations
 from seqopt.scene.scene import Scene
+from seqopt.sequence.rules import FreeRules
+from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import AnyStep, StepKind
 
 
@@ -58,22 +60,8 @@ def require_durations(scene: Scene, robots: Sequence[int] | None = None) -> tupl
 def step_times(scene: Scene, steps: Sequence[AnyStep]) -> tuple[StepTime, ...]:
     """Return when every step of a build happens at the earliest, in the order that is given.
 
-    Parameters
-    ----------
-    scene : Scene
-        Robots that act have durations.
-    steps : sequence of Step
-        Of one build, from its first step on.
-
-    Returns
-    -------
-    tuple of StepTime
-        One for every step.
-
-    Raises
-    ------
-    StepError
-        If it is not known how long a robot takes that acts.
+    Steps are all of one build, from its first on. A `StepError` names robots that act of which it
+    is not known how long they take.
 
     Examples
     --------
@@ -84,31 +72,27 @@ def step_times(scene: Scene, steps: Sequence[AnyStep]) -> tuple[StepTime, ...]:
     >>> [(each.start, each.end) for each in step_times(scene, steps)[:4]]
     [(30.0, 40.0), (40.0, 50.0), (50.0, 55.0), (85.0, 95.0)]
     """
-    count = len(scene.robots)
-    before: Sequence[object] = (None,) * count
-    busy = [
-        r for r in range(count) if any(step.grips[r] is not None for step in steps)
-    ]  # others need not be known
+    robots = range(len(scene.robots))
+    busy = [r for r in robots if any(step.grips[r] is not None for step in steps)]
     durations = dict(zip(busy, require_durations(scene, busy), strict=True))
     free, last = dict.fromkeys(busy, 0.0), dict[int, object]()
+    before: Sequence[object] = (None,) * len(robots)
     now, out = 0.0, list[StepTime]()
     for step in steps:
-        acting = [r for r in busy if step.grips[r] != before[r]]
-        takes = [r for r in acting if step.grips[r] is not None]
-        prepares = ready = None
-        start = now
-        for r in takes:
-            placing = step.kind is StepKind.PLACE
-            prepares, own = free[r], durations[r]
-            ready = prepares + (own.fetch if placing else own.approach)
-            ready += way_seconds(scene, own, last.get(r), step.grips[r])
-            start, last[r] = max(now, ready), step.grips[r]
-            now = start + (own.place if placing else own.grip)
-        if not takes:
-            now = start + max((durations[r].release for r in acting), default=0.0)
-            free |= dict.fromkeys(acting, now)
-        out.append(StepTime(step.number, tuple(acting), prepares, ready, start, now))
-        before = step.grips
+        acting = tuple(r for r in busy if step.grips[r] != before[r])
+        taker = next((r for r in acting if step.grips[r] is not None), None)
+        if taker is None:
+            end = now + max((durations[r].release for r in acting), default=0.0)
+            out.append(StepTime(step.number, acting, None, None, now, end))
+            free |= dict.fromkeys(acting, end)
+        else:
+            own, node, placing = durations[taker], step.grips[taker], step.kind is StepKind.PLACE
+            ready = free[taker] + (own.fetch if placing else own.approach)
+            ready += way_seconds(scene, own, last.get(taker), node)
+            start, last[taker] = max(now, ready), node
+            end = start + (own.place if placing else own.grip)
+            out.append(StepTime(step.number, acting, free[taker], ready, start, end))
+        now, before = end, step.grips
     return tuple(out)
 
 
@@ -122,3 +106,17 @@ def way_seconds(scene: Scene, own: Durations, last: object, node: object) -> flo
 def has_durations(scene: Scene) -> bool:
     """Return whether it is known how long every robot takes."""
     return bool(scene.robots) and all(robot.durations is not None for robot in scene.robots)
+
+
+def has_speeds(scene: Scene) -> bool:
+    """Return whether ways of some robot take time of their own."""
+    return any(robot.durations and robot.durations.speed for robot in scene.robots)
+
+
+def require_for_makespan(scene: Scene, moves: FreeRules | Schedule) -> None:
+    """Raise a `ProblemError` unless it is known how long those take who take part."""
+    team = moves.team(scene) if isinstance(moves, FreeRules) else None
+    try:
+        require_durations(scene, team)
+    except StepError as error:
+        raise ProblemError(f"makespan: {error}") from None

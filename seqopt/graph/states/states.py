@@ -12,7 +12,7 @@ from seqopt._showing import Shown
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
-from seqopt.errors import ProblemError, StepError
+from seqopt.errors import ProblemError
 from seqopt.graph.scenarios import engine_for, require_alike
 from seqopt.network.network import Network
 from seqopt.problem.criteria import RankSum
@@ -35,7 +35,7 @@ from seqopt.problem.requirements import (
     state_costs,
 )
 from seqopt.problem.standing import Standing, StandingSets
-from seqopt.responses._grip_sets import GripSets
+from seqopt.responses._grip_sets import GripSets, _near
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import TOLERANCE, robot_response
 from seqopt.responses.resources import HERE, Resources
@@ -43,14 +43,13 @@ from seqopt.scene._checks import as_float, short
 from seqopt.scene.scene import Scene
 from seqopt.sequence._rule_space import FreeSpace, free_space
 from seqopt.sequence._schedule_space import ScheduleSpace
-from seqopt.sequence._timing import require_durations
+from seqopt.sequence._timing import has_speeds, require_for_makespan
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Grips
 from seqopt.stability.assessment import Stability
 
 FREE_TITLE = "free schedule"
-BAND = 1e-5  # share of a value within which six digits do not decide
 
 
 @dataclass(frozen=True, repr=False)
@@ -145,10 +144,11 @@ class States(Shown):
     @cached_property
     def space(self) -> FreeSpace | ScheduleSpace:
         """Its states and moves."""
-        parks = self.parks
         if isinstance(self.rules, Schedule):
-            return ScheduleSpace(self.network, self.rules, self.caps, parks)
-        return free_space(self.network, self.rules, self.caps, parks=parks, timed=self.is_timed)
+            return ScheduleSpace(self.network, self.rules, self.caps, self.parks)
+        return free_space(
+            self.network, self.rules, self.caps, parks=self.parks, timed=self.is_timed
+        )
 
     @property
     def is_timed(self) -> bool:
@@ -158,8 +158,7 @@ class States(Shown):
     @property
     def parks(self) -> bool:
         """Whether it counts where a free robot was last: for its travel, or the time of it."""
-        robots = self.network.scene.robots
-        speeds = self.is_timed and any(r.durations and r.durations.speed for r in robots)
+        speeds = self.is_timed and has_speeds(self.network.scene)
         return speeds or any(goal.measure is Measure.TRAVEL for goal in self.goals)
 
     @cached_property
@@ -389,12 +388,6 @@ class States(Shown):
         return np.take_along_axis(held, order, axis=1), np.asarray(most[order])
 
 
-def _near(values: Floats, bound: Floats | float) -> Bools:
-    """Return which values are so close to a bound, NaN if there is none, that digits decide."""
-    finite = np.where(np.isfinite(values), values, np.nan)
-    return np.asarray(np.abs(finite - bound) <= BAND * np.abs(bound))
-
-
 def build_states(
     engine: Engine,
     rules: FreeRules | Schedule,
@@ -443,7 +436,7 @@ def build_states(
     if any(goal.of_states and not goal.response for goal in named):
         criterion = _of_states(engine, criterion)
     standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
-    return _asked(_in_time(States(engine, rules, criterion, named, limits, standing)))
+    return _asked(States(engine, rules, criterion, named, limits, standing))
 
 
 def within(problem: States, caps: Mapping[str, float]) -> States:
@@ -472,7 +465,7 @@ def within(problem: States, caps: Mapping[str, float]) -> States:
     if problem.budgets:
         raise ProblemError("the problem has budgets already; give all of them at once")
     caps_of = tuple(float(cap) for cap in caps.values())
-    return _in_time(replace(problem, goals=(*problem.goals, *goals), budgets=caps_of))
+    return _asked(replace(problem, goals=(*problem.goals, *goals), budgets=caps_of))
 
 
 def over_scenarios(
@@ -501,22 +494,12 @@ def over_scenarios(
     return replace(problem, scenarios=engines, over=over)
 
 
-def _in_time(problem: States) -> States:
-    """Return a problem; where it counts how long robots take, that must be known of all."""
-    if problem.is_timed:
-        scene, rules = problem.network.scene, problem.rules
-        team = rules.team(scene) if isinstance(rules, FreeRules) else None
-        try:
-            require_durations(scene, team)
-        except StepError as error:
-            raise ProblemError(f"{Measure.MAKESPAN.value}: {error}") from None
-    return problem
-
-
 def _asked(problem: States) -> States:
     """Return a problem whose stability can be asked, where it will be."""
     if problem.standing is not None or any(goal.of_margins for goal in problem.goals):
         _ = problem.stability  # what cannot be asked is refused now
+    if problem.is_timed:
+        require_for_makespan(problem.network.scene, problem.rules)
     return problem
 
 
