@@ -25,7 +25,7 @@ from importlib import import_module
 _HOMES = {
     "scene.scene": ("Scene",),
     "scene.parts": ("Robot", "Sphere"),
-    "scene._props": ("Prop",),
+    "scene.holders._props": ("Prop",),
     "scene.scene_file": ("load_scene", "save_scene"),
     "scene.arch": ("ArchShape", "arch_scene"),
     "network.network": ("Network",),

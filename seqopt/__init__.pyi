@@ -16,9 +16,9 @@ from seqopt.problem.criteria import StepCost as StepCost
 from seqopt.problem.problem import Problem as Problem
 from seqopt.problem.requirements import Limit as Limit
 from seqopt.responses.table import analyze as analyze
-from seqopt.scene._props import Prop as Prop
 from seqopt.scene.arch import ArchShape as ArchShape
 from seqopt.scene.arch import arch_scene as arch_scene
+from seqopt.scene.holders._props import Prop as Prop
 from seqopt.scene.parts import Robot as Robot
 from seqopt.scene.parts import Sphere as Sphere
 from seqopt.scene.scenarios import scenarios as scenarios

@@ -25,6 +25,7 @@ DISPLAYS = {
     "steps_picture": "seqopt.report._pictures",
     "tilt_picture": "seqopt.report._failure_chart",
     "gantt_picture": "seqopt.report._pictures",
+    "seconds_picture": "seqopt.report.gantt._seconds",
     "Film": "seqopt.report._pictures",
     "build_page": "seqopt.report._pages",
     "failure_figure": "seqopt.report._failure_chart",

@@ -159,7 +159,7 @@ def _of_states(moves: Schedule | FreeRules, asked: dict[str, Any], formulation: 
     said = any(asked.get(name) for name in (*STATE_WORDS, "orders"))
     if said or not in_layers(moves) or formulation is None:
         return said or not in_layers(moves)
-    return find_formulation(formulation).on is On.STATES
+    return find_formulation(formulation).on in (On.STATES, On.TIMES)
 
 
 def _open(

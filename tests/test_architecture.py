@@ -45,6 +45,9 @@ SHARED = {  # what formulations may import
     "formulations.whole_program",
     "formulations._weights",
     "formulations.states._search",
+    "formulations.times._labels",
+    "formulations.times._prices",
+    "formulations.times._stages",
     "formulations.states._totals",
 }
 MECHANICS = {"network.mechanics", "engines.rigid"}  # not for the frame

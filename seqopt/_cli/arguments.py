@@ -97,6 +97,7 @@ COMMANDS = {
     "next": _Command("look up the best next move of a build", "commands.next"),
     "pareto": _Command("find all plans that no other one beats in every aim", "commands.pareto"),
     "analyze": _Command("compute forces and displacements in every step", "commands.analyze"),
+    "times": _Command("say how long a build takes, and who does what when", "commands.times"),
     "assess": _Command("prove which steps stand, and with what margins", "commands.assess"),
     "report": _Command("make a page that shows plans step by step", "commands.report"),
     "reach": _Command("say which arms reach which nodes, and how", "commands.reach"),

@@ -65,6 +65,14 @@ def asked_scene(options: argparse.Namespace, *, ranged: bool = False) -> Scene:
     return scene if own else parse_grips(options.grips, scene)
 
 
+def in_seconds(options: argparse.Namespace, scene: Scene) -> Scene:
+    """Return a scene whose robots take as long as a command is told."""
+    try:
+        return scene.with_durations(*options.durations)
+    except SceneError as error:
+        raise SceneError(f"--{error}") from None
+
+
 def asked_engine(options: argparse.Namespace, network: Network) -> Engine:
     """Return the engine that a command is asked for."""
     mortar = None if options.mortar is None else mortar_word(options.mortar, "--mortar")

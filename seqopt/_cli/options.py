@@ -66,6 +66,13 @@ STRICT = {
     "--strict": "end with exit status 1 if a robot would exceed its payload in a step, or results "
     "leave the linear range"
 }
+DURATIONS = {
+    "--durations WORDS ...": "how long robots take, s: "
+    "fetch=30,place=10,approach=10,grip=5,release=5 (to bring the next brick, to place it, to come "
+    "to one that stands, to grip it, to let go; who is free fetches and approaches while others "
+    "act), speed=0.2 (m/s, of ways between grips); of one robot with its name before, as "
+    "rob3:fetch=75 or rob3:slower=2.5 (default: as the scene says)"
+}
 STEPS_USAGE = (
     "[SCENE] --method NAME [--out FILE] [other options]",
     "[SCENE] --plan FILE [--out FILE] [other options]",

@@ -14,6 +14,7 @@ import pandas as pd
 from seqopt._files import csv_text, require_apart, require_folder, write_csv, write_folder
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.states.states import States
+from seqopt.plan.build import ShownBuild
 from seqopt.plan.calling.formulation import trace_rows
 from seqopt.plan.out_of_sample import Trial
 from seqopt.plan.plan import Plan
@@ -85,13 +86,31 @@ def plan_files(
         tables["trace"] = pd.DataFrame(rows)
     if trial is not None:
         tables["scenarios"] = trial.table
+    if plan.makespan is not None:
+        tables["times"] = plan.times()
     return {
         **{f"{name}.csv": csv_text(table) for name, table in tables.items()},
         "summary.json": json.dumps(_plain(report), indent=2) + "\n",
         "scene.json": dump_scene(plan.engine.network.scene),
         **_task_files(plan),
+        **_time_files(plan),
         PAGE: plan_page(plan.engine, plan.title, tables["plan"], plan.result, prover),
     }
+
+
+def _time_files(plan: ShownBuild) -> dict[str, bytes]:
+    """Return the chart of a build over seconds, where it is known how long robots take."""
+    if plan.makespan is None or figure_notes():
+        return {}
+    from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
+
+    return picture_files("times", plan.gantt())
+
+
+def time_files(build: ShownBuild) -> dict[str, bytes | str]:
+    """Return steps of a build, when they happen, and a chart of it, by file name."""
+    tables = {"plan": build.responses(), "times": build.times()}
+    return {**{f"{name}.csv": csv_text(t) for name, t in tables.items()}, **_time_files(build)}
 
 
 def _task_files(plan: Plan) -> dict[str, str]:

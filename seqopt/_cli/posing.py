@@ -6,7 +6,7 @@ import argparse
 from dataclasses import dataclass, replace
 from typing import Any
 
-from seqopt._cli.asked import asked_engine, asked_scene
+from seqopt._cli.asked import asked_engine, asked_scene, in_seconds
 from seqopt._cli.outputs import require_out
 from seqopt._cli.values import (
     asked_criterion,
@@ -36,7 +36,7 @@ from seqopt.problem.problem import (
     parse_robust,
 )
 from seqopt.problem.requirements import Criterion
-from seqopt.scene._props import Prop
+from seqopt.scene.holders._props import Prop
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, FreeRules, with_robots
@@ -112,6 +112,8 @@ def asked_problem(options: argparse.Namespace) -> Asked:
     scene, begin, end = _asked_ends(options, scene)
     fewest = fewest_asked(options, scene)
     scene = scene if fewest is None else scene.with_props(*fewest)
+    if getattr(options, "durations", ()):
+        scene = in_seconds(options, scene)
     find_postures(scene, getattr(options, "cache", None), options.tell)
     words: dict[str, Any] = {"limits": parse_limits(options.limit, scene)}
     budgets = getattr(options, "budget", [])
@@ -154,7 +156,7 @@ def _wants_states(options: argparse.Namespace) -> bool:
     if options.schedule == FREE or options.aim or options.stands or options.order == SEARCH:
         return True
     named = getattr(options, "formulation", None)
-    return named is not None and find_formulation(named).on in (On.STATES, On.ORDERS)
+    return named is not None and find_formulation(named).on in (On.STATES, On.ORDERS, On.TIMES)
 
 
 def _criterion(options: argparse.Namespace, *, of_states: bool) -> Criterion | None:

@@ -72,6 +72,17 @@ def least_sum(graph: Graph, costs: Floats) -> float:
     return _sum_bound(graph, costs, distances(graph, costs))
 
 
+def _to_go(graph: Graph, costs: Floats) -> Floats:
+    """Return what a sum of costs (m,) from 0 takes at least from states to an end, (n,).
+
+    Infinite where no path leads to an end; zero where an inequality does not hold.
+    """
+    left = distances(graph, costs, back=True)
+    if left[graph.ends].any() or not _hold(left, costs, graph, back=True):
+        return np.zeros(graph.states)
+    return left
+
+
 def _hold(least: Floats, costs: Floats, graph: Graph, *, back: bool = False) -> bool:
     """Return whether no move leads from a state to another by less than their difference."""
     ends = (graph.target, graph.source) if back else (graph.source, graph.target)

@@ -15,7 +15,7 @@ import numpy as np
 
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.orders import AllOrders, OrderSelection
-from seqopt.graph.states._visits import steps_of
+from seqopt.graph.states._visits import steps_in_hands
 from seqopt.graph.states.states import States
 from seqopt.plan._status import FoundOrder
 from seqopt.plan.calling._guard import (
@@ -64,7 +64,7 @@ def _solved(
     solved = time.perf_counter()
     if proof and "progress" in options:
         options["progress"]("proving that no plan is better")
-    steps = steps_of(twin.space, selection.states)
+    steps = steps_in_hands(twin.space, selection.states, selection.grips)
     hint = dict(enumerate(selection.visited, start=twin.space.first))
     exact = formulation.kind is FormulationKind.EXACT
     certificate = judge_schedule(twin, selection, steps, hint, exact=exact) if proof else None

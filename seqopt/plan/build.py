@@ -11,10 +11,12 @@ import pandas as pd
 from seqopt._showing import Page, Shown, display
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
+from seqopt.plan._times import reassign, times_table
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._props import props_table
 from seqopt.responses._tolerance import tolerance_table
 from seqopt.responses.table import Departure, LinearRange, grips_table
+from seqopt.sequence._timing import has_durations, step_times
 from seqopt.sequence.steps import Step
 from seqopt.stability._step_verdicts import step_verdicts
 from seqopt.stability.assessment import MARGINS, Verdict
@@ -119,6 +121,31 @@ class ShownBuild(Shown):
         """
         return tolerance_table(self.engine, self.steps)
 
+    def times(self) -> pd.DataFrame:
+        """Return who does what when, at the earliest, in the order of the steps.
+
+        Result: a row per step: ``step``, ``type``, ``bricks``, ``robots`` who act, ``node`` that is
+        taken, from when the robot ``prepares_s`` and is ``ready_s`` (none where robots let go),
+        ``start_s`` and ``end_s`` of what changes the structure, and how long it ``waits_s`` for the
+        robot. Raises `StepError` if it is not known how long a robot takes that acts.
+        """
+        return times_table(self.engine.network.scene, self.steps)
+
+    @property
+    def makespan(self) -> float | None:
+        """How long the build takes, s; None if it is not known how long robots take."""
+        scene = self.engine.network.scene
+        return step_times(scene, self.steps)[-1].end if has_durations(scene) else None
+
+    def reassigned(self) -> tuple[Step, ...]:
+        """Return the same grips in the same order by robots with which the build takes least.
+
+        A robot may have a grip that it reaches, that is within its payload, and at which it gives
+        way as the one who had it. Raises `StepError` if it is not known how long robots take, or
+        some have arms, whose postures count.
+        """
+        return reassign(self.engine.network.scene, self.steps, self.responses())
+
     def plot(
         self, step: int | Sequence[int] | None = None, *, forces: bool = False, magnify: float = 0.0
     ) -> Figure:
@@ -135,18 +162,24 @@ class ShownBuild(Shown):
         )
         return figure
 
-    def gantt(self, first: int | None = None, last: int | None = None) -> Figure:
+    def gantt(
+        self, first: int | None = None, last: int | None = None, *, seconds: bool | None = None
+    ) -> Figure:
         """Draw the grips over the steps of the build: a lane per robot, a bar per grip.
+
+        Where it is known how long robots take, over seconds: with what they prepare, hatched.
 
         Every bar names its brick and its node, says whether the robot places the brick or holds it,
         and is shaded by the force of the grip.
 
-        ``first``, ``last``: numbers of the first and the last step that are drawn; by default all.
-        Raises `ExtraError` if matplotlib is not installed (extra ``plot``); `StepError` if there
-        are no such steps.
+        ``first``, ``last``: numbers of the first and the last step that are drawn; by default all;
+        ``seconds``: whether time goes along, by default if it is known. Raises `ExtraError` if
+        matplotlib is not installed (extra ``plot``); `StepError` if there are no such steps.
         """
         scene, responses = self.engine.network.scene, self.responses()
-        figure: Figure = display("gantt_picture")(scene, self.steps, responses, (first, last))
+        timed = has_durations(scene) if seconds is None else seconds
+        name = "seconds_picture" if timed else "gantt_picture"
+        figure: Figure = display(name)(scene, self.steps, responses, (first, last))
         return figure
 
     def animate(self, *, forces: bool = False, magnify: float = 0.0, seconds: float = 0.4) -> Any:

@@ -179,7 +179,9 @@ class Plan(ShownBuild):
     def gap(self) -> float | None:
         """What is proven to be left between value and bound, over the value; None without proof."""
         early = isinstance(self.selection, StatePath) and self.selection.stopped
-        return None if self.certificate is None or early else self.certificate.gap
+        if self.certificate is None or (early and not isfinite(self.certificate.gap)):
+            return None
+        return self.certificate.gap
 
     @property
     def ended(self) -> End:
@@ -218,7 +220,9 @@ class Plan(ShownBuild):
             return Status.FEASIBLE
         if proof is None:
             return Status.UNPROVEN
-        judged_exact = isinstance(graph, States) and not (graph.budgets or graph.totals)
+        judged_exact = isinstance(graph, States) and not (
+            graph.budgets or graph.totals or graph.is_timed
+        )
         exact = judged_exact and self.formulation.kind is not FormulationKind.HEURISTIC
         if exact or proof.gap <= TOLERANCE:
             return Status.OPTIMAL
@@ -364,8 +368,9 @@ class Plan(ShownBuild):
         the ``claimed_gap``; of every one of the ``budgets`` what is there, spent, and what one more
         unit would save; ``limits``, ``rules``, ``scenarios``, what ``stands``; how it ``ended`` and
         what ``stopped`` it; ``steps``, ``steps_before_release`` without those that let all go at
-        the end, ``regrips``, ``idle_robots``, which never grip; limits of the linear range that are
-        left, which model was ``enough``, what is known of ``arms``, and payloads that are exceeded;
+        the end, ``regrips``, ``makespan`` (s, if it is known how long robots take),
+        ``idle_robots``, which never grip; limits of the linear range that are left, which model was
+        ``enough``, what is known of ``arms``, and payloads that are exceeded;
         ``models_evaluated``, ``states_in_proof``, ``seconds``;
         of criteria of ranks the sums under both ``objectives`` and of heuristics ``gap_parts``; of
         an order that was sought ``order``, ``orders`` (among which), ``order_status``,
@@ -399,6 +404,7 @@ def _summarized(plan: Plan) -> dict[str, object]:
         "steps": len(plan.steps),
         "steps_before_release": len(plan.steps) - _letting_go(plan),
         "regrips": plan.regrips,
+        "makespan": plan.makespan,
         "idle_robots": list(idle_robots(scene, plan.steps)),
         "outside_linear_range": [str(departure) for departure in plan.departures],
         "enough": plan.enough.facts(),
@@ -447,7 +453,7 @@ def _bounds(plan: Plan) -> dict[str, float | None]:
     proof, chosen = plan.certificate, plan.selection
     bounds: tuple[float, ...] = () if proof is None else proof.bounds
     if isinstance(chosen, StatePath):
-        early = proof is None or chosen.stopped
+        early = proof is None or (chosen.stopped and not isfinite(proof.gap))
         bounds = (chosen.bound if early else bounds)[: len(plan.states.aims)]
     found = plan._by_goal(bounds) if bounds else {}
     return {name: bound if isfinite(bound) else None for name, bound in found.items()}

@@ -47,6 +47,7 @@ USUAL = {
     On.SCENARIOS: "scenario_search",
     On.STATES: "schedule_search",
     On.ORDERS: "order_search",
+    On.TIMES: "makespan_labels",
 }
 
 
@@ -113,6 +114,8 @@ def natural(problem: Problem) -> On:
     """Return which graph answers a problem if no formulation says."""
     if problem.orders is not None:
         return On.ORDERS
+    if problem.is_timed:
+        return On.TIMES
     if not in_layers(problem.moves) or problem.goals or problem.stands is not None:
         return On.STATES
     if problem.scenarios and problem.over.aim is Aim.SUM:
@@ -155,7 +158,8 @@ def layers_of(problem: Problem) -> Layers:
 
 def states_of(problem: Problem) -> States:
     """Return the states and moves of a problem; where its order is sought, in the scene's own."""
-    found = graph_of(problem, On.STATES if problem.orders is None else On.ORDERS)
+    on = natural(problem)
+    found = graph_of(problem, on if on in (On.ORDERS, On.TIMES) else On.STATES)
     states = found.states if isinstance(found, AllOrders) else found
     assert isinstance(states, States)
     return states
@@ -163,7 +167,7 @@ def states_of(problem: Problem) -> States:
 
 def _usual_criterion(problem: Problem) -> Criterion:
     """Return the criterion with the numbers of the scene; raise what the usual graph says."""
-    if natural(problem) in (On.STATES, On.ORDERS):
+    if natural(problem) in (On.STATES, On.ORDERS, On.TIMES):
         return states_of(problem).criterion
     parse_budgets(problem.budgets)
     layers = _scenarios(problem).nominal if problem.scenarios else _plain_layers(problem)
@@ -237,6 +241,8 @@ def _in_own_order(problem: Problem) -> States:
 def _all_orders(problem: Problem) -> AllOrders:
     if problem.orders is None:
         raise ProblemError("an order is given; pose with orders='tied' to seek one")
+    if problem.is_timed:
+        raise ProblemError("makespan: it is found in one order; give an order, or leave it out")
     return AllOrders(_states(problem), problem.orders)
 
 
@@ -244,6 +250,7 @@ MADE: dict[On, Callable[[Problem], Graph]] = {
     On.LAYERS: _layers,
     On.SCENARIOS: _scenarios,
     On.STATES: _in_own_order,
+    On.TIMES: _in_own_order,
     On.ORDERS: _all_orders,
 }
 
@@ -252,6 +259,7 @@ SOLVE: dict[On, Callable[[Any, Formulation, Run], Plan]] = {
     On.LAYERS: solve_layers,
     On.SCENARIOS: solve_layers,
     On.STATES: solve_states,
+    On.TIMES: solve_states,
     On.ORDERS: solve_orders,
 }
 
@@ -340,7 +348,9 @@ def _of_graph(problem: object, formulation: Formulation | str | None) -> Formula
     """Return the formulation of a graph of choices that is given."""
     on = next((on for kind, on in GRAPHS.items() if isinstance(problem, kind)), On.LAYERS)
     name = USUAL[on]
-    if isinstance(problem, ScenarioLayers) and problem.aim.aim is Aim.PEAK:
+    if isinstance(problem, States) and problem.is_timed:
+        on, name = On.TIMES, USUAL[On.TIMES]
+    elif isinstance(problem, ScenarioLayers) and problem.aim.aim is Aim.PEAK:
         on, name = On.LAYERS, "minimax"
     elif on is On.LAYERS and getattr(problem, "budgets", None):
         name = "labels"

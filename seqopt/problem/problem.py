@@ -216,6 +216,7 @@ class Measure(Enum):
     STEPS = "steps"  # how many steps there are
     REGRIPS = "regrips"  # how many grips are taken beside those that place a brick
     TRAVEL = "travel"  # how far robots go from one grip to the next, m
+    MAKESPAN = "makespan"  # how long the build takes, s
 
 
 @dataclass(frozen=True)
@@ -261,9 +262,10 @@ def parse_goals(text: str) -> tuple[Goal, ...]:
     """Return goals from words, the most important first, with commas between them.
 
     They are ``minmax`` (the worst of the criterion), ``sum`` (over all steps), ``steps``,
-    ``regrips``, ``travel``, a response (its worst) or ``sum(RESPONSE)``; also ``bond`` and
-    ``friction`` (the least with which every state stands), ``tilt`` (the largest that every state
-    survives) and ``tolerance`` (how far grips may be off in every state).
+    ``regrips``, ``travel``, ``makespan`` (how long the build takes, where robots have durations), a
+    response (its worst) or ``sum(RESPONSE)``; also ``bond`` and ``friction`` (the least with which
+    every state stands), ``tilt`` (the largest that every state survives) and ``tolerance`` (how far
+    grips may be off in every state).
 
     Examples
     --------
@@ -288,8 +290,9 @@ SHAPE = re.compile(
     r"(?P<kind>travel|steps_over:(?P<response>.+)|robot_use:(?P<robot>.+))"
     r"=((?P<level>[^:=]+):)?(?P<bound>[^:=]+?)(?P<unit>m|x|)"
 )
-CAP = re.compile(r"(?P<name>[^=]+)=(?P<bound>[^:=]+?)(?P<unit>m?)")
-CAPS = "travel=3.5m, regrips=2, steps=50 or sum(T_max)=900, say"
+CAP = re.compile(r"(?P<name>[^=]+)=(?P<bound>[^:=]+?)(?P<unit>[ms]?)")
+CAP_UNITS = {"travel": "m", "makespan": "s"}
+CAPS = "travel=3.5m, makespan=600s, regrips=2, steps=50 or sum(T_max)=900, say"
 FORMS = "travel=0.8, travel=3.5m, steps_over:F_largest=250:10 or robot_use:rob1=100:5"
 
 
@@ -332,11 +335,11 @@ def _parse(text: str) -> AskedBudget:
 
 
 def parse_caps(texts: Sequence[str] | str) -> dict[str, float]:
-    """Return caps on totals of states: ``travel=3.5m``, ``regrips=2``, ``sum(T_max)=9``."""
+    """Return caps on totals: ``travel=3.5m``, ``makespan=60s``, ``regrips=2``, ``sum(T_max)=9``."""
     out: dict[str, float] = {}
     for text in (texts,) if isinstance(texts, str) else texts:
         found = CAP.fullmatch(text) if isinstance(text, str) else None
-        if found is None or (found["name"] == "travel") != bool(found["unit"]):
+        if found is None or found["unit"] != CAP_UNITS.get(found["name"], ""):
             raise ProblemError(f"budget {short(text)} of states does not exist; give {CAPS}")
         if found["name"] in out:
             raise ProblemError(f"budget {text}: it stands there twice; give one bound")
@@ -452,6 +455,12 @@ class Problem(Shown):
     def method(self) -> str:
         """The name of the schedule, or ``free``."""
         return FREE if isinstance(self.moves, FreeRules) else self.moves.method
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether it is asked how long the build takes."""
+        capped = any(str(words).startswith(f"{Measure.MAKESPAN.value}=") for words in self.budgets)
+        return capped or any(goal.measure is Measure.MAKESPAN for goal in self.goals)
 
     @property
     def schedule(self) -> Schedule:

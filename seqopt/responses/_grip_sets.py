@@ -12,7 +12,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Engine
 from seqopt.errors import MechanismError
 from seqopt.responses._blocks import (
@@ -208,3 +208,12 @@ def _solved(engine: Engine | Shipment, part: Block) -> Floats:
 
 def _columns(part: Block, found: Answers) -> Floats:
     return np.column_stack([*(found.values[name] for name in part.names), found.forces])
+
+
+BAND = 1e-5  # share of a value within which six digits do not decide
+
+
+def _near(values: Floats, bound: Floats | float) -> Bools:
+    """Return which values are so close to a bound, NaN if there is none, that digits decide."""
+    finite = np.where(np.isfinite(values), values, np.nan)
+    return np.asarray(np.abs(finite - bound) <= BAND * np.abs(bound))

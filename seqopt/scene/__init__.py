@@ -14,18 +14,21 @@ An arch of your own from the angles of its bricks, with robots beside it that re
 [True, True, True]
 
 Make any other scene from `Brick`, `Joint`, `Ground` and `Robot`, and `Load` where something else
-than its weight loads it; `save_scene` writes it to a file.
+than its weight loads it; `seqopt.save_scene` writes it to a file. `Durations` say how long a robot
+takes.
 """
 
 from seqopt.scene._loads import Load
 from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.holders._durations import Durations
 from seqopt.scene.parts import Brick, Ground, Joint, Robot
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import load_scene, save_scene
+from seqopt.scene.scene_file import load_scene
 
 __all__ = [
     "ArchShape",
     "Brick",
+    "Durations",
     "Ground",
     "Joint",
     "Load",
@@ -33,5 +36,4 @@ __all__ = [
     "Scene",
     "arch_scene",
     "load_scene",
-    "save_scene",
 ]

@@ -36,6 +36,7 @@ from seqopt.scene._checks import (
     wholes,
 )
 from seqopt.scene.arm import Arm
+from seqopt.scene.holders._durations import Durations
 from seqopt.scene.shape import Polyhedron
 
 _UNIT = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
@@ -421,6 +422,8 @@ class Robot(Terse):
         scene's axes. By default a grip lets its node turn.
     arm : Arm, optional
         Its arm, which must reach a node as well; see `seqopt.arms`.
+    durations : Durations, optional
+        How long it takes for what it does; by default that is not known.
 
     Raises
     ------
@@ -444,6 +447,7 @@ class Robot(Terse):
     stiffness: float | Vector | None = None
     rotational_stiffness: float | Vector | None = None
     arm: Arm | None = field(default=None, repr=False)
+    durations: Durations | None = None
 
     def __post_init__(self) -> None:
         printable("robot", self.name)
@@ -453,3 +457,4 @@ class Robot(Terse):
         turning = partial(_each_way, unit="N m/rad, or none if its node may turn")
         check(self, where, rotational_stiffness=unless_none(turning))
         check(self, where, arm=unless_none(partial(kind_of, kind=Arm)))
+        check(self, where, durations=unless_none(partial(kind_of, kind=Durations)))

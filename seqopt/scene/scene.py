@@ -15,7 +15,8 @@ from seqopt.errors import SceneError
 from seqopt.scene._checks import check, not_negative, printable, short, vector, wholes
 from seqopt.scene._grip_kinds import GripKinds, grip_kinds
 from seqopt.scene._loads import Load
-from seqopt.scene._props import Prop, centered, settled_props
+from seqopt.scene.holders._durations import _durations_in_words
+from seqopt.scene.holders._props import Prop, centered, settled_props
 from seqopt.scene.parts import Brick, Ground, Joint, Reach, Robot
 
 if TYPE_CHECKING:
@@ -356,6 +357,24 @@ class Scene(Shown):
             return ()
         since, of = self.since, self.brick_of_node
         return tuple(prop for prop in self.props if since[of[prop.node].name] <= bricks)
+
+    def with_durations(self, *words: str) -> Scene:
+        """Return the same scene with robots that take as long as words say.
+
+        ``*words``: as of `seqopt.scene.holders._durations._durations_in_words`.
+
+        Examples
+        --------
+        >>> import seqopt
+        >>> words = "fetch=30,place=10,approach=10,grip=5,release=5"
+        >>> scene = seqopt.load_scene("arch25").with_durations(words, "rob3:slower=2.5")
+        >>> [robot.durations.place for robot in scene.robots]
+        [10.0, 10.0, 25.0]
+        """
+        names, own = [r.name for r in self.robots], [r.durations for r in self.robots]
+        found = _durations_in_words(names, own, words)
+        pairs = zip(self.robots, found, strict=True)
+        return replace(self, robots=tuple(replace(r, durations=each) for r, each in pairs))
 
     @cached_property
     def grip_kinds(self) -> GripKinds:

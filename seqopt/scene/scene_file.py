@@ -25,8 +25,9 @@ from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import cut, reading_json, short
 from seqopt.scene._loads import Load
-from seqopt.scene._props import Prop
 from seqopt.scene.arm import Arm
+from seqopt.scene.holders._durations import Durations
+from seqopt.scene.holders._props import Prop
 from seqopt.scene.library.arch_form import ArchForm, arch, barrel_vault, chain
 from seqopt.scene.library.dome import DomeShape, dome
 from seqopt.scene.library.vault import VaultShape, herringbone_vault
@@ -106,7 +107,7 @@ def _named(bricks: list[Brick]) -> str:
 _VERSION = 1
 _UNSAID = (
     *("thickness", "face", "shape", "node_offsets", "movement", "position", "since"),
-    *("stiffness", "rotational_stiffness"),  # of robots
+    *("stiffness", "rotational_stiffness", "arm", "durations", "speed"),  # of robots
     *("direction", "capacity"),  # of props
 )
 """Left out of a file where there is none."""
@@ -355,6 +356,7 @@ def _scene_from_dict(document: dict[str, Any]) -> Scene:
             **robot
             | {"reach": _reach(robot.get("reach", {"kind": "anywhere"}))}
             | ({"arm": Arm(**robot["arm"])} if robot.get("arm") else {})
+            | ({"durations": Durations(**robot["durations"])} if robot.get("durations") else {})
         )
         for robot in content["robots"]
     ]
@@ -378,19 +380,22 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
         if document[key] == usual:
             del document[key]
     kinds = ("bricks", "joints", "grounds", "robots", "loads", "props")
-    for part in (part for kind in kinds for part in document.get(kind, ())):
-        for key in _UNSAID:
-            if part.get(key, "") is None:
-                del part[key]
+    for kind in (kind for kind in kinds if kind in document):
+        document[kind] = tuple(map(_said, document[kind]))
     names = {cls: kind for kind, cls in _REACHES.items()}
     for entry, robot in zip(document["robots"], scene.robots, strict=True):
         entry["reach"] = {"kind": names[type(robot.reach)], **entry["reach"]}
-        if robot.arm is None:
-            del entry["arm"]
-        else:
+        if robot.durations is not None:
+            entry["durations"] = _said(entry["durations"])
+        if robot.arm is not None:
             usual = {each.name: each.default for each in fields(Arm)}
             entry["arm"] = {k: v for k, v in entry["arm"].items() if v != usual[k]}
     return document
+
+
+def _said(entry: dict[str, Any]) -> dict[str, Any]:
+    """Return an entry without what is none and then left out."""
+    return {key: value for key, value in entry.items() if value is not None or key not in _UNSAID}
 
 
 def dump_scene(scene: Scene) -> str:

@@ -62,11 +62,16 @@ class RobotKind(FrozenValue):
 
 
 def sort_robots(
-    network: Network, rules: FreeRules, caps: Mapping[str, float] | None = None
+    network: Network,
+    rules: FreeRules,
+    caps: Mapping[str, float] | None = None,
+    *,
+    timed: bool = False,
 ) -> tuple[RobotKind, ...]:
     """Return the robots that take part, by kind, in the order of their first robots.
 
-    ``caps``: largest force of a robot's grip beside its payload, by its name, N.
+    ``caps``: largest force of a robot's grip beside its payload, by its name, N; ``timed``: whether
+    those of a kind must take as long.
     """
     scene = network.scene
     alike: dict[tuple[object, ...], RobotKind] = {}
@@ -78,7 +83,7 @@ def sort_robots(
         places = not rules.placers or robot.name in rules.placers
         cap = robot.payload if rules.payload is Payload.KEPT else np.inf
         cap = min(cap, (caps or {}).get(robot.name, np.inf))
-        alone = (robot.arm and robot.name, scene.grip_kinds.of_robot[i])
+        alone = (robot.arm and robot.name, scene.grip_kinds.of_robot[i], timed and robot.durations)
         key = (reach.tobytes(), newest.tobytes(), places, cap, *alone)
         first = alike.setdefault(key, RobotKind((), reach, newest, places, cap))
         alike[key] = replace(first, robots=(*first.robots, i))
@@ -402,11 +407,13 @@ def free_space(
     caps: Mapping[str, float] | None = None,
     *,
     parks: bool = False,
+    timed: bool = False,
 ) -> FreeSpace:
     """Return the states of a free schedule in a scene.
 
     ``caps``: largest force of a robot's grip beside its payload, by its name, N; ``parks``: whether
-    free robots stay where they were, for their travel.
+    free robots stay where they were, for their travel; ``timed``: whether it counts how long robots
+    take.
 
     Examples
     --------
@@ -416,7 +423,7 @@ def free_space(
     >>> space.places(0, space.start()).states.tolist()  # node 0 of its first brick is blocked
     [[2, 0, 0], [0, 2, 0], [0, 0, 2]]
     """
-    space = FreeSpace(network, rules, sort_robots(network, rules, caps), parks)
+    space = FreeSpace(network, rules, sort_robots(network, rules, caps, timed=timed), parks)
     base = 1 + (2 if parks else 1) * 2 * len(network.inner)
     if base**space.robots * (1 + (rules.regrips or 0)) >= 2**62:
         raise StepError(

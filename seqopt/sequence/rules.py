@@ -216,7 +216,7 @@ def with_robots(scene: Scene, count: int) -> Scene:
     """Return a scene with one to five robots: its own first, then mobile ones.
 
     Further robots reach every node, have the largest payload of the scene's own, and give way as
-    the first of them does.
+    the first of them does, and take as long.
 
     Examples
     --------
@@ -233,6 +233,7 @@ def with_robots(scene: Scene, count: int) -> Scene:
     ways = [(robot.stiffness, robot.rotational_stiffness) for robot in scene.robots[:1]]
     shift, turn = ways[0] if ways else (None, None)
     more = partial(Robot, payload=payload, stiffness=shift, rotational_stiffness=turn)
+    more = partial(more, durations=scene.robots[0].durations if scene.robots else None)
     robots += [more(name=next(fresh)) for _ in range(count - len(robots))]
     return replace(scene, robots=tuple(robots))
 

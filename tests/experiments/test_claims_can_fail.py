@@ -33,6 +33,7 @@ from experiments.placement import (
 from experiments.stability import classical, dry_map, witnesses
 from experiments.study import criteria_variants, paper_counterparts
 from experiments.study.parts.paper_items import ITEMS
+from experiments.times import makespan
 from seqopt.study.published import printed
 
 STUDY = printed("de_validation").set_index("bricks")["error_percent"]
@@ -138,6 +139,11 @@ CHECKS = {
         lambda table: soft_grips.holds(table, 1.0),
         ("soft_grips",),
         *("D_max", 200.0, {"build": "cantilever", "stiffness": 1e6}),
+    ),
+    "makespan": Check(
+        makespan.holds,
+        ("makespan",),
+        *("makespan", 100.0, {"formulation": "makespan_cp", "bricks": 7}),
     ),
     "free_growth": Check(
         free_growth.holds, ("free_growth",), *("status", "feasible", {"bricks": 49, "robots": 4})

@@ -13,8 +13,8 @@ from seqopt._cli.main import main
 from seqopt.engines.registry import Recipe
 from seqopt.errors import SceneError, SceneWarning
 from seqopt.report.page import Build, report_page
-from seqopt.scene import Load, load_scene, save_scene
-from seqopt.scene.scene_file import dump_scene, scene_to_dict
+from seqopt.scene import Load, load_scene
+from seqopt.scene.scene_file import dump_scene, save_scene, scene_to_dict
 from tests.builders import six_bricks
 
 

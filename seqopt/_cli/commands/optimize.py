@@ -16,12 +16,14 @@ from seqopt._cli.asked import (
     asked_scene,
     exceeded,
     idle_notes,
+    in_seconds,
     level_notes,
     refused,
     scene_facts,
     strictly,
 )
 from seqopt._cli.options import (
+    DURATIONS,
     LIMIT,
     RULE,
     STANDING,
@@ -76,6 +78,8 @@ EXAMPLES = (
     "seqopt optimize wall:columns=6,courses=4 --schedule free --out wall",
     "seqopt optimize my.json --formulation minimax --limit payload --out mine",
     "seqopt optimize arch25 --robust worst-peak --out robust",
+    "seqopt optimize arch25 --schedule free --aim minmax,makespan "
+    "--durations fetch=30,place=10,approach=10,grip=5,release=5",
 )
 INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
 BUDGET = {
@@ -83,15 +87,15 @@ BUDGET = {
     "lagrangian, overlap_mip and overlap_lp: travel=0.8 (of what the optimum without budgets "
     "travels), travel=3.5m, steps_over:F_largest=250:10 (at most 10 open steps over 250 N), "
     "robot_use:rob1=100:5 (at most 5 in which rob1 carries over 100 N); with --aim or --schedule "
-    "free: steps=N, regrips=N, travel=METERS or sum(RESPONSE)=VALUE"
+    "free: steps=N, regrips=N, travel=3.5m, makespan=600s or sum(RESPONSE)=VALUE"
 }
 AIM = {
     "--aim NAME,NAME": "what is to be as small as possible, the most important first: props (how "
-    "many are needed, at which nodes), minmax (the "
-    "worst step by the criterion, by default worst-ratio), sum, steps, regrips, travel, bond, "
-    "friction, tilt, a response, or sum(RESPONSE) (free: by default minmax; other schedules: by "
-    "default the total of what their moves cost); with --order search, the best order of the "
-    "bricks is found too"
+    "many are needed, at which nodes), minmax (the worst step by the criterion, by default "
+    "worst-ratio), sum, steps, regrips, travel, makespan (how long the build takes, with "
+    "--durations), bond, friction, tilt, a response, or sum(RESPONSE) (free: by default minmax; "
+    "other schedules: by default the total of what their moves cost); with --order search, the "
+    "best order of the bricks is found too"
 }
 SEARCH = {
     "--option NAME=VALUE ...": "option of the formulation, as horizon=2 or width=10",
@@ -170,8 +174,8 @@ def _basic(command: argparse.ArgumentParser) -> None:
         "--formulation NAME": "which mathematical program chooses: "
         f"{', '.join(formulation_names())} (default: overlap_dp, which is exact and the fastest, "
         "labels with --budget, minimax with --robust worst-peak, scenario_search with other aims "
-        "over scenarios; schedule_search with --aim, --stands or --schedule free, order_search "
-        "with --order search)",
+        "over scenarios; schedule_search with --aim, --stands or --schedule free, makespan_labels "
+        "where a makespan counts, order_search with --order search)",
         "--schedule NAME|FILE": f"which sequence has the open grips: {', '.join(SCHEDULES)} (of "
         "all robots), a CSV file of steps in which open grips are marked ?, or "
         f"{FREE}: any robot may release, hold or place next (default: the loop of three robots, or "
@@ -181,6 +185,7 @@ def _basic(command: argparse.ArgumentParser) -> None:
     declare(takes, about)
     robots_option(takes, "a loop, or a schedule that is named")
     declare(takes, {"--out DIR": "folder to write plan, tables, summary and page to"})
+    declare(takes, DURATIONS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +256,7 @@ def find(options: argparse.Namespace) -> Found:
     formulation = as_formulation(options.formulation or usual(asked.problem))
     how = _how(options, formulation)
     assemble = time.perf_counter() - start
-    tell = options.tell if formulation.on is On.STATES else within(options.tell, limit)
+    tell = options.tell if formulation.on in (On.STATES, On.TIMES) else within(options.tell, limit)
 
     def choose(problem: Problem) -> Plan:
         return solve(problem, formulation, time_limit=limit, progress=tell, **how)
@@ -314,7 +319,7 @@ def _bases(
     """Return the best plan over the bases that are asked for."""
     if options.no_proof:
         raise ProblemError("--no-proof: bases are compared by proven plans; leave it out")
-    scene = asked_scene(options)
+    scene = in_seconds(options, asked_scene(options))
     places = asked_places(scene, options.bases)
     return choose_bases(problem, scene, places, choose, options.tell)
 
@@ -364,6 +369,7 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
             *arms,
             *(() if stopped else (*plan.enough.lines, f"proof: {_proof(plan)}")),
             *idle_notes(scene, plan.steps),
+            *_time_notes(plan),
             *refused(found.prover),
         ),
         failures=(INTERRUPTED,) if stopped else (),
@@ -371,6 +377,13 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
     )
     unreached = () if plan.arms is None else faults_in_words(plan.arms.postures)
     return strictly(answer, options, over, plan.departures, found.verdicts, unreached)
+
+
+def _time_notes(plan: Plan) -> tuple[str, ...]:
+    """Return how long a plan takes where that is known, and no aim."""
+    if plan.makespan is None or "makespan" in plan.goals:
+        return ()
+    return (f"time: the build takes {plan.makespan:.6g} s; --aim makespan makes it short",)
 
 
 def _said(found: Found) -> str:

@@ -17,7 +17,7 @@ from seqopt.sequence import _rule_space as free_space
 from seqopt.sequence._rule_space import FreeSpace, node_numbers
 from seqopt.sequence._schedule_space import ScheduleSpace
 from seqopt.sequence.rules import Ending
-from seqopt.sequence.site import _begin_step
+from seqopt.sequence.site import Site, _begin_step
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 
@@ -57,6 +57,38 @@ def _stays(space: FreeSpace) -> dict[int, int]:
     lasts = (site.grips or (), site.stays)
     found = [(r, n) for nodes in lasts for r, n in enumerate(nodes) if n is not None]
     return {robot: numbers.index(node) + 1 for robot, node in found}
+
+
+def steps_in_hands(
+    space: FreeSpace | ScheduleSpace,
+    states: Sequence[Sequence[int]],
+    grips: Sequence[Sequence[int]],
+) -> tuple[Step, ...]:
+    """Return the same by the robots that grips say, places (one per robot), if they say any.
+
+    Raises `SolverError` if they are not those of the states.
+    """
+    steps = steps_of(space, states)
+    if not grips:
+        return steps
+    numbers = [None, *node_numbers(space.network)]
+    if [len(row) for row in grips] != [len(step.grips) for step in steps] or not all(
+        0 <= n < len(numbers) for row in grips for n in row
+    ):
+        raise SolverError("the grips of robots are none of this scene, or not of every state")
+    out = []
+    for step, row in zip(steps, grips, strict=True):
+        own = replace(step, grips=tuple(numbers[n] for n in row))
+        if {*own.held} != {*step.held}:
+            raise SolverError(f"step {step.number}: robots hold other nodes than its state says")
+        out.append(own)
+    scene = space.network.scene
+    return check_sequence(scene, out, _begin_step(scene, _begin_of(space)))
+
+
+def _begin_of(space: FreeSpace | ScheduleSpace) -> Site | None:
+    """Return where builds begin."""
+    return space.schedule.begin if isinstance(space, ScheduleSpace) else space.rules.begin
 
 
 def _scheduled_steps(space: ScheduleSpace, states: Sequence[Sequence[int]]) -> tuple[Step, ...]:

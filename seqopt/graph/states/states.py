@@ -35,7 +35,7 @@ from seqopt.problem.requirements import (
     state_costs,
 )
 from seqopt.problem.standing import Standing, StandingSets
-from seqopt.responses._grip_sets import GripSets
+from seqopt.responses._grip_sets import GripSets, _near
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, robot_response
 from seqopt.responses.resources import HERE, Resources
@@ -43,13 +43,13 @@ from seqopt.scene._checks import as_float, short
 from seqopt.scene.scene import Scene
 from seqopt.sequence._rule_space import FreeSpace, free_space
 from seqopt.sequence._schedule_space import ScheduleSpace
+from seqopt.sequence._timing import has_speeds, require_for_makespan
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Grips
 from seqopt.stability.assessment import Stability
 
 FREE_TITLE = "free schedule"
-BAND = 1e-5  # share of a value within which six digits do not decide
 
 
 @dataclass(frozen=True, repr=False)
@@ -144,10 +144,22 @@ class States(Shown):
     @cached_property
     def space(self) -> FreeSpace | ScheduleSpace:
         """Its states and moves."""
-        parks = any(goal.measure is Measure.TRAVEL for goal in self.goals)
         if isinstance(self.rules, Schedule):
-            return ScheduleSpace(self.network, self.rules, self.caps, parks)
-        return free_space(self.network, self.rules, self.caps, parks=parks)
+            return ScheduleSpace(self.network, self.rules, self.caps, self.parks)
+        return free_space(
+            self.network, self.rules, self.caps, parks=self.parks, timed=self.is_timed
+        )
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether it is asked how long the build takes."""
+        return any(goal.measure is Measure.MAKESPAN for goal in self.goals)
+
+    @property
+    def parks(self) -> bool:
+        """Whether it counts where a free robot was last: for its travel, or the time of it."""
+        speeds = self.is_timed and has_speeds(self.network.scene)
+        return speeds or any(goal.measure is Measure.TRAVEL for goal in self.goals)
 
     @cached_property
     def caps(self) -> Mapping[str, float]:
@@ -376,12 +388,6 @@ class States(Shown):
         return np.take_along_axis(held, order, axis=1), np.asarray(most[order])
 
 
-def _near(values: Floats, bound: Floats | float) -> Bools:
-    """Return which values are so close to a bound, NaN if there is none, that digits decide."""
-    finite = np.where(np.isfinite(values), values, np.nan)
-    return np.asarray(np.abs(finite - bound) <= BAND * np.abs(bound))
-
-
 def build_states(
     engine: Engine,
     rules: FreeRules | Schedule,
@@ -452,14 +458,14 @@ def within(problem: States, caps: Mapping[str, float]) -> States:
         if goal.measure is Measure.PEAK or (goal.of_states and not goal.response):
             raise ProblemError(
                 f"budget {goal}: it is no total of moves or of a response; give steps, regrips, "
-                "travel or sum(RESPONSE), or set a limit"
+                "travel, makespan or sum(RESPONSE), or set a limit"
             )
         if not 0 <= as_float(cap) < np.inf:
             raise ProblemError(f"budget {goal}={short(cap)}: give a number from 0")
     if problem.budgets:
         raise ProblemError("the problem has budgets already; give all of them at once")
     caps_of = tuple(float(cap) for cap in caps.values())
-    return replace(problem, goals=(*problem.goals, *goals), budgets=caps_of)
+    return _asked(replace(problem, goals=(*problem.goals, *goals), budgets=caps_of))
 
 
 def over_scenarios(
@@ -492,6 +498,8 @@ def _asked(problem: States) -> States:
     """Return a problem whose stability can be asked, where it will be."""
     if problem.standing is not None or any(goal.of_margins for goal in problem.goals):
         _ = problem.stability  # what cannot be asked is refused now
+    if problem.is_timed:
+        require_for_makespan(problem.network.scene, problem.rules)
     return problem
 
 

@@ -21,6 +21,7 @@ import numpy as np
 from seqopt._interrupts import answered
 from seqopt.arrays import FrozenValue, Ints
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, SolverError, message_of
+from seqopt.graph._timed import LabelProof
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.scenarios import ScenarioLayers, largest_of
@@ -169,7 +170,9 @@ class StatePath(FrozenValue):
     and depends on them in nothing but its time; ``prices``: by goal, what a unit of every budget
     and of every sum before it is worth: they prove the bounds where there are budgets; ``stopped``:
     why the search ended before all was proven: ``time``, ``memory`` or ``interrupt``; empty if it
-    did not.
+    did not; ``grips``: where it counts who of a kind acts, after every step the place that each
+    robot of the scene holds, 0 for none; ``proofs``: of the makespan and the goals after it, of all
+    goals where there are budgets.
     """
 
     states: tuple[tuple[int, ...], ...]
@@ -178,6 +181,8 @@ class StatePath(FrozenValue):
     visited: tuple[Ints, ...] = field(default=(), repr=False)
     prices: tuple[tuple[float, ...], ...] = ()
     stopped: str = ""
+    grips: tuple[tuple[int, ...], ...] = ()
+    proofs: tuple[LabelProof, ...] = field(default=(), repr=False)
 
 
 def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
@@ -198,7 +203,17 @@ def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
             raise ValueError("a value or bound is NaN, or a bound is above its value")
         visited = tuple(np.asarray(rows) for rows in found.visited)
         prices = tuple(tuple(map(float, each)) for each in found.prices)
-        return StatePath(states, objective, bound, visited, prices, text(found.stopped))
+        grips = tuple(tuple(operator.index(n) for n in row) for row in found.grips)
+        proofs = tuple(_arrays(proof) for proof in found.proofs)
+        told = (visited, prices, text(found.stopped), grips, proofs)
+        return StatePath(states, objective, bound, *told)
+
+
+def _arrays(proof: LabelProof) -> LabelProof:
+    """Return labels as arrays of numbers."""
+    states, labels, prices = proof
+    numbers = [np.array(part, dtype=float) for part in (labels, prices)]
+    return LabelProof(np.array(states, dtype=np.int64), *numbers)
 
 
 def require_fit(

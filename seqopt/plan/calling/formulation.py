@@ -158,6 +158,7 @@ class On(Enum):
     SCENARIOS = "layers of candidates in many scenarios"
     STATES = "the states of a build"
     ORDERS = "the states of all orders"
+    TIMES = "the states of a build in time"
     FRONTS = "Pareto sets"
 
 
@@ -309,8 +310,8 @@ def formulations(*on: On) -> dict[str, Formulation]:
     Examples
     --------
     >>> import seqopt
-    >>> [name for name, f in seqopt.formulations().items() if f.takes_budgets]
-    ['labels', 'lagrangian', 'overlap_lp', 'overlap_mip', 'schedule_search']
+    >>> [name for name, f in seqopt.formulations().items() if f.takes_budgets and f.aim]
+    ['labels', 'lagrangian', 'overlap_lp', 'overlap_mip']
     """
     return {name: find_formulation(name) for name in formulation_names(*on)}
 

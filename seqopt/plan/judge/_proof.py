@@ -24,6 +24,7 @@ from seqopt.graph.states.states import States
 from seqopt.plan.judge._answers import ask
 from seqopt.plan.judge._rule_moves import Follows, RuleTables, ScheduleTables, _alike
 from seqopt.plan.judge._standing_proof import StandingProof
+from seqopt.plan.judge._timed_goals import Claim, GoalProofs, TimedStates
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Measure
 from seqopt.problem.requirements import LIMIT_TOLERANCE
@@ -233,11 +234,10 @@ def _near(values: Floats, bounds: Floats) -> Bools:
 
 def _tables(problem: States, most: Mapping[int, float]) -> Tables:
     """Return what rules or a schedule allow."""
-    parks = any(goal.measure is Measure.TRAVEL for goal in problem.goals)
     if isinstance(problem.rules, Schedule):
-        return ScheduleTables(problem.rules, problem.network, parks=parks)
+        return ScheduleTables(problem.rules, problem.network, parks=problem.parks)
     book = RuleBook(problem.network, problem.rules)
-    return RuleTables(book, _alike(book, most), parks=parks)
+    return RuleTables(book, _alike(book, most, timed=problem.is_timed), parks=problem.parks)
 
 
 def _loads(problem: States, *, stand: bool) -> dict[int, float]:
@@ -305,6 +305,33 @@ class Proof:
         levels = _Levels(self._passable, self._told, asked)
         self.states = sum(map(len, levels.states))
         return budget_bounds(levels.graph(), values, claimed, (caps, prices))
+
+    def timed_bounds(self, claim: Claim) -> tuple[float, ...]:
+        """Return the same for builds in time, by labels that a formulation gives.
+
+        Raises `SolverError` if labels are given that do not prove what is claimed.
+        """
+        passable, values = self._passable, claim.values
+        k = passable.margins
+        levels = _Levels(passable, self._told, Asked(values, exact=True))
+        graph, margins = levels.graph(), values[:k]
+        stands = passable.stands.asked(margins)
+
+        def fallen(level: int, rows: Ints) -> Bools:
+            if not stands:
+                return np.zeros(len(rows), dtype=bool)
+            return ~passable.may_stand(level, rows, margins)
+
+        while True:
+            states = TimedStates(passable.problem, passable.tables, levels.states, graph, fallen)
+            proofs = GoalProofs(states, claim)
+            out = (*values[:k], *proofs.bounds(k))
+            early = [b < v - BELOW * abs(v) for b, v in zip(out, values, strict=False)]
+            fell = self._fallen(levels, graph, values) if any(early) else ()
+            if not len(fell):
+                self.states = int(reached(graph).sum())
+                return out
+            graph = graph.only(~np.isin(graph.target, fell))
 
     def is_impossible(self, margins: Sequence[float] = ()) -> bool:
         """Return whether no plan is allowed, or none in which all states have such margins.

@@ -12,7 +12,7 @@ import numpy as np
 
 from seqopt.engines.interface import Engine, Want
 from seqopt.errors import SolverError
-from seqopt.scene._props import Prop
+from seqopt.scene.holders._props import Prop
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 

@@ -99,6 +99,12 @@ class RuleTables:
         return self._book.team
 
     @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """Columns of robots that could change places; those of others alone."""
+        alone = {*range(self.robots)} - {column for group in self._groups for column in group}
+        return (*(tuple(group) for group in self._groups), *((column,) for column in sorted(alone)))
+
+    @property
     def robots(self) -> int:
         """How many robots take part."""
         return len(self._able)
@@ -273,6 +279,7 @@ class ScheduleTables:
         self.last, self.robots = len(schedule.steps), len(scene.robots)
         self._before = schedule.steps[0].number - 1
         self.team = tuple(range(self.robots))
+        self.groups = tuple((column,) for column in self.team)
         self.nodes = np.array([-1, *(node for brick in scene.placed for node in brick.nodes)])
         at = [scene.node_position(node) for node in self.nodes[1:].tolist()]
         self._at = np.array([[np.nan] * 3, *at])
@@ -391,8 +398,10 @@ def check_scheduled(schedule: Schedule, steps: Sequence[Step]) -> None:
             raise StepError(f"step {step.number} is none of schedule {schedule.method}")
 
 
-def _alike(book: RuleBook, most: Mapping[int, float]) -> list[tuple[int, ...]]:
-    """Return the robots that could change places, group by group."""
+def _alike(
+    book: RuleBook, most: Mapping[int, float], *, timed: bool = False
+) -> list[tuple[int, ...]]:
+    """Return the robots that could change places, group by group; ``timed``: also in time."""
     scene, last = book.network.scene, len(book.network.inner)
     groups: dict[object, list[int]] = {}
     for r in book.team:
@@ -401,6 +410,7 @@ def _alike(book: RuleBook, most: Mapping[int, float]) -> list[tuple[int, ...]]:
         own = scene.robots[r]
         gives = (own.stiffness, own.rotational_stiffness, own.payload)  # tolerances are of these
         arm = own.arm and r  # no other robot is where it is
-        key = (book.reached[r, last], tuple(nodes), may, most[r], gives, arm)
+        takes = own.durations if timed else None
+        key = (book.reached[r, last], tuple(nodes), may, most[r], gives, arm, takes)
         groups.setdefault(key, []).append(r)
     return [tuple(group) for group in groups.values() if len(group) > 1]

@@ -24,6 +24,8 @@ from seqopt.plan.judge._proof import BELOW, Hint, Proof
 from seqopt.plan.judge._prop_rules import check_props
 from seqopt.plan.judge._rule_moves import check_scheduled
 from seqopt.plan.judge._standing_proof import proven_margins, require_margin
+from seqopt.plan.judge._time_proof import makespan
+from seqopt.plan.judge._timed_goals import Claim
 from seqopt.plan.judge.certificate import Certificate
 from seqopt.problem.problem import LARGEST, Goal, Measure
 from seqopt.problem.standing import _size, slack
@@ -55,6 +57,8 @@ def judge_schedule(
     a limit is exceeded, or a plan is better than promised; `StepError` if a step breaks a rule.
     """
     values = _as_claimed(problem, selection, steps)
+    if problem.is_timed and np.isfinite(selection.bound).any():
+        return _in_time(problem, selection, values, hint)
     if selection.stopped:  # its bounds are claimed, not proven
         return Certificate(values, (-np.inf,) * len(values), np.inf, np.inf)
     if problem.totals:
@@ -69,6 +73,25 @@ def judge_schedule(
             raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
     gap = _gap(problem.goals, values, bounds)
     return Certificate(values, bounds, gap, gap, {}, proof.states)
+
+
+def _in_time(
+    problem: States, selection: StatePath, values: tuple[float, ...], hint: Hint | None
+) -> Certificate:
+    """Return the certificate of a build in time: what labels prove, and prices alone."""
+    aims, proof = len(problem.aims), Proof(problem, hint)
+    for goal, spent, cap in zip(problem.goals[aims:], values[aims:], problem.budgets, strict=True):
+        if not spent <= cap + TOLERANCE * cap:
+            raise SolverError(f"{goal} is {spent:.9g}, more than the {cap:g} that are allowed")
+    margins = _margin_bounds(problem, proof, values)
+    claim = Claim(values, selection.bound, selection.proofs)
+    bounds = (*margins, *proof.timed_bounds(claim)[len(margins) :])
+    pairs = list(zip(bounds, values, strict=False))
+    bounds = tuple(v if b >= v - BELOW * abs(v) else b for b, v in pairs)
+    said = zip(bounds, selection.bound, values, strict=False)
+    claimed = [min(v, max(b, other)) for b, other, v in said]
+    gap, left = (_gap(problem.goals, values, each) for each in (bounds, claimed))
+    return Certificate(values, (*bounds, *values[aims:]), gap, left, {}, proof.states)
 
 
 def _gap(goals: Sequence[Goal], values: Sequence[float], bounds: Sequence[float]) -> float:
@@ -171,7 +194,8 @@ def plan_values(
     margins = _margins(problem, steps)
     regrips = sum(step.kind is StepKind.REPOSITION for step in steps)
     travel = _travel_of(problem, steps)
-    moves = {Measure.STEPS: len(steps), Measure.REGRIPS: regrips, Measure.TRAVEL: travel}
+    moves: dict[Measure, float] = {Measure.STEPS: len(steps), Measure.REGRIPS: regrips}
+    moves |= {Measure.TRAVEL: travel, Measure.MAKESPAN: makespan(problem.network.scene, steps)}
     out = []
     for k, goal in enumerate(problem.goals):
         if goal.of_margins:

@@ -1,0 +1,1 @@
+"""Claims about builds in time: how long they take, and what proves it."""

@@ -1,0 +1,1 @@
+"""What the claims about time rest on: runs. None is run on its own."""

@@ -1,0 +1,93 @@
+"""The command ``times``: who does what when in a build, and how long that takes."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+
+from seqopt._cli.answer import Answer
+from seqopt._cli.asked import asked_scene, asked_steps, idle_notes, in_seconds, scene_facts
+from seqopt._cli.options import (
+    DURATIONS,
+    STEPS_USAGE,
+    declare,
+    form_options,
+    scene_options,
+    steps_options,
+)
+from seqopt._cli.outputs import figure_notes, require_out, time_files, write_outputs
+from seqopt._cli.terminal import wrapped
+from seqopt.engines.registry import USUAL, make_engine
+from seqopt.errors import ProblemError, StepError
+from seqopt.network.build import build_network
+from seqopt.plan._times import busy_table
+from seqopt.plan.build import GivenSequence
+
+DESCRIPTION = (
+    "Say how long a build takes and who does what when. A robot that holds nothing prepares what "
+    "it does next while others hold and act; actions come one after the other, in the order of "
+    "the steps."
+)
+USAGE = tuple(usage.replace("--out FILE", "--out DIR") for usage in STEPS_USAGE)
+EXAMPLES = (
+    "seqopt times arch25 --method cantilever "
+    "--durations fetch=30,place=10,approach=10,grip=5,release=5",
+    "seqopt times my.json --plan plan.csv --reassign --out faster",
+)
+REASSIGN = {
+    "--reassign": "let those robots have the same grips, in the same order, with which the build "
+    "takes least, as far as they reach and carry them"
+}
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``times``."""
+    basic = command.add_argument_group("which build")
+    scene_options(basic)
+    steps_options(basic)
+    declare(basic, DURATIONS | REASSIGN)
+    declare(basic, {"--out DIR": "folder to write plan.csv, times.csv and a chart to"})
+    form_options(command)
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Say how long a build takes, and write its times if asked."""
+    require_out(options, "plan.csv", "times.csv")
+    scene = in_seconds(options, asked_scene(options))
+    network = build_network(scene)
+    steps = asked_steps(options, network)
+    build = GivenSequence(make_engine(USUAL, network), steps)
+    try:
+        given = build.times()["end_s"].iloc[-1]
+    except StepError as error:
+        raise ProblemError(f"--durations: {error}") from None
+    least = None
+    if options.reassign:
+        build = GivenSequence(build.engine, build.reassigned())
+        least = build.times()["end_s"].iloc[-1]
+    written = write_outputs(options, lambda: time_files(build))
+    busy = busy_table(scene, build.steps)
+    lines = [*_said(scene.name, len(steps), float(given), least)]
+    for row in busy.to_dict("records"):
+        spent = (
+            f"{what} {row[f'{what}_s']:.6g} s" for what in ("prepares", "acts", "holds", "idle")
+        )
+        lines.append(f"  {row['robot']}: {', '.join(spent)}")
+    if written:
+        lines.append(f"written to {options.out}: plan.csv, times.csv")
+    else:
+        lines.append("--out DIR writes when every step happens, and a chart of it")
+    facts = {"makespan_s": given, "reassigned_s": least, "robots": busy, "steps": build.times()}
+    return Answer(
+        facts={"scene": scene_facts(scene), **facts},
+        text="\n".join(map(wrapped, lines)),
+        written=written,
+        notes=(*idle_notes(scene, build.steps), *(figure_notes() if written else ())),
+    )
+
+
+def _said(name: str, steps: int, given: float, least: float | None) -> Iterator[str]:
+    """Yield how long a build takes."""
+    yield f"{name}: {steps} steps take {given:.6g} s"
+    if least is not None:
+        yield f"the same grips by other robots: {least:.6g} s, the least"

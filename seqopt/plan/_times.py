@@ -1,0 +1,113 @@
+"""Builds in time: who does what when, and the same grips by other robots."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from seqopt.errors import StepError
+from seqopt.problem.requirements import LIMIT_TOLERANCE
+from seqopt.responses.table import force_column
+from seqopt.scene.scene import Scene
+from seqopt.sequence._reassign import reassigned_steps
+from seqopt.sequence._timing import step_times
+from seqopt.sequence.schedule import Hold
+from seqopt.sequence.steps import Step, idle_robots
+
+
+def times_table(scene: Scene, steps: Sequence[Step]) -> pd.DataFrame:
+    """Return who does what when, at the earliest: a row per step, as of `Plan.times`.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> scene = seqopt.load_scene("arch25")
+    >>> scene = scene.with_durations("fetch=30,place=10,approach=10,grip=5,release=5")
+    >>> table = times_table(scene, seqopt.sequential(seqopt.build_network(scene)))
+    >>> table[["step", "robots", "start_s", "end_s"]].head(3).values.tolist()
+    [[1, 'rob1', 30.0, 40.0], [2, 'rob2', 40.0, 50.0], [3, 'rob1', 50.0, 55.0]]
+    """
+    rows, end = [], 0.0
+    for step, time in zip(steps, step_times(scene, steps), strict=True):
+        taken = [step.grips[r] for r in time.robots if step.grips[r] is not None]
+        rows.append(
+            {
+                "step": step.number,
+                "type": step.kind.value,
+                "bricks": step.bricks,
+                "robots": ";".join(scene.robots[r].name for r in time.robots),
+                "node": taken[0] if taken else None,
+                "prepares_s": time.prepares,
+                "ready_s": time.ready,
+                "start_s": time.start,
+                "end_s": time.end,
+                "waits_s": time.start - end,
+            }
+        )
+        end = time.end
+    return pd.DataFrame(rows).astype({"node": "Int64", "prepares_s": float, "ready_s": float})
+
+
+def busy_table(scene: Scene, steps: Sequence[Step]) -> pd.DataFrame:
+    """Return how long each robot ``prepares_s``, ``acts_s``, ``holds_s`` and is ``idle_s``."""
+    times = step_times(scene, steps)
+    out = {
+        robot.name: dict.fromkeys(("prepares_s", "acts_s", "holds_s"), 0.0)
+        for robot in scene.robots
+    }
+    before: Sequence[int | None] = (None,) * len(scene.robots)
+    end = 0.0
+    for step, time in zip(steps, times, strict=True):
+        for r, robot in enumerate(scene.robots):
+            own = out[robot.name]
+            if r in time.robots:
+                own["acts_s"] += time.end - time.start
+                if step.grips[r] is None:
+                    own["holds_s"] += time.start - end
+                elif time.ready is not None and time.prepares is not None:
+                    own["prepares_s"] += time.ready - time.prepares
+            elif before[r] is not None:
+                own["holds_s"] += time.end - end
+        before, end = step.grips, time.end
+    table = pd.DataFrame.from_dict(out, orient="index").rename_axis("robot")
+    table["idle_s"] = end - table.sum(axis=1)
+    return table.reset_index()
+
+
+def reassign(scene: Scene, steps: Sequence[Step], responses: pd.DataFrame) -> tuple[Step, ...]:
+    """Return the same grips in the same order by robots with which the build takes least.
+
+    ``responses``: of the steps, as of `seqopt.analyze`. A robot may have a grip if it reaches the
+    node, gives way there as the one who had it, and carries the largest force of the grip within
+    its payload; who carried more before may go on. A `StepError` says that robots have arms.
+    """
+    if scene.has_arms:
+        raise StepError(
+            f"scene {scene.name}: arms keep postures while they hold; robots cannot be reassigned"
+        )
+    forces = {
+        r: responses[force_column(robot)].abs().to_numpy(float)
+        for r, robot in enumerate(scene.robots)
+    }
+    kinds = scene.grip_kinds.compliance[scene.grip_kinds.of_robot]
+    turns = scene.grip_kinds.turns[scene.grip_kinds.of_robot]
+
+    def may(robot: int, hold: Hold) -> bool:
+        had = hold.robot
+        if robot == had:
+            return True
+        assert hold.node is not None  # steps of a plan have no open grips
+        position = scene.node_position(hold.node)
+        force = float(forces[had][hold.first - 1 : hold.last].max())
+        most = scene.robots[robot].payload * (1 + LIMIT_TOLERANCE)
+        alike = bool((kinds[robot] == kinds[had]).all() and turns[robot] == turns[had])
+        return alike and force <= most and scene.robots[robot].reach.covers(position)
+
+    idle = idle_robots(scene, steps)
+    known = [
+        r
+        for r, robot in enumerate(scene.robots)
+        if robot.durations is not None or robot.name not in idle
+    ]
+    return reassigned_steps(scene, steps, may, known)

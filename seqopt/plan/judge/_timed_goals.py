@@ -1,0 +1,210 @@
+"""Goals of builds in time, proven one after the other on the judge's own graph."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import SolverError
+from seqopt.graph._timed import LabelProof
+from seqopt.graph.duality import cut, potentials
+from seqopt.graph.graph import Graph
+from seqopt.graph.paths import tied
+from seqopt.graph.states.states import States
+from seqopt.plan.judge._rule_moves import RuleTables, ScheduleTables
+from seqopt.plan.judge._time_proof import Closed, Limits, Team, TimedMoves, kept_below, limit_below
+from seqopt.problem.problem import Measure
+from seqopt.sequence._timing import require_durations
+from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.steps import StepKind
+
+Fallen = Callable[[int, Ints], Bools]
+
+
+@dataclass(frozen=True, eq=False)
+class TimedStates:
+    """The states that a better build could pass, by level, and the moves between them.
+
+    ``levels``: of rows (n, c), numbered one level after the other; ``fallen``: which rows (k,) of a
+    level are proven to fall.
+    """
+
+    problem: States
+    tables: RuleTables | ScheduleTables
+    levels: Sequence[Ints]
+    graph: Graph
+    fallen: Fallen
+
+    @property
+    def starts(self) -> Ints:
+        """The number of the first state of every level."""
+        return np.cumsum([0, *map(len, self.levels)])[:-1]
+
+    def moves(self, graph: Graph) -> TimedMoves:
+        """Return what moves of a graph of these states take of the time of robots."""
+        rows = np.concatenate([each[:, : self.tables.robots] for each in self.levels])
+        level = np.repeat(np.arange(len(self.levels)), [*map(len, self.levels)])
+        places = level[graph.target] > level[graph.source]
+        rules = self.problem.rules
+        if isinstance(rules, Schedule):
+            kinds = [False, *(step.kind is StepKind.PLACE for step in rules.steps)]
+            places = np.array(kinds)[level[graph.target]]
+        return TimedMoves(graph, rows.astype(np.int64), places, self._team())
+
+    def _team(self) -> Team:
+        scene, tables = self.problem.network.scene, self.tables
+        own = require_durations(scene, tables.team)
+        times = np.array([[d.fetch, d.place, d.approach, d.grip, d.release] for d in own])
+        slow = np.array([0.0 if d.speed is None else 1 / d.speed for d in own])
+        at = [scene.node_position(node) for node in tables.nodes[1:].tolist()]
+        places = np.array([(0.0, 0.0, 0.0), *at])
+        return Team(times, slow, tables.groups, places, self.problem.parks)
+
+    def numbers(self, proof: LabelProof) -> tuple[Ints, Floats]:
+        """Return labels by the numbers of their states, as far as there are such states.
+
+        Entries of robots that could change places are sorted, and with them their readiness.
+        """
+        columns = [r for kind in self.problem.space.kinds for r in kind.robots]
+        order = [columns.index(r) for r in self.tables.team]
+        count = len(order)
+        if (
+            proof.states.ndim != 2
+            or proof.labels.ndim != 2
+            or (
+                len(proof.states) != len(proof.labels)
+                or proof.states.shape[1] < 1 + count
+                or proof.labels.shape[1] < 1 + count
+            )
+        ):
+            raise SolverError("labels are none of this build: they have other columns")
+        entries = proof.states[
+            :, [*(1 + np.array(order)), *range(1 + count, proof.states.shape[1])]
+        ]
+        values = proof.labels[
+            :, [0, *(1 + np.array(order)), *range(1 + count, proof.labels.shape[1])]
+        ]
+        team = self._team()
+        for group in team.groups:
+            own, times = entries[:, group], values[:, [1 + c for c in group]]
+            sort = np.lexsort((times, -own), axis=1)
+            values[:, [1 + c for c in group]] = np.take_along_axis(times, sort, axis=1)
+        entries = self.tables.in_order(entries.astype(self.tables.start().dtype))
+        numbers = np.full(len(entries), -1)
+        for level, (rows, first) in enumerate(zip(self.levels, self.starts, strict=True)):
+            own = np.flatnonzero(proof.states[:, 0] == level)
+            if len(own) and len(rows):
+                codes = self.tables.codes(rows)
+                sort = np.argsort(codes)
+                wanted = self.tables.codes(entries[own])
+                at = np.searchsorted(codes, wanted, sorter=sort).clip(max=len(rows) - 1)
+                found = codes[sort[at]] == wanted
+                numbers[own[found]] = first + sort[at[found]]
+        known = (numbers >= 0) & np.isfinite(values).all(axis=1)
+        return numbers[known], values[known]
+
+    def all_fallen(self, states: Ints) -> Bools:
+        """Return which states of some numbers are proven to fall."""
+        out = np.zeros(len(states), dtype=bool)
+        for level, (rows, first) in enumerate(zip(self.levels, self.starts, strict=True)):
+            own = np.flatnonzero((states >= first) & (states < first + len(rows)))
+            if len(own) and level:
+                out[own] = self.fallen(level, rows[states[own] - first])
+        return out
+
+
+class Claim(NamedTuple):
+    """What is claimed of a build in time.
+
+    ``values``: of all goals; ``bounds``: what no build stays below; ``proofs``: of the latter.
+    """
+
+    values: Sequence[float]
+    bounds: Sequence[float]
+    proofs: Sequence[LabelProof]
+
+
+class GoalProofs:
+    """Bounds on the goals of a build in time, each where those before it are at their values."""
+
+    def __init__(self, states: TimedStates, claim: Claim) -> None:
+        self._states, self._claim, values = states, claim, claim.values
+        problem = states.problem
+        self._aims = len(problem.aims)
+        self._is_time = [goal.measure is Measure.MAKESPAN for goal in problem.goals]
+        self._graph = states.graph
+        caps = zip(range(self._aims, len(values)), problem.budgets, strict=True)
+        self._time, self._sums = np.inf, list[tuple[int, float]]()
+        for k, cap in caps:
+            self._cap(k, tied(cap))
+        self._filtered = not problem.budgets
+        self.states = 0
+
+    def _cap(self, k: int, most: float) -> None:
+        """Let builds take no more of a goal from now on."""
+        if self._is_time[k]:
+            self._time = min(self._time, most)
+        elif self._graph.peaks[k]:
+            self._graph = self._graph.only(self._graph.amounts[:, k] <= most)
+        else:
+            self._sums.append((k, most))
+
+    def bounds(self, first: int) -> tuple[float, ...]:
+        """Return what no build stays below in every aim from the first one that is not known."""
+        proofs, out = iter(self._claim.proofs), list[float]()
+        for k in range(first, self._aims):
+            value = self._claim.values[k]
+            if self._filtered and not self._is_time[k]:
+                proven = cut if self._graph.peaks[k] else potentials
+                bound, kept = proven(self._graph, k, value)
+                self._graph = self._graph.only(kept)
+                out.append(bound)
+                continue
+            self._filtered = False
+            proof = next(proofs, None)
+            out.append(-np.inf if proof is None else self._by_labels(k, proof))
+            self._cap(k, tied(value))
+        return tuple(out)
+
+    def _by_labels(self, k: int, proof: LabelProof) -> float:
+        """Return the bound of a goal that labels prove, or prices alone."""
+        claimed, graph = min(self._claim.bounds[k], self._claim.values[k]), self._graph
+        if not np.isfinite(claimed):
+            return -np.inf
+        columns = [column for column, _ in self._sums]
+        caps = [self._time, *(most for _, most in self._sums)]
+        strict = [False] * len(caps)
+        if self._is_time[k]:
+            caps[0], strict[0] = limit_below(claimed), True
+        elif graph.peaks[k]:
+            graph = graph.only(kept_below(graph.amounts[:, k], claimed))
+        else:
+            columns, strict = [*columns, k], [*strict, True]
+            caps.append(limit_below(claimed))
+        moves = self._states.moves(graph)
+        limits = Limits(caps[0], np.array(caps[1:]), np.array(strict))
+        prices = self._in_order(proof.prices)
+        closed = Closed(moves, graph.amounts[:, columns], prices, limits)
+        labels = self._states.numbers(proof)
+        if labels[1].shape[1] != 1 + self._states.tables.robots + len(columns):
+            labels = labels[0][:0], np.zeros((0, 1 + self._states.tables.robots + len(columns)))
+        is_proof, count = closed.is_proof(labels, self._states.all_fallen)
+        self.states += count
+        if is_proof:
+            return claimed
+        if len(proof.labels):
+            goal = self._states.problem.names[k]
+            raise SolverError(f"{goal}: labels do not prove that no build is below {claimed:.9g}")
+        return min(closed.bound, claimed) if self._is_time[k] else -np.inf
+
+    def _in_order(self, prices: Floats) -> Floats:
+        """Return prices (L, 1 + c) by the columns of the judge."""
+        columns = [r for kind in self._states.problem.space.kinds for r in kind.robots]
+        order = [1 + columns.index(r) for r in self._states.tables.team]
+        if prices.ndim != 2 or prices.shape[1] != 1 + len(order):
+            raise SolverError("there is no price for every robot")
+        return np.asarray(prices[:, [0, *order]])

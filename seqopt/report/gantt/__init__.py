@@ -1,0 +1,1 @@
+"""Charts of builds in time: who prepares, acts and holds when."""

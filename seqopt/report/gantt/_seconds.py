@@ -1,0 +1,123 @@
+"""Grips of a build over seconds: what robots prepare, when they act, and how long they hold."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+
+from seqopt.errors import StepError
+from seqopt.report._pictures import DARK, LANE, LETTER, SHADES
+from seqopt.report._style import SMALL, new_picture, styled
+from seqopt.responses.table import force_column
+from seqopt.scene.scene import Scene
+from seqopt.sequence._timing import StepTime, step_times
+from seqopt.sequence.schedule import Hold, holds
+from seqopt.sequence.steps import Step
+
+PER_STEP, NARROWEST, WIDEST = 0.15, 7.0, 30.0  # inches
+BESIDE = 1.8  # inches that names and the key of shades take
+PREPARES = "#e8e8e8"
+
+
+@styled
+def seconds_picture(
+    scene: Scene,
+    steps: Sequence[Step],
+    responses: pd.DataFrame,
+    shown: tuple[int, int | None] = (1, None),
+) -> Figure:
+    """Return the grips of a build over seconds, a lane per robot, shaded by their forces."""
+    first, last = shown[0], len(steps) if shown[1] is None else shown[1]
+    if not 1 <= first <= last <= len(steps):
+        raise StepError(f"steps {first} to {last}: the build has steps 1 to {len(steps)}")
+    times = step_times(scene, steps)
+    begin, end = 0.0 if first == 1 else times[first - 2].end, times[last - 1].end
+    width = float(np.clip(PER_STEP * (last - first + 1) + BESIDE, NARROWEST, WIDEST))
+    figure = new_picture(width, 0.62 * len(scene.robots) + 1.3)
+    axes = figure.add_subplot()
+    forces = responses[[force_column(robot) for robot in scene.robots]].to_numpy(float)
+    shade = ScalarMappable(Normalize(0.0, np.nanmax(forces, initial=0.0) or 1.0), colormaps[SHADES])
+    colors = shade.to_rgba(forces)
+    inch = (width - BESIDE) / (end - begin or 1.0)
+    for hold in holds(scene, steps):
+        if hold.last >= first and hold.first <= last:
+            stops = _stops(times, hold)
+            _bar(axes, hold, stops, colors[hold.first - 1 : hold.last, hold.robot])
+            _label(axes, scene, hold, (stops[0][0], stops[-1][1], inch))
+    for time in times[first - 1 : last]:
+        _prepared(axes, time)
+    _frame(axes, scene, (begin, end))
+    figure.colorbar(shade, ax=axes, label="grip force, N", pad=0.01)
+    return figure
+
+
+def _bar(axes: Axes, hold: Hold, stops: Sequence[tuple[float, float]], colors: np.ndarray) -> None:
+    """Draw a grip: shaded step by step, framed as a whole, marked where it places a brick."""
+    low = hold.robot - LANE / 2
+    for (start, stop), color in zip(stops, colors, strict=True):
+        axes.add_patch(Rectangle((start, low), stop - start, LANE, fc=color, lw=0))
+    begin, end = stops[0][0], stops[-1][1]
+    look: Any = {"fc": "none", "ec": DARK, "lw": 0.9, "gid": f"hold {hold.robot} {hold.first}"}
+    axes.add_patch(Rectangle((begin, low), end - begin, LANE, **look))
+    if hold.places is not None:
+        axes.plot([begin] * 2, [low, low + LANE], color=DARK, lw=3.2)
+
+
+def _frame(axes: Axes, scene: Scene, span: tuple[float, float]) -> None:
+    """Set lanes, limits and names, and explain the marks."""
+    room = 0.01 * (span[1] - span[0])
+    limits: Any = {"xlim": (span[0] - room, span[1] + room)}
+    axes.set(xlabel="seconds", ylim=(len(scene.robots) - 0.5, -0.5), axisbelow=True, **limits)
+    axes.set_yticks(range(len(scene.robots)), [robot.name for robot in scene.robots])
+    axes.tick_params(left=False)
+    axes.grid(visible=True, axis="x", lw=0.3)
+    axes.spines[["top", "right", "left"]].set_visible(False)
+    handles = [
+        Patch(fc=PREPARES, ec=DARK, lw=0.5, hatch="///", label="prepares"),
+        Line2D([], [], color=DARK, marker="|", ms=11, mew=3.2, lw=0, label="places the brick"),
+        Patch(fc="white", ec=DARK, label="holds it (brick · node)"),
+    ]
+    place: Any = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
+    axes.legend(handles=handles, ncols=3, frameon=False, **place)
+
+
+def _stops(times: Sequence[StepTime], hold: Hold) -> list[tuple[float, float]]:
+    """Return from when to when a grip lasts in each of its steps, up to when it is let go, s."""
+    out = [(times[hold.first - 1].start, times[hold.first - 1].end)]
+    out += [(times[n - 2].end, times[n - 1].end) for n in range(hold.first + 1, hold.last + 1)]
+    if hold.last < len(times):
+        out[-1] = (out[-1][0], times[hold.last].end)
+    return out
+
+
+def _prepared(axes: Axes, time: StepTime) -> None:
+    """Draw what a robot prepares before a step."""
+    if time.prepares is None or time.ready is None:
+        return
+    low, span = time.robots[0] - LANE / 4, time.ready - time.prepares
+    look: Any = {"fc": PREPARES, "ec": DARK, "lw": 0.4, "hatch": "///"}
+    look["gid"] = f"prepares {time.step}"
+    axes.add_patch(Rectangle((time.prepares, low), span, LANE / 2, **look))
+
+
+def _label(axes: Axes, scene: Scene, hold: Hold, span: tuple[float, float, float]) -> None:
+    """Write brick and node into a bar, from when to when, as far as they fit; then inches per s."""
+    begin, end, inch = span
+    room = inch * (end - begin)
+    if room < 0.12 or hold.node is None:
+        return
+    words = f"{scene.brick_of_node[hold.node].name} · {hold.node}"
+    flat = room >= LETTER * len(words) + 0.06
+    look: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": DARK, "clip_on": True}
+    look["bbox"] = {"boxstyle": "square,pad=0.1", "fc": (1, 1, 1, 0.72), "lw": 0}
+    axes.annotate(words, ((begin + end) / 2, hold.robot), rotation=0 if flat else 90, **look)

@@ -1,0 +1,1 @@
+"""What holds beside robots, and how long robots take."""
