@@ -135,7 +135,7 @@ class ShownBuild(Shown):
     def makespan(self) -> float | None:
         """How long the build takes, s; None if it is not known how long robots take."""
         scene = self.engine.network.scene
-        return step_times(scene, self.steps)[-1].end if has_durations(scene) else None
+        return step_times(scene, self.steps)[-1].end if self._timed else None
 
     def reassigned(self) -> tuple[Step, ...]:
         """Return the same grips in the same order by robots with which the build takes least.
@@ -162,6 +162,12 @@ class ShownBuild(Shown):
         )
         return figure
 
+    @property
+    def _timed(self) -> bool:
+        """Whether it is known how long it takes: of a part it is not, what was before counts."""
+        whole = bool(self.steps) and self.steps[0].number == 1
+        return whole and has_durations(self.engine.network.scene)
+
     def gantt(
         self, first: int | None = None, last: int | None = None, *, seconds: bool | None = None
     ) -> Figure:
@@ -177,7 +183,7 @@ class ShownBuild(Shown):
         matplotlib is not installed (extra ``plot``); `StepError` if there are no such steps.
         """
         scene, responses = self.engine.network.scene, self.responses()
-        timed = has_durations(scene) if seconds is None else seconds
+        timed = self._timed if seconds is None else seconds
         name = "seconds_picture" if timed else "gantt_picture"
         figure: Figure = display(name)(scene, self.steps, responses, (first, last))
         return figure

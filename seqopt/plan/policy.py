@@ -280,13 +280,13 @@ def find_policy(
     --------
     >>> import seqopt
     >>> from seqopt.plan.policy import find_policy
-    >>> scene = seqopt.load_scene("arch:bricks=5")
+    >>> scene = seqopt.load_scene("wall:columns=2,courses=2")
     >>> engine = seqopt.make_engine("compliance", scene)
     >>> worst = seqopt.CRITERIA["worst-ratio"]
     >>> problem = seqopt.pose(engine, seqopt.FreeRules(), worst, "minmax,steps")
     >>> policy = find_policy(problem)
     >>> str(policy.best(seqopt.Site(0)))
-    'rob1 places brick 1 and holds it at node 1'
+    'rob1 places brick 1 and holds it at node 2'
     """
     states = _states_with_policy(problem)
     tell("looking at every state")

@@ -72,6 +72,8 @@ def step_times(scene: Scene, steps: Sequence[AnyStep]) -> tuple[StepTime, ...]:
     >>> [(each.start, each.end) for each in step_times(scene, steps)[:4]]
     [(30.0, 40.0), (40.0, 50.0), (50.0, 55.0), (85.0, 95.0)]
     """
+    if steps and steps[0].number > 1:
+        raise StepError(f"steps from {steps[0].number} on: times are of whole builds; give all")
     robots = range(len(scene.robots))
     busy = [r for r in robots if any(step.grips[r] is not None for step in steps)]
     durations = dict(zip(busy, require_durations(scene, busy), strict=True))

@@ -34,10 +34,10 @@ def seconds_picture(
     scene: Scene,
     steps: Sequence[Step],
     responses: pd.DataFrame,
-    shown: tuple[int, int | None] = (1, None),
+    shown: tuple[int | None, int | None] = (None, None),
 ) -> Figure:
     """Return the grips of a build over seconds, a lane per robot, shaded by their forces."""
-    first, last = shown[0], len(steps) if shown[1] is None else shown[1]
+    first, last = shown[0] or 1, len(steps) if shown[1] is None else shown[1]
     if not 1 <= first <= last <= len(steps):
         raise StepError(f"steps {first} to {last}: the build has steps 1 to {len(steps)}")
     times = step_times(scene, steps)
