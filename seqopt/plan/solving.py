@@ -224,6 +224,8 @@ def _states(problem: Problem) -> States:
     goals = problem.goals or (AIMS[over.aim],)
     asked = problem.engine, problem.moves, problem.criterion, goals, problem.limits
     found = replace(build_states(*asked, problem.stands), resources=problem.resources)
+    if problem.is_timed and problem.moves.begin is not None:
+        raise ProblemError("aim makespan: a build in time begins on an empty site; leave from out")
     if caps := parse_caps(problem.budgets):
         found = within(found, caps)
     return over_scenarios(found, problem.scenarios, over) if problem.scenarios else found

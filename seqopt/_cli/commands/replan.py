@@ -25,6 +25,7 @@ from seqopt._cli.options import (
 )
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import number_word
+from seqopt._cli.words.optimizing import AIM, TIME
 from seqopt._cli.words.where import Place
 from seqopt._files import read_text
 from seqopt.errors import FileError, InfeasibleError, StepError
@@ -74,11 +75,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     declare(basic, {"--out DIR": "folder to write the new plan to"})
     declare(command.add_argument_group("what has changed"), CHANGES)
     asked = command.add_argument_group("what is asked, if not as before")
-    declare(asked, optimize.AIM | LIMIT | RULE | STANDING)
+    declare(asked, AIM | LIMIT | RULE | STANDING)
     form_options(command, strict=True, builds=True)
     criterion_options(command)
     engine_options(command)
-    declare(command.add_argument_group("time"), optimize.TIME)
+    declare(command.add_argument_group("time"), TIME)
 
 
 def run(options: argparse.Namespace) -> Answer:

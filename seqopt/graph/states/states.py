@@ -496,8 +496,6 @@ def over_scenarios(
 
 def _asked(problem: States) -> States:
     """Return a problem whose stability can be asked, where it will be."""
-    if problem.is_timed and problem.rules.begin is not None:
-        raise ProblemError("aim makespan: a build in time begins on an empty site; leave from out")
     if problem.standing is not None or any(goal.of_margins for goal in problem.goals):
         _ = problem.stability  # what cannot be asked is refused now
     if problem.is_timed:
