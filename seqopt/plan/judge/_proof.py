@@ -354,7 +354,7 @@ class Proof:
         with fewer bricks are all that this depends on. Result: None where a plan may be as good.
         """
         levels, tables = _Levels(self._passable, {}, Asked(values, ())), self._passable.tables
-        parts = np.repeat(np.arange(tables.last + 1), [*map(len, levels.states)])
+        parts = np.repeat(levels.levels, [*map(len, levels.states)])
         graph = levels.graph()
         seen = reached(graph)
         if graph.ends[seen].any():
@@ -417,12 +417,10 @@ class _Levels:
 
     def __init__(self, passable: Passable, told: Mapping[int, Ints], asked: Asked) -> None:
         self._passable, self._asked = passable, asked
-        self.states: list[Ints] = []
+        self.levels, self.states = list[int](), list[Ints]()
         self._moves: list[tuple[Ints, Ints, Floats]] = []
         self._ends: list[Bools] = []
-        self._count = 0
-        coming: list[tuple[Ints, Follows]] = []
-        tables, self.levels = passable.tables, list[int]()
+        self._count, tables = 0, passable.tables
         start = tables.start()
         coming = self._begin(tables.first, start)
         for level in range(max(1, tables.first), tables.last + 1):
