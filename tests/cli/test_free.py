@@ -139,7 +139,7 @@ def test_a_free_schedule_within_a_budget(capsys, tmp_path, arch):
     assert summary["budgets"]["travel"]["spent"] <= 9
     assert summary["objective"]["travel"] <= 9
     for word, status, said in (
-        ("travel=0.8", 2, "give travel=3.5m, regrips=2"),
+        ("travel=0.8", 2, "give travel=3.5m, makespan=600s, regrips=2"),
         ("tilt=3", 2, "it is no total of moves or of a response"),
         ("sum(T_max)=0", 3, "no plan is within all budgets; sum(T_max) is at least"),
     ):

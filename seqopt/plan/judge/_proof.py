@@ -420,8 +420,7 @@ class _Levels:
         self.levels, self.states = list[int](), list[Ints]()
         self._moves: list[tuple[Ints, Ints, Floats]] = []
         self._ends: list[Bools] = []
-        self._count, tables = 0, passable.tables
-        start = tables.start()
+        self._count, tables, start = 0, passable.tables, passable.tables.start()
         coming = self._begin(tables.first, start)
         for level in range(max(1, tables.first), tables.last + 1):
             now = [pair for pair in coming if pair[1].level == level]
