@@ -62,6 +62,7 @@ def met(problem25):
     values += [ArchForm(span=2.0, rise=0.8), DomeShape(courses=4, around=12), VaultShape(bricks=9)]
     values += [seqopt.StepCost("own", ("F_largest",), max), free.animate()]
     values += [network, seqopt.Sphere(center=(0.0, 0.0, 0.0), radius=1.0)]
+    values += [seqopt.Site.after(free.steps, 3), seqopt.Prop(node=3)]
     values += [seqopt.GivenSequence(problem25.engine, seqopt.sequential(network))]
     for each in (plan, free, robust):
         each.responses()

@@ -90,8 +90,7 @@ EXAMPLES = (
     "seqopt optimize wall:columns=6,courses=4 --schedule free --out wall",
     "seqopt optimize my.json --formulation minimax --limit payload --out mine",
     "seqopt optimize arch25 --robust worst-peak --out robust",
-    "seqopt optimize arch25 --schedule free --aim minmax,makespan "
-    "--durations fetch=30,place=10,approach=10,grip=5,release=5",
+    "seqopt optimize timed.json --schedule free --aim minmax,makespan --out soon",
 )
 INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
 

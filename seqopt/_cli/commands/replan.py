@@ -36,7 +36,7 @@ from seqopt.responses.quantities import length_text
 from seqopt.scene.scenarios import as_built
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence._parts import read_measured
+from seqopt.sequence._parts import SAME, read_measured
 from seqopt.sequence.rules import FREE, with_robots
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.study.published import CRITERIA
@@ -212,9 +212,11 @@ def _in_words(facts: Mapping[str, Any]) -> Sequence[str]:
         line = f"as planned the rest takes: {values}"
     if "off_m" in facts:
         off, left = length_text(facts["off_m"]), length_text(facts["tolerance_left_m"])
+        which = "every brick is"
+        if facts["off_m"] > SAME:
+            which = f"brick {facts['off_brick']} is {off} from"
         line = (
-            f"as built, brick {facts['off_brick']} is {off} from where it was planned; grips of "
-            f"the rest may be {left} off; {line}"
+            f"as built, {which} where it was planned; grips of the rest may be {left} off; {line}"
         )
     if facts["differs"] is None:
         return (line, "the new plan is the old one")
