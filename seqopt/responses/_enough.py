@@ -103,7 +103,7 @@ def _left_out(
     """Yield what the model has not, as far as it could matter in these builds."""
     every, moved = within.engine.network.scene.robots, RESPONSES["D_max"]
     kinds = within.engine.network.scene.grip_kinds
-    rigid = ~kinds.gives[kinds.of_robot]
+    rigid = ~kinds.gives[kinds.of_robot[: len(every)]]  # props come after robots
     robots = [robot for robot, is_rigid in zip(every, rigid, strict=True) if is_rigid]
     tables = builds.values()
     if any(table[f"{robot.name}_node"].notna().any() for table in tables for robot in robots):
