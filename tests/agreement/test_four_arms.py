@@ -159,7 +159,9 @@ def test_no_step_has_a_contact_by_another_library(build):
 
 def test_the_page_prints_what_it_says(monkeypatch, capsys):
     page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
-    code, said = re.search(r"```python\n(.*?)```\n\nThat prints:\n\n```text\n(.*?)```", page, re.DOTALL).groups()
+    code, said = re.search(
+        r"```python\n(.*?)```\n\nThat prints:\n\n```text\n(.*?)```", page, re.DOTALL
+    ).groups()
     monkeypatch.chdir(EXAMPLES / "wall")
     exec(compile(code, "page", "exec"), {})
     assert capsys.readouterr().out == said
