@@ -19,7 +19,7 @@ from seqopt.contact.mortar import EPOXY
 from seqopt.engines._auto import AutoEngine
 from seqopt.engines.discrete._equilibrium_path import FAR
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.interface import Engine, Fields, Want
+from seqopt.engines.interface import Engine, Fields, Want, empty_site
 from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.network import Network
 from seqopt.responses.quantities import (
@@ -160,6 +160,8 @@ class LinearRange:
         held = (scene.grip_numbers([int(n) if pd.notna(n) else None for n in r]) for r in nodes)
         keys = [*zip(map(int, table["bricks"]), held, strict=True)]
         for key in keys:  # in order: engines grow with the build
+            if not key[0]:
+                self._known[key] = np.array([0.0, 0.0, -np.inf, 0.0])
             if key not in self._known:
                 asked = np.array([key[1]], dtype=np.int64).reshape(1, -1)
                 found = self._engine.solve(key[0], asked, _MEASURED)
@@ -272,6 +274,8 @@ def support_columns(scene: Scene) -> list[tuple[str, str]]:
 
 def step_fields(engine: Engine, step: Step, want: Want = Want.RESPONSES) -> Fields:
     """Return the full fields of one step, of one grip set; errors of the engine name the step."""
+    if not step.bricks:  # where a take-down ends
+        return empty_site(engine.network)
     with step_named(step):
         return engine.solve(step.bricks, _grips_of(engine.network.scene, step), want)
 
@@ -325,8 +329,10 @@ def _row(network: Network, step: Step, fields: Fields) -> dict[str, object]:
     for robot, node in zip(scene.robots, step.grips, strict=True):
         row[force_column(robot)] = np.nan if node is None else next(forces)
     for response in RESPONSES.values():
-        values = require_finite(response.name, response.of(network, fields), step.bricks)
-        row[response.column] = values[0] * response.scale
+        row[response.column] = 0.0
+        if step.bricks:
+            values = require_finite(response.name, response.of(network, fields), step.bricks)
+            row[response.column] = values[0] * response.scale
     acts = network.springs.since[network.springs.support] <= step.bricks
     carried = np.array([support_forces(network, fields)[0], support_moments(fields)[0]])
     cells = np.where(acts, carried, np.nan).T  # of ground ends; NaN where one does not act yet

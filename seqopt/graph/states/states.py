@@ -252,9 +252,11 @@ class States(Shown):
         if self.each:
             asked = [partial(p.values, level, rough=rough) for p in self.each]
             return self._worst(asked, states, most)
-        found, within = self.responses(level, states, rough=rough)
         bricks = self.space.bricks_at(level)
         out = np.zeros((len(states), len(self.goals)))
+        if not bricks:  # the empty site, where a take-down ends
+            return out, np.ones(len(states), dtype=bool)
+        found, within = self.responses(level, states, rough=rough)
         for column, goal in enumerate(self.goals):
             if goal.of_states and not goal.of_margins:
                 if goal.response:
@@ -278,6 +280,8 @@ class States(Shown):
             asked = [partial(p.standing_values, level) for p in self.each]
             return self._worst(asked, states, most)
         out, within = self.values(level, states)
+        if not self.space.bricks_at(level):
+            return out, within
         if self.demands:
             rows = np.flatnonzero(within)
             within[rows] = self.stand(level, states[rows])
@@ -298,6 +302,8 @@ class States(Shown):
         if self.each:
             return np.asarray(np.all([p.stand(level, states) for p in self.each], axis=0))
         bricks = self.space.bricks_at(level)
+        if not bricks:
+            return np.ones(len(states), dtype=bool)
         return np.asarray(self.stability.stand(bricks, *self._grips(states, stand=True)))
 
     def recalled(self, level: int, states: Ints) -> Ints:
@@ -305,6 +311,8 @@ class States(Shown):
         if self.each:
             return np.asarray(np.min([p.recalled(level, states) for p in self.each], axis=0))
         bricks = self.space.bricks_at(level)
+        if not bricks:
+            return np.ones(len(states), dtype=np.int64)
         return self.stability.recalled(bricks, *self._grips(states, stand=True))
 
     def _worst(
@@ -426,6 +434,7 @@ def build_states(
     States('arch25', minmax, steps, 0 limits)
     """
     named = _goals(goals, least=1)
+    rules = rules.begun(engine.network.scene) if isinstance(rules, FreeRules) else rules
     limits = _checked(limits, engine.network)
     if any(goal.of_states and not goal.response for goal in named):
         criterion = _of_states(engine, criterion)
