@@ -19,7 +19,7 @@ from seqopt._cli.values import (
     parse_robots,
     parse_rules,
 )
-from seqopt._cli.where import Place, asked_place, between
+from seqopt._cli.where import Place, asked_place, between, kept_place
 from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
@@ -37,7 +37,7 @@ from seqopt.problem.problem import (
 from seqopt.problem.requirements import Criterion
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
-from seqopt.sequence.rules import FREE, FreeRules, with_robots
+from seqopt.sequence.rules import FREE, Direction, FreeRules, with_robots
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.workflow import SEARCH, posed
@@ -120,6 +120,8 @@ def _asked_ends(options: argparse.Namespace, scene: Scene) -> tuple[Scene, Place
     scene, begin = asked_place(options, "from", scene)
     if hasattr(options, "change"):
         scene, begin, options.robots = options.change(scene, begin)
+    if getattr(options, "keep", None) is not None:
+        return kept_place(options, scene, begin)
     later, end = asked_place(options, "to", scene)
     if later != scene:
         raise StepError(f"--to {options.to}: its bricks are not those that follow in this order")
@@ -151,6 +153,7 @@ def _asked_moves(options: argparse.Namespace, network: Network) -> Schedule | Fr
         return schedule if rule is None else thin(schedule, rule)
     names = () if options.robots.isdecimal() else parse_robots(options.robots)
     rules = parse_rules(options.rule, names)
+    rules = replace(rules, direction=getattr(options, "direction", None) or Direction.BUILD)
     return replace(rules, candidates=rule) if rule else rules
 
 
@@ -164,6 +167,11 @@ def _require_known(options: argparse.Namespace, *, of_states: bool) -> None:
                     "worst-total or as cvar=0.9"
                 )
     free = options.schedule == FREE
+    direction = getattr(options, "direction", None)
+    if direction == Direction.TAKE_DOWN.value and not free:
+        raise ProblemError(f"--direction {direction}: it goes with --schedule {FREE}")
+    if getattr(options, "keep", None) is not None and direction != Direction.TAKE_DOWN.value:
+        raise ProblemError(f"--keep {options.keep}: it goes with --direction take-down")
     for name, why in _WRONG["free" if free else "states" if of_states else "candidates"].items():
         if getattr(options, name, None):
             raise ProblemError(f"--{name}: {why}")
