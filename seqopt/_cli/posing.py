@@ -167,11 +167,7 @@ def _require_known(options: argparse.Namespace, *, of_states: bool) -> None:
                     "worst-total or as cvar=0.9"
                 )
     free = options.schedule == FREE
-    direction = getattr(options, "direction", None)
-    if direction == Direction.TAKE_DOWN.value and not free:
-        raise ProblemError(f"--direction {direction}: it goes with --schedule {FREE}")
-    if getattr(options, "keep", None) is not None and direction != Direction.TAKE_DOWN.value:
-        raise ProblemError(f"--keep {options.keep}: it goes with --direction take-down")
+    _require_direction(options, free=free)
     for name, why in _WRONG["free" if free else "states" if of_states else "candidates"].items():
         if getattr(options, name, None):
             raise ProblemError(f"--{name}: {why}")
@@ -180,6 +176,16 @@ def _require_known(options: argparse.Namespace, *, of_states: bool) -> None:
         if of_states:
             said = f"--schedule {options.schedule}: a count of robots goes with {FREE}"
         raise StepError(said)
+
+
+def _require_direction(options: argparse.Namespace, *, free: bool) -> None:
+    """Raise an error if a take-down is asked for that does not go with the rest."""
+    down, keep = Direction.TAKE_DOWN.value, getattr(options, "keep", None)
+    asked = getattr(options, "direction", None)
+    if asked == down and not free:
+        raise ProblemError(f"--direction {down}: it goes with --schedule {FREE}")
+    if keep is not None and asked != down:
+        raise ProblemError(f"--keep {keep}: it goes with --direction {down}")
 
 
 def _asked_aim(options: argparse.Namespace) -> RobustAim:

@@ -49,8 +49,9 @@ class Task:
     """What one robot does in one step; frames are of the scene, m.
 
     ``grip`` is the frame of the tool, with its tip at the node and its third axis into the block,
-    and ``grip_in_block`` the same from the block. A block is picked and stored where the reader keeps
-    it, so tasks of this have no other frame. ``built``: how many blocks stand once the step is done.
+    and ``grip_in_block`` the same from the block. A block is picked and stored where the reader
+    keeps it, so tasks of this have no other frame. ``built``: how many blocks stand once the step
+    is done.
     """
 
     step: int
