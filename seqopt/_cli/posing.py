@@ -19,7 +19,7 @@ from seqopt._cli.values import (
     parse_robots,
     parse_rules,
 )
-from seqopt._cli.where import Place, asked_place, between, kept_place
+from seqopt._cli.where import Place, _kept_place, asked_place, between
 from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
@@ -121,7 +121,7 @@ def _asked_ends(options: argparse.Namespace, scene: Scene) -> tuple[Scene, Place
     if hasattr(options, "change"):
         scene, begin, options.robots = options.change(scene, begin)
     if getattr(options, "keep", None) is not None:
-        return kept_place(options, scene, begin)
+        return _kept_place(options, scene, begin)
     later, end = asked_place(options, "to", scene)
     if later != scene:
         raise StepError(f"--to {options.to}: its bricks are not those that follow in this order")

@@ -41,7 +41,7 @@ def asked_place(options: argparse.Namespace, name: str, scene: Scene) -> tuple[S
         raise StepError(f"--{name} {text}: {error}") from None
 
 
-def kept_place(
+def _kept_place(
     options: argparse.Namespace, scene: Scene, begin: Place
 ) -> tuple[Scene, Place, Place]:
     """Return where a take-down begins, and where it ends: with the bricks that are to be kept.

@@ -270,7 +270,7 @@ def no_sets(network: Network, bricks: int, held: int) -> Fields:
     return Fields(grip_force=np.empty((0, held, 3)), **empty)
 
 
-def empty_site(network: Network) -> Fields:
+def _empty_site(network: Network) -> Fields:
     """Return the fields of a site on which nothing stands, of one set of no grips."""
     empty = no_sets(network, 0, 0)
     return Fields(**{n: np.zeros((1, *getattr(empty, n).shape[1:])) for n in _NAMES})

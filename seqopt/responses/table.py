@@ -19,7 +19,7 @@ from seqopt.contact.mortar import EPOXY
 from seqopt.engines._auto import AutoEngine
 from seqopt.engines.discrete._equilibrium_path import FAR
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.interface import Engine, Fields, Want, empty_site
+from seqopt.engines.interface import Engine, Fields, Want, _empty_site
 from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.network import Network
 from seqopt.responses.quantities import (
@@ -275,7 +275,7 @@ def support_columns(scene: Scene) -> list[tuple[str, str]]:
 def step_fields(engine: Engine, step: Step, want: Want = Want.RESPONSES) -> Fields:
     """Return the full fields of one step, of one grip set; errors of the engine name the step."""
     if not step.bricks:  # where a take-down ends
-        return empty_site(engine.network)
+        return _empty_site(engine.network)
     with step_named(step):
         return engine.solve(step.bricks, _grips_of(engine.network.scene, step), want)
 

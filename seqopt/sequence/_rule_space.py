@@ -428,10 +428,7 @@ class _TakeDownSpace(FreeSpace):
                 sort_entries(new, first, end)
                 parts.append(Moves(rows, new, np.zeros(len(rows))))
         moves = _join_moves(parts, states)
-        if bricks > 1:
-            return self._lawful_only(bricks - 1, moves)
-        moves.states[:, : self.robots] = 0
-        return moves
+        return self._lawful_only(bricks - 1, moves) if bricks > 1 else moves
 
 
 def free_space(
@@ -455,8 +452,7 @@ def free_space(
     [[2, 0, 0], [0, 2, 0], [0, 0, 2]]
     """
     kinds, rules = sort_robots(network, rules, caps), rules.begun(network.scene)
-    kind = _TakeDownSpace if rules.takes_down else FreeSpace
-    space = kind(network, rules, kinds, parks)
+    space = (_TakeDownSpace if rules.takes_down else FreeSpace)(network, rules, kinds, parks)
     base = 1 + (2 if parks else 1) * 2 * len(network.inner)
     if base**space.robots * (1 + (rules.regrips or 0)) >= 2**62:
         raise StepError(

@@ -21,9 +21,9 @@ from seqopt.sequence.steps import (
     Step,
     StepKind,
     _check_part,
+    _turned_round,
     check_sequence,
     check_step,
-    turned_round,
 )
 from seqopt.sequence.three_robots import SCHEDULES, make_schedule, open_schedule, robot_loop
 
@@ -93,7 +93,7 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     if first > 1 or any(step.kind is StepKind.REMOVE for step in steps):
         return _check_part(scene, steps)
     checked = check_sequence(scene, steps)
-    return turned_round(scene, checked) if turned else checked
+    return _turned_round(scene, checked) if turned else checked
 
 
 def _read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, _Row]]:

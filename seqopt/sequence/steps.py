@@ -213,7 +213,7 @@ def _check_removal(
         )
 
 
-def turned_round(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
+def _turned_round(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
     """Return the take-down that passes the states of a build in reverse, from 1.
 
     It begins where the build ends; robots that let go together take hold one after the other.
@@ -222,7 +222,7 @@ def turned_round(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
     --------
     >>> import seqopt
     >>> scene = seqopt.load_scene("arch25")
-    >>> steps = turned_round(scene, seqopt.sequential(seqopt.build_network(scene)))
+    >>> steps = _turned_round(scene, seqopt.sequential(seqopt.build_network(scene)))
     >>> steps[0].bricks, steps[-1].kind.value, steps[-1].bricks
     (25, 'remove', 0)
     """

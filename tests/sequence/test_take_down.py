@@ -23,7 +23,7 @@ from seqopt.sequence.exports import Action, plan_tasks
 from seqopt.sequence.exports.formats import plan_csv
 from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.site import Site
-from seqopt.sequence.steps import Step, StepKind, check_sequence, turned_round
+from seqopt.sequence.steps import Step, StepKind, _turned_round, check_sequence
 from tests.brute_force import ONES, allowed
 
 ARCH = seqopt.ArchShape(pitch=(1.2, 0.4, -0.4, -1.2), pattern="V")
@@ -133,7 +133,7 @@ def test_take_down_is_worth_what_its_build_is_in_reverse(made):
     one = seqopt.FreeRules(ending="one-by-one")
     build, down = (seqopt.solve(posed(engine, "minmax,steps", rules)) for rules in (one, DOWN))
     bare = peak_of(engine, [build.steps[-1]])  # counts in builds: it is where take-downs begin
-    reverse = turned_round(engine.network.scene, build.steps)
+    reverse = _turned_round(engine.network.scene, build.steps)
     check_free(engine.network, DOWN, reverse)
     assert down.selection.objective[0] == pytest.approx(peak_of(engine, down.steps))
     assert max(bare, down.selection.objective[0]) == pytest.approx(build.selection.objective[0])
@@ -223,7 +223,7 @@ def test_judge_finds_a_better_take_down():
     engine = arch()
     problem = build_states(engine, DOWN, ONES, "minmax")
     build = seqopt.solve(posed(engine, "steps", seqopt.FreeRules(ending="one-by-one")))
-    steps = turned_round(engine.network.scene, build.steps)
+    steps = _turned_round(engine.network.scene, build.steps)
     worst, least = peak_of(engine, steps), seqopt.solve(posed(engine, "minmax")).selection
     assert worst > least.objective[0] * (1 + 1e-6)
     told = replace(least, objective=(worst,), bound=(worst,), visited=())
@@ -273,7 +273,7 @@ def test_removal_is_by_who_alone_holds(who, match):
 def test_plans_are_read_back_and_a_build_turned_round():
     scene = seqopt.load_scene("arch25")
     build = seqopt.sequential(seqopt.build_network(scene))
-    down = turned_round(scene, build)
+    down = _turned_round(scene, build)
     assert parse_plan(scene, plan_csv(scene, down), "down") == down
     head, *rows = plan_csv(scene, build).splitlines()
     assert parse_plan(scene, "\n".join([head, *rows[::-1]]), "turned") == down

@@ -280,15 +280,14 @@ class States(Shown):
             asked = [partial(p.standing_values, level) for p in self.each]
             return self._worst(asked, states, most)
         out, within = self.values(level, states)
-        if not self.space.bricks_at(level):
-            return out, within
         if self.demands:
             rows = np.flatnonzero(within)
             within[rows] = self.stand(level, states[rows])
-        for column, goal in enumerate(self.goals):
+        bricks = self.space.bricks_at(level)
+        for column, goal in enumerate(self.goals if bricks else ()):
             if goal.of_margins:
                 rows = np.flatnonzero(within)
-                bricks, grips = self.space.bricks_at(level), self._grips(states[rows], stand=True)
+                grips = self._grips(states[rows], stand=True)
                 ends = self.stability.margins(goal.response, bricks, *grips)
                 out[rows, column] = ends[:, 1]
         within &= np.isfinite(out).all(axis=1)
@@ -302,8 +301,6 @@ class States(Shown):
         if self.each:
             return np.asarray(np.all([p.stand(level, states) for p in self.each], axis=0))
         bricks = self.space.bricks_at(level)
-        if not bricks:
-            return np.ones(len(states), dtype=bool)
         return np.asarray(self.stability.stand(bricks, *self._grips(states, stand=True)))
 
     def recalled(self, level: int, states: Ints) -> Ints:
@@ -311,8 +308,6 @@ class States(Shown):
         if self.each:
             return np.asarray(np.min([p.recalled(level, states) for p in self.each], axis=0))
         bricks = self.space.bricks_at(level)
-        if not bricks:
-            return np.ones(len(states), dtype=np.int64)
         return self.stability.recalled(bricks, *self._grips(states, stand=True))
 
     def _worst(

@@ -14,13 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.plan.judge._posture_rules import PostureRules
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.rules import Ending, Newest
-from seqopt.sequence.schedule import Hold, OpenGrip, Schedule, holds, islands
-from seqopt.sequence.steps import Step, StepKind
+from seqopt.sequence.schedule import Hold, Schedule, holds, islands
+from seqopt.sequence.steps import StepKind
 
 PAIRS = 1_000_000  # of states and places that are looked at together
 
@@ -174,8 +173,6 @@ class RuleTables:
             if bricks > 1:
                 ok = self.keep(bricks - 1, after) & self._postures.allow(bricks - 1, after)
                 source, after = source[ok], after[ok]
-            else:
-                after[:, : self.robots] = 0  # nobody goes anywhere from here
             none = np.zeros(len(source))
             yield Follows(level + 1, source, self.in_order(after), regrip=False, way=none)
 
@@ -389,27 +386,6 @@ class ScheduleTables:
     def in_order(self, states: Ints) -> Ints:
         """Return states as they are: no two robots could change places."""
         return states
-
-
-def check_scheduled(schedule: Schedule, steps: Sequence[Step]) -> None:
-    """Raise a `StepError` unless a sequence is the schedule, each open grip at one candidate."""
-    if len(steps) != len(schedule.steps):
-        raise StepError(f"{len(steps)} steps; schedule {schedule.method} has {len(schedule.steps)}")
-    chosen: dict[int, object] = {}
-    for step, planned in zip(steps, schedule.steps, strict=True):
-        same = (step.number, step.kind, step.bricks) == (
-            planned.number,
-            planned.kind,
-            planned.bricks,
-        )
-        for node, grip in zip(step.grips, planned.grips, strict=True):
-            if isinstance(grip, OpenGrip):
-                found = chosen.setdefault(grip.move, node)
-                same &= found == node and node in schedule.moves[grip.move].candidates
-            else:
-                same &= node == grip
-        if not same:
-            raise StepError(f"step {step.number} is none of schedule {schedule.method}")
 
 
 def _alike(book: RuleBook, most: Mapping[int, float]) -> list[tuple[int, ...]]:
