@@ -49,7 +49,7 @@ def each_verdict(
     follow, so steps of a build are asked best in their order. ``compiled``: makes the programs of
     the steps for which that proves nothing.
     """
-    most = max((step.bricks for step in steps), default=1)
+    most = max((step.bricks for step in steps), default=1) or 1
     parts = PartialAssemblies(built, most) if isinstance(built, Network) else built
     prove = VerdictChain(parts, lambda assembly: bonded(assembly, mortar), compiled)
     found: dict[tuple[int, Grips], Stability] = {}
@@ -143,7 +143,7 @@ def each_stability(
     """
     numbers = {step.number for step in steps} if at is None else at
     whole = _Portion(tuple(steps), mortar, margins, numbers if margins else ())
-    most = max((step.bricks for step in steps), default=1)
+    most = max((step.bricks for step in steps), default=1) or 1
     with hire(*shared, beside=True) as crew:
         if crew is None:
             yield from _each(PartialAssemblies(network, most), whole)

@@ -187,6 +187,15 @@ def test_states_stand_until_nothing_does():
     assert {v.value for v in plan.verdicts("epoxy")} == {"stands"}
 
 
+@pytest.mark.slow
+def test_margins_are_aims_of_a_take_down():
+    plan = seqopt.solve(posed(small_wall(), "tilt"))
+    tilts = plan.stability("dry")["tilt_survived_deg"]
+    assert tilts.iloc[-1] == 90  # of the empty site
+    lost = np.pi / 2 - np.radians(tilts.min())
+    assert plan.selection.objective[0] == pytest.approx(lost, rel=0.02)
+
+
 def test_policy_leads_to_the_optimum():
     engine = arch()
     problem = posed(engine, "minmax,steps")
