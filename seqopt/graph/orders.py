@@ -45,6 +45,11 @@ class AllOrders(Shown):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "among", Orders.of(self.among))
+        if self.states.free_rules.takes_down:
+            raise ProblemError(
+                "orders of a take-down are not searched: it removes the newest brick first; search "
+                "the order of building, and give it"
+            )
         first, last = self.states.free_rules.span(self.scene)
         if last < len(self.scene.bricks):
             raise ProblemError(

@@ -264,9 +264,11 @@ class States(Shown):
         if self.each:
             asked = [partial(p.values, level, rough=rough) for p in self.each]
             return self._worst(asked, states, most)
-        found, within = self.responses(level, states, rough=rough)
         bricks = self.space.bricks_at(level)
         out = np.zeros((len(states), len(self.goals)))
+        if not bricks:  # the empty site, where a take-down ends
+            return out, np.ones(len(states), dtype=bool)
+        found, within = self.responses(level, states, rough=rough)
         for column, goal in enumerate(self.goals):
             if goal.of_states and not goal.of_margins:
                 if goal.response:
@@ -293,12 +295,11 @@ class States(Shown):
         if self.demands:
             rows = np.flatnonzero(within)
             within[rows] = self.stand(level, states[rows])
-        for column, goal in enumerate(self.goals):
-            if goal.of_margins:
+        if bricks := self.space.bricks_at(level):
+            for column in (c for c, goal in enumerate(self.goals) if goal.of_margins):
                 rows = np.flatnonzero(within)
-                bricks, grips = self.space.bricks_at(level), self._grips(states[rows], stand=True)
-                ends = self.stability.margins(goal.response, bricks, *grips)
-                out[rows, column] = ends[:, 1]
+                asked = bricks, *self._grips(states[rows], stand=True)
+                out[rows, column] = self.stability.margins(self.goals[column].response, *asked)[:, 1]
         within &= np.isfinite(out).all(axis=1)
         return out, within
 
@@ -432,6 +433,7 @@ def build_states(
     States('arch25', minmax, steps, 0 limits)
     """
     named = _goals(goals, least=1)
+    rules = rules.begun(engine.network.scene) if isinstance(rules, FreeRules) else rules
     limits = _checked(limits, engine.network)
     if any(goal.of_states and not goal.response for goal in named):
         criterion = _of_states(engine, criterion)

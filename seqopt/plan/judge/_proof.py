@@ -96,7 +96,9 @@ class Passable:
         goals, tables = self.problem.goals, self.tables
         end, counted = tables.only_end(), float(tables.least_steps())
         last = np.full((1, len(goals)), -np.inf)
-        if end is not None:
+        if end is not None and not tables.bricks_at(tables.last):
+            last = np.zeros((1, len(goals)))
+        elif end is not None:
             asked = Asked(exact=True)
             last = self._answers(tables.bricks_at(tables.last), end, asked, np.inf)[0]
         known = {Measure.PEAK: last[0], Measure.STEPS: np.full(len(goals), counted)}
@@ -137,7 +139,7 @@ class Passable:
         ``states`` (n, c). Results: ``values`` (n, g); ``ok`` (n,).
         """
         goals = self.problem.goals
-        if not level:
+        if not self.tables.bricks_at(level):
             return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
         held, payload = self._held(states, self._most, self._beyond)
         most, margins, _ = asked
@@ -163,13 +165,17 @@ class Passable:
 
     def may_stand(self, level: int, states: Ints, margins: Sequence[float]) -> Bools:
         """Return which states (n, c) are not proven to fall, or to lack margins of first goals."""
-        held = self._held(states, self._payload)
-        return self.stands.allows_rows(self.tables.bricks_at(level), *held, margins)
+        held, bricks = self._held(states, self._payload), self.tables.bricks_at(level)
+        if not bricks:
+            return np.ones(len(states), dtype=bool)
+        return self.stands.allows_rows(bricks, *held, margins)
 
     def recalled(self, level: int, states: Ints, margins: Sequence[float]) -> Ints:
         """Return the same by what is known: -1 where it is proven, else 0 or 1."""
-        held = self._held(states, self._payload)
-        return self.stands.recalled_rows(self.tables.bricks_at(level), *held, margins)
+        held, bricks = self._held(states, self._payload), self.tables.bricks_at(level)
+        if not bricks:
+            return np.ones(len(states), dtype=np.int64)
+        return self.stands.recalled_rows(bricks, *held, margins)
 
     def _answers(
         self, bricks: int, held: Ints, asked: Asked, below: float
