@@ -64,7 +64,7 @@ def test_a_part_is_kept(capsys, tmp_path, arch):
         ((*DOWN, "--keep", "1..2", "--to", "1"), "leave one out"),
         ((*DOWN, "--from", "3", "--keep", "4,5"), "keep what stands"),
         ((*DOWN, "--to", "5"), "cannot end with 5; give fewer"),
-        ((*DOWN, "--order", "search"), "search the order of building, and give it"),
+        ((*DOWN, "--order", "search", "--aim", "steps"), "put minmax first"),
     ],
 )
 def test_wrong_words_get_a_line(capsys, tmp_path, arch, words, said):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, permutations
 
 import networkx as nx
 import numpy as np
@@ -14,6 +14,7 @@ from seqopt.errors import ProblemError, SolverError, StepError
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import build_states
+from seqopt.plan._status import Status
 from seqopt.plan.front import find_front
 from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.plan.policy import find_policy
@@ -196,6 +197,20 @@ def test_margins_are_aims_of_a_take_down():
     assert plan.selection.objective[0] == pytest.approx(lost, rel=0.02)
 
 
+def test_best_order_is_that_of_all():
+    engine = small_wall()
+    scene, criterion = engine.network.scene, seqopt.CRITERIA["worst-ratio"]
+    found = seqopt.solve(seqopt.pose(engine, DOWN, criterion, "minmax", orders="tied"))
+    among = AllOrders(build_states(engine, DOWN, found.problem.criterion, "minmax"))
+    orders = [*filter(among.allows, permutations(scene.build_order))]
+    values = [seqopt.solve(among.planned(order)).objective["minmax"] for order in orders]
+    assert len(orders) > 1
+    assert found.objective["minmax"] == pytest.approx(min(values), rel=1e-9)
+    assert found.order.status == found.status == Status.OPTIMAL
+    assert found.steps[-1].bricks == 0
+    assert max(values) > min(values) * 1.01  # orders differ
+
+
 def test_policy_leads_to_the_optimum():
     engine = arch()
     problem = posed(engine, "minmax,steps")
@@ -307,8 +322,10 @@ def test_robots_put_away_what_they_remove():
 
 def test_what_a_take_down_has_not():
     engine = arch()
-    with pytest.raises(ProblemError, match="orders of a take-down"):
-        AllOrders(build_states(engine, DOWN, ONES, "minmax"))
+    with pytest.raises(ProblemError, match="orders of a take-down are searched for its worst"):
+        AllOrders(build_states(engine, DOWN, ONES, "steps"))
+    with pytest.raises(ProblemError, match="orders of a take-down from or to a part"):
+        AllOrders(build_states(engine, replace(DOWN, finish=Site(2)), ONES, "minmax"))
     with pytest.raises(StepError, match="cannot end with 4; give fewer"):
         replace(DOWN, finish=Site(4)).span(engine.network.scene)
     with pytest.raises(StepError, match="did you mean take-down"):

@@ -65,6 +65,8 @@ def _asked(problem: States, bricks: int, grips: Ints, *, rough: bool) -> Answers
     for limit in problem.limits:
         fit &= ~limit.exceeded(found.get(limit.response, np.zeros(len(grips))))
     worth = np.column_stack([_costs(problem, goal, found, bricks, fit) for goal in problem.goals])
+    if problem.spares and bricks == len(problem.network.inner) and not grips.shape[1]:
+        worth[:] = 0.0  # the whole that nobody holds, where a take-down begins
     return Answers(worth, forces, fit & np.isfinite(worth).all(axis=1))
 
 

@@ -165,17 +165,13 @@ class Passable:
 
     def may_stand(self, level: int, states: Ints, margins: Sequence[float]) -> Bools:
         """Return which states (n, c) are not proven to fall, or to lack margins of first goals."""
-        held, bricks = self._held(states, self._payload), self.tables.bricks_at(level)
-        if not bricks:
-            return np.ones(len(states), dtype=bool)
-        return self.stands.allows_rows(bricks, *held, margins)
+        held = self._held(states, self._payload)
+        return self.stands.allows_rows(self.tables.bricks_at(level), *held, margins)
 
     def recalled(self, level: int, states: Ints, margins: Sequence[float]) -> Ints:
         """Return the same by what is known: -1 where it is proven, else 0 or 1."""
-        held, bricks = self._held(states, self._payload), self.tables.bricks_at(level)
-        if not bricks:
-            return np.ones(len(states), dtype=np.int64)
-        return self.stands.recalled_rows(bricks, *held, margins)
+        held = self._held(states, self._payload)
+        return self.stands.recalled_rows(self.tables.bricks_at(level), *held, margins)
 
     def _answers(
         self, bricks: int, held: Ints, asked: Asked, below: float
