@@ -24,7 +24,8 @@ from seqopt.network.build import build_network
 from seqopt.problem.problem import LARGEST, Measure, Orders
 from seqopt.responses._blocks import Shipment, engine_of, pack
 from seqopt.scene.scene import Order, Scene
-from seqopt.sequence._rule_space import node_numbers, sort_entries
+from seqopt.sequence._robot_kinds import node_numbers
+from seqopt.sequence._rule_space import sort_entries
 from seqopt.sequence.rules import Direction, Ending, FreeRules
 
 

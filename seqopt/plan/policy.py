@@ -24,7 +24,7 @@ from seqopt.graph.states.states import States
 from seqopt.plan.judge._policy import check_policy
 from seqopt.plan.solving import states_of
 from seqopt.problem.problem import Problem
-from seqopt.sequence._rule_space import node_numbers
+from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import StepKind
 

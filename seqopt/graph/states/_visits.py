@@ -14,7 +14,8 @@ from seqopt.graph.graph import Graph
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import Measure
 from seqopt.sequence import _rule_space as free_space
-from seqopt.sequence._rule_space import FreeSpace, node_numbers
+from seqopt.sequence._robot_kinds import node_numbers
+from seqopt.sequence._rule_space import FreeSpace
 from seqopt.sequence._schedule_space import ScheduleSpace
 from seqopt.sequence.rules import Ending
 from seqopt.sequence.site import Site, _begin_step

@@ -8,7 +8,7 @@ with a minus; then how many grips were taken since the last brick where that cou
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -405,21 +405,3 @@ class ScheduleTables:
     def in_order(self, states: Ints) -> Ints:
         """Return states as they are: no two robots could change places."""
         return states
-
-
-def _alike(
-    book: RuleBook, most: Mapping[int, float], *, timed: bool = False
-) -> list[tuple[int, ...]]:
-    """Return the robots that could change places, group by group; ``timed``: also in time."""
-    scene, last = book.network.scene, len(book.network.inner)
-    groups: dict[object, list[int]] = {}
-    for r in book.team:
-        may = not book.rules.placers or scene.robots[r].name in book.rules.placers
-        nodes = [book.newest_nodes[r, b] for b in range(1, last + 1)]
-        own = scene.robots[r]
-        gives = (own.stiffness, own.rotational_stiffness, own.payload)  # tolerances are of these
-        arm = own.arm and r  # no other robot is where it is
-        takes = own.durations if timed else None
-        key = (book.reached[r, last], tuple(nodes), may, most[r], gives, arm, takes)
-        groups.setdefault(key, []).append(r)
-    return [tuple(group) for group in groups.values() if len(group) > 1]
