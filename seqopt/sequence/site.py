@@ -89,6 +89,9 @@ class Site:
             _check_state(scene, Step(0, StepKind.RELEASE, self.bricks, tuple(grips)), "site")
         elif self.held:
             raise StepError("site: a robot holds a brick, and none stands; give bricks")
+        for prop in scene.props:
+            if prop.node in grips:
+                raise StepError(f"site: a robot holds node {prop.node} of a prop; leave one out")
         return grips
 
     def described(self, scene: Scene) -> dict[str, object]:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt.errors import StepError
+from seqopt.errors import InfeasibleError, StepError
 from seqopt.plan._replan import compared, goes_on, without
 from seqopt.plan.solving import states_of
 from seqopt.sequence.rules import FreeRules
@@ -87,3 +87,14 @@ def test_what_the_old_rest_breaks_is_named():
     for wrong in ({"lost": ["rob9"]}, {"missing": [99]}):
         with pytest.raises(StepError, match="does not exist"):
             without(SCENE, site, **wrong)
+
+
+def test_props_are_none_where_a_robot_holds():
+    weak = SCENE.with_robots(*(replace(robot, payload=1.0) for robot in SCENE.robots))
+    assert 5 in {prop.node for prop in SCENE.with_centering().props}
+    rules = FreeRules(robots=("rob1",), least_grips=1, begin=Site(3, (5, None, None)))
+    with pytest.raises(InfeasibleError, match="is never placed"):
+        seqopt.solve(seqopt.pose(seqopt.make_engine("compliance", weak), rules, ONES))
+    beside = seqopt.make_engine("compliance", SCENE.with_props(seqopt.Prop(node=5)))
+    with pytest.raises(StepError, match="a robot holds node 5 of a prop; leave one out"):
+        seqopt.solve(seqopt.pose(beside, rules, ONES))

@@ -212,8 +212,11 @@ def _propped(problem: States, look: Look) -> Iterator[str]:
     scene = problem.network.scene
     if scene.props or recipe_of(problem.engine) is None or problem.scenarios:
         return
-    engine = engine_for(problem.engine, scene.with_centering())
     moves = problem.rules
+    sites = (moves.begin, moves.finish) if isinstance(moves, FreeRules) else ()
+    held = {node for site in sites if site is not None for node in site.holds(scene)}
+    props = (prop for prop in scene.with_centering().props if prop.node not in held)
+    engine = engine_for(problem.engine, scene.with_props(*props))
     rules = replace(moves, scene=engine.network.scene) if isinstance(moves, Schedule) else moves
     if look(replace(problem, engine=engine, rules=rules, goals=STEPS)).whole:
         yield CENTERING
