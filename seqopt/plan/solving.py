@@ -36,6 +36,8 @@ from seqopt.problem.standing import Standing
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
+from seqopt.sequence._rule_space import FreeSpace
+from seqopt.sequence._schedule_space import ScheduleSpace
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 
@@ -224,11 +226,18 @@ def _states(problem: Problem) -> States:
     goals = problem.goals or (AIMS[over.aim],)
     asked = problem.engine, problem.moves, problem.criterion, goals, problem.limits
     found = replace(build_states(*asked, problem.stands), resources=problem.resources)
+    _require_moves_left(found.space)
     if problem.is_timed and problem.moves.begin is not None:
         raise ProblemError("aim makespan: a build in time begins on an empty site; leave from out")
     if caps := parse_caps(problem.budgets):
         found = within(found, caps)
     return over_scenarios(found, problem.scenarios, over) if problem.scenarios else found
+
+
+def _require_moves_left(space: FreeSpace | ScheduleSpace) -> None:
+    ends = isinstance(space, FreeSpace) and space.first == space.levels
+    if ends and space.ended(space.start()).all():
+        raise ProblemError("nothing is left to plan: the build begins as it may end")
 
 
 def _in_own_order(problem: Problem) -> States:

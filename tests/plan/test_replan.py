@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import seqopt
-from seqopt.errors import InfeasibleError, StepError
+from seqopt.errors import InfeasibleError, ProblemError, StepError
 from seqopt.plan._replan import compared, goes_on, without
 from seqopt.plan.solving import states_of
 from seqopt.sequence.rules import FreeRules
@@ -98,3 +98,9 @@ def test_props_are_none_where_a_robot_holds():
     beside = seqopt.make_engine("compliance", SCENE.with_props(seqopt.Prop(node=5)))
     with pytest.raises(StepError, match="a robot holds node 5 of a prop; leave one out"):
         seqopt.solve(seqopt.pose(beside, rules, ONES))
+
+
+def test_a_build_that_has_ended_leaves_nothing_to_plan():
+    ended = FreeRules(begin=Site(6, (None, None, None)))
+    with pytest.raises(ProblemError, match="nothing is left to plan"):
+        seqopt.solve(seqopt.pose(ENGINE, ended, ONES))
