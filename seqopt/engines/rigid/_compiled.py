@@ -1,0 +1,169 @@
+"""The loops of `seqopt.engines.rigid._extremes`, compiled by numba where it is installed.
+
+Nothing else imports this file. Grip sets are solved a few at a time, side by side, so that a
+processor does the same with several at once; what loads mean is summed for one stretch of edges or
+nodes at a time, over all sets, so that it stays in the processor's cache. The code is compiled when
+it is first called and kept in the folder that numba chooses: beside this file, or the user's own
+(``NUMBA_CACHE_DIR`` names another). No function touches what another call works on, and none holds
+Python's lock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, TypeVar, cast
+
+import numba
+import numpy as np
+
+from seqopt.arrays import Floats, Ints
+
+_SIDE_BY_SIDE = 32  # sets
+
+_Function = TypeVar("_Function", bound=Callable[..., object])
+
+
+def _compiled(*freedom: str) -> Callable[[_Function], _Function]:
+    """Return what compiles a function when it is first called, and keeps it if there is a place.
+
+    ``freedom``: what may differ from arithmetic by the book, in numba's words.
+    """
+    free = {"contract", *freedom}
+
+    def compiled(function: _Function) -> _Function:
+        make = partial(numba.njit, nogil=True, fastmath=free, error_model="numpy")
+        try:
+            found: Any = make(cache=True)(function)
+        except RuntimeError:  # no folder can be written
+            found = make()(function)
+        return cast("_Function", found)
+
+    return compiled
+
+
+@_compiled()
+def solve_grips(
+    flexibility: Floats, dead: Floats, index: Ints, force: Floats, pivot: Floats
+) -> None:
+    """Find the forces (S, k) at loads (S, k) that undo the displacements (l,), and scaled pivots.
+
+    As ``_solve_positive`` of `seqopt.engines.rigid._grip_equations`, of rigid grips.
+    """
+    sets, count = index.shape
+    low = np.empty((count, count, _SIDE_BY_SIDE))
+    share, pivots, own = np.empty((3, count, _SIDE_BY_SIDE))
+    for start in range(0, sets, _SIDE_BY_SIDE):
+        for s in range(_SIDE_BY_SIDE):
+            at = index[min(start + s, sets - 1)]
+            for i in range(count):
+                for j in range(i + 1):
+                    low[i, j, s] = flexibility[at[i], at[j]]
+                share[i, s], own[i, s] = -dead[at[i]], low[i, i, s]
+        _eliminate(low, pivots)
+        _substitute(low, share)
+        for s in range(min(_SIDE_BY_SIDE, sets - start)):
+            for i in range(count):
+                force[start + s, i] = share[i, s]
+                pivot[start + s, i] = pivots[i, s] / own[i, s]
+
+
+@_compiled()
+def _eliminate(low: Floats, pivots: Floats) -> None:
+    """Turn lower triangles (k, k, w) into their factors, with reciprocals of the pivots (k, w)."""
+    count, _, wide = low.shape
+    for j in range(count):
+        for i in range(j, count):
+            for k in range(j):
+                for s in range(wide):
+                    low[i, j, s] -= low[i, k, s] * low[j, k, s] * pivots[k, s]
+        for s in range(wide):
+            pivots[j, s] = low[j, j, s]
+            low[j, j, s] = 1.0 / low[j, j, s]
+        for i in range(j + 1, count):
+            for s in range(wide):
+                low[i, j, s] *= low[j, j, s]
+
+
+@_compiled()
+def _substitute(low: Floats, share: Floats) -> None:
+    """Turn loads (k, w) into answers."""
+    count, wide = share.shape
+    for i in range(count):
+        for k in range(i):
+            for s in range(wide):
+                share[i, s] -= low[i, k, s] * share[k, s]
+    for i in range(count - 1, -1, -1):
+        for s in range(wide):
+            share[i, s] *= low[i, i, s]
+        for k in range(i + 1, count):
+            for s in range(wide):
+                share[i, s] -= low[k, i, s] * share[k, s]
+
+
+@_compiled()
+def _sum_into(out: Floats, rows: Floats, at: Ints, force: Floats) -> None:
+    """Find what the weight, the last of the rows (l + 1, n), and forces at others mean."""
+    count, done = len(at), 0
+    if count >= 9:
+        done = _sum_nine(out, rows, at, force)
+    elif count >= 6:
+        done = _sum_six(out, rows, at, force)
+    else:
+        out[:] = rows[-1]
+    for k in range(done, count):
+        own, much = rows[at[k]], force[k]
+        for n in range(len(out)):
+            out[n] += much * own[n]
+
+
+@_compiled()
+def _sum_nine(out: Floats, rows: Floats, at: Ints, force: Floats) -> int:
+    """Begin a sum with the weight and nine loads: three grips in space."""
+    weight, a, b, c, d = rows[-1], rows[at[0]], rows[at[1]], rows[at[2]], rows[at[3]]
+    e, f, g, h, i = rows[at[4]], rows[at[5]], rows[at[6]], rows[at[7]], rows[at[8]]
+    p, q, r, s, t, u = force[0], force[1], force[2], force[3], force[4], force[5]
+    v, w, x = force[6], force[7], force[8]
+    for n in range(len(out)):
+        first = weight[n] + p * a[n] + q * b[n] + r * c[n]
+        second = s * d[n] + t * e[n] + u * f[n]
+        out[n] = first + second + v * g[n] + w * h[n] + x * i[n]
+    return 9
+
+
+@_compiled()
+def _sum_six(out: Floats, rows: Floats, at: Ints, force: Floats) -> int:
+    """Begin a sum with the weight and six loads: two grips in space."""
+    weight, a, b, c, d = rows[-1], rows[at[0]], rows[at[1]], rows[at[2]], rows[at[3]]
+    e, f = rows[at[4]], rows[at[5]]
+    p, q, r, s, t, u = force[0], force[1], force[2], force[3], force[4], force[5]
+    for n in range(len(out)):
+        first = weight[n] + p * a[n] + q * b[n] + r * c[n]
+        out[n] = first + s * d[n] + t * e[n] + u * f[n]
+    return 6
+
+
+@_compiled("nnan", "nsz")  # else no maximum is taken of several numbers at once
+def reduce_rows(
+    rows: Floats, counts: tuple[int, int, int], index: Ints, force: Floats, found: Floats
+) -> None:
+    """Find extremes of what forces (S, k) at loads (S, k) and the weight mean.
+
+    ``rows`` (p, l + 1, n), ``counts``, ``found`` (4, S): as of `seqopt.engines.rigid._extremes`.
+    """
+    edges, nodes, ends = counts
+    out = np.empty(rows.shape[2])
+    tension, x, y, z = out[:edges], out[edges:], out[edges + nodes :], out[edges + 2 * nodes :]
+    behind = edges + 3 * nodes
+    u, v, w = out[behind:], out[behind + ends :], out[behind + 2 * ends :]
+    for part in range(len(rows)):
+        for s in range(len(index)):
+            _sum_into(out, rows[part], index[s], force[s])
+            least, most, shift, moment = found[0, s], found[1, s], found[2, s], found[3, s]
+            for n in range(edges):
+                least, most = min(least, tension[n]), max(most, tension[n])
+            for n in range(nodes):
+                shift = max(shift, x[n] * x[n] + y[n] * y[n] + z[n] * z[n])
+            for n in range(ends):
+                moment = max(moment, u[n] * u[n] + v[n] * v[n] + w[n] * w[n])
+            found[0, s], found[1, s], found[2, s], found[3, s] = least, most, shift, moment
