@@ -111,11 +111,11 @@ def answer(engine: Engine, block: Block) -> Answers:
     want = reduce(or_, (r.needs for r in asked), Want.SCREEN if block.screen else Want(0))
     before = Counter(tally_of(engine))
     grips, robots = with_props(block.grips, block.props), block.grips.shape[1]
-    if isinstance(engine, ComplianceEngine) and EXTREMES.issuperset(block.names):
+    if isinstance(engine, ComplianceEngine) and set(block.names) <= EXTREMES.keys():
         with one_thread():
             found = engine._extremes(block.bricks, grips, want, compiled=block.compiled)
         forces = require_finite("grip force", found.force, block.bricks)[:, :robots]
-        return Answers({name: _extreme(name, found) for name in block.names}, forces)
+        return Answers({name: EXTREMES[name](found) for name in block.names}, forces)
     with one_thread():  # as many threads everywhere: sums in other orders differ in the last bit
         fields = engine.solve(block.bricks, grips, want)
     forces = require_finite("grip force", lengths(fields.grip_force), block.bricks)[:, :robots]
@@ -130,17 +130,14 @@ def answer(engine: Engine, block: Block) -> Answers:
     return Answers(values, forces, tuple((Counter(tally_of(engine)) - before).items()))
 
 
-EXTREMES = frozenset({"T_max", "F_min", "C_max", "D_max", "M_sup"})
+EXTREMES: Mapping[str, Callable[[Extremes], Floats]] = {
+    "T_max": lambda found: found.most,
+    "F_min": lambda found: found.least,
+    "C_max": lambda found: np.maximum(0.0, -found.least),
+    "D_max": lambda found: found.shift,
+    "M_sup": lambda found: found.moment,
+}
 """Responses that are extremes of fields, which need not be written down themselves."""
-
-
-def _extreme(name: str, found: Extremes) -> Floats:
-    """Return a response of `EXTREMES`."""
-    if name == "C_max":
-        return np.maximum(0.0, -found.least)
-    return {"T_max": found.most, "F_min": found.least, "D_max": found.shift, "M_sup": found.moment}[
-        name
-    ]
 
 
 def tally_of(engine: Engine) -> dict[object, int]:
