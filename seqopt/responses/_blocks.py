@@ -37,7 +37,6 @@ from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines._auto import Level, LevelChoice
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
-from seqopt.engines.rigid._extremes import Extremes
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import FileError, MemoryShortError, SceneError
 from seqopt.responses._arms import for_arms
@@ -45,6 +44,7 @@ from seqopt.responses._props import excess_of, with_props
 from seqopt.responses._tolerance import allowed_by, is_tolerance, misfits
 from seqopt.responses.quantities import (
     CHOSEN_BY,
+    EXTREMES,
     PROP_EXCESS,
     lengths,
     require_finite,
@@ -128,16 +128,6 @@ def answer(engine: Engine, block: Block) -> Answers:
         props = [network.scene.prop_of_number[number] for number in block.props]
         values[PROP_EXCESS] = excess_of(props, fields.grip_force[:, robots:])
     return Answers(values, forces, tuple((Counter(tally_of(engine)) - before).items()))
-
-
-EXTREMES: Mapping[str, Callable[[Extremes], Floats]] = {
-    "T_max": lambda found: found.most,
-    "F_min": lambda found: found.least,
-    "C_max": lambda found: np.maximum(0.0, -found.least),
-    "D_max": lambda found: found.shift,
-    "M_sup": lambda found: found.moment,
-}
-"""Responses that are extremes of fields, which need not be written down themselves."""
 
 
 def tally_of(engine: Engine) -> dict[object, int]:

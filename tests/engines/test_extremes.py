@@ -15,8 +15,8 @@ from seqopt.engines.rigid import _extremes
 from seqopt.engines.rigid._extremes import extremes_in, extremes_of, rows_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
-from seqopt.responses._blocks import COMPILED, EXTREMES, Block, answer
-from seqopt.responses.quantities import CHOSEN_BY, lengths
+from seqopt.responses._blocks import COMPILED, Block, answer
+from seqopt.responses.quantities import CHOSEN_BY, EXTREMES, lengths
 from seqopt.scene.scene_file import load_scene
 from tests.builders import from_both_sides, six_bricks, small_arch
 from tests.limit_scenes import chain, loosened

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.optimize import linprog
 
-from experiments.harness.timing import best
 from seqopt import Network, three_robot_loop
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Fields, Want, grip_columns
@@ -90,23 +89,14 @@ def products(
     return call, flops
 
 
-def least_arithmetic(net: Network, cases: list[Case], setting: str) -> tuple[float, float]:
-    """Return seconds for the arithmetic and the stores that no way around exists for, and flops.
-
-    Rates are those of this machine now: of a dense product, and of filling what stays in its cache.
-    """
-    flops = stored = 0.0
+def least_flops(net: Network, cases: list[Case], setting: str) -> float:
+    """Return how many operations the models of all cases have, nothing multiplied by zero."""
+    flops = 0.0
     for case in cases:
-        sets, numbers = len(case.grips), sum(_widths(net, case, setting))
         unknowns = 3 * case.columns.shape[1]
-        equations = unknowns**3 / 3 + 4 * unknowns**2
-        flops += sets * (2 * (unknowns + 1) * numbers + equations)
-        stored += sets * 8 * numbers
-    square, room = np.random.default_rng(0).standard_normal((400, 400)), np.empty(2**15)
-    out = np.empty_like(square)
-    multiply = best(lambda: np.matmul(square, square, out=out), 5) / (2 * 400**3)
-    store = best(lambda: room.fill(1.0), 50) / room.nbytes
-    return flops * multiply + stored * store, flops
+        sums = 2 * (unknowns + 1) * sum(_widths(net, case, setting))
+        flops += len(case.grips) * (sums + unknowns**3 / 3 + 4 * unknowns**2)
+    return flops
 
 
 def load_index(case: Case) -> Ints:
