@@ -24,6 +24,7 @@ from tests.limit_scenes import chain, loosened
 needs_numba = pytest.mark.skipif(not _extremes.can_compile(), reason="no numba")
 WAYS = [False, pytest.param(True, marks=needs_numba)]
 SOME = [Want.RESPONSES, Want.EDGES, Want.DISPLACEMENTS, Want.SUPPORT, Want(0)]
+NONE, MANY = np.empty((1, 0), dtype=np.int64), np.empty((500, 0), dtype=np.int64)
 CLOSE = 1e-12  # of what is largest
 
 
@@ -121,9 +122,9 @@ def test_a_wrong_row_is_seen(compiled):
     operator = engine._operator(6, np.arange(12).reshape(-1, 1))
     known = rows_of(operator, Want.EDGES)
     index, force = operator.load_index(np.array([[0, 9]])), np.ones((1, 6))
-    true = extremes_of(known, index, force, compiled=compiled)
+    true = extremes_of(known, index, force, NONE if compiled else None)
     wrong = known._replace(rows=known.rows * (1 + 1e-9))
-    found = extremes_of(wrong, index, force, compiled=compiled)
+    found = extremes_of(wrong, index, force, NONE if compiled else None)
     assert np.abs(found - true).max() > CLOSE * np.abs(true).max()
 
 
@@ -133,9 +134,9 @@ def test_threads_do_not_disturb_each_other():
     operator = engine._operator(6, np.arange(12).reshape(-1, 1))
     known, index = rows_of(operator, Want.RESPONSES), operator.load_index(np.array([[0, 9]] * 500))
     forces = [np.random.default_rng(i).normal(size=index.shape) for i in range(8)]
-    alone = [extremes_of(known, index, force, compiled=True) for force in forces]
+    alone = [extremes_of(known, index, force, MANY) for force in forces]
     with ThreadPoolExecutor(4) as pool:
-        beside = pool.map(lambda force: extremes_of(known, index, force, compiled=True), forces)
+        beside = pool.map(lambda force: extremes_of(known, index, force, MANY), forces)
         assert all(map(np.array_equal, alone, beside))
 
 
@@ -149,7 +150,8 @@ def test_where_no_folder_can_be_written_code_is_compiled_all_the_same(tmp_path):
         "import numpy as np\n"
         "from seqopt.engines.rigid._compiled import solve_grips as solve\n"
         "force, pivot = np.empty((1, 1)), np.empty((1, 1))\n"
-        "solve(np.full((1, 1), 2.0), np.ones(1), np.zeros((1, 1), dtype=np.int64), force, pivot)\n"
+        "held = np.zeros((1, 1), dtype=np.int64), np.zeros((1, 1), dtype=np.int64)\n"
+        "solve(np.full((1, 1), 2.0), np.ones(1), np.ones((1, 1)), held, force, pivot)\n"
         "print(force[0, 0], type(solve._cache).__name__)\n"
     )
     command = [sys.executable, "-W", "error", "-c", code]

@@ -44,13 +44,21 @@ def _compiled(*freedom: str) -> Callable[[_Function], _Function]:
 
 @_compiled()
 def solve_grips(
-    flexibility: Floats, dead: Floats, index: Ints, force: Floats, pivot: Floats
-) -> None:
-    """Find the forces (S, k) at loads (S, k) that undo the displacements (l,), and scaled pivots.
+    flexibility: Floats,
+    dead: Floats,
+    axis: Floats,
+    held: tuple[Ints, Ints],
+    force: Floats,
+    pivot: Floats,
+) -> int:
+    """Find the forces (S, k) that undo the displacements (l,) at grips, and scaled pivots (S, k).
 
-    As ``_solve_positive`` of `seqopt.engines.rigid._grip_equations`, of rigid grips.
+    As ``_solve_positive`` of `seqopt.engines.rigid._grip_equations`, of rigid grips. ``axis`` (b,
+    d): along bricks; ``held`` (S, r), (S, k): nodes and their loads. Result: how many pairs of
+    grips share a brick.
     """
-    sets, count = index.shape
+    columns, index = held
+    (sets, count), pairs = index.shape, 0
     low = np.empty((count, count, _SIDE_BY_SIDE))
     share, pivots, own = np.empty((3, count, _SIDE_BY_SIDE))
     for start in range(0, sets, _SIDE_BY_SIDE):
@@ -59,13 +67,70 @@ def solve_grips(
             for i in range(count):
                 for j in range(i + 1):
                     low[i, j, s] = flexibility[at[i], at[j]]
-                share[i, s], own[i, s] = -dead[at[i]], low[i, i, s]
+                share[i, s] = -dead[at[i]]
+            pairs += _brace(low, s, axis, columns[min(start + s, sets - 1)]) * (start + s < sets)
+            for i in range(count):
+                own[i, s] = low[i, i, s]
         _eliminate(low, pivots)
         _substitute(low, share)
         for s in range(min(_SIDE_BY_SIDE, sets - start)):
             for i in range(count):
                 force[start + s, i] = share[i, s]
                 pivot[start + s, i] = pivots[i, s] / own[i, s]
+    return pairs
+
+
+@_compiled()
+def _brace(low: Floats, s: int, axis: Floats, columns: Ints) -> int:
+    """Give the force between two grips on one brick a flexibility; return how many pairs."""
+    pairs, width, scale = 0, axis.shape[1], 0.0
+    for i in range(len(low)):
+        scale += low[i, i, s]
+    for second in range(1, len(columns)):
+        for first in range(second):
+            brick = columns[first] // 2
+            if columns[second] // 2 != brick:
+                continue
+            pairs += 1
+            f, g = width * first, width * second
+            for i in range(width):
+                for j in range(width):
+                    more = scale * axis[brick, i] * axis[brick, j]
+                    if j <= i:
+                        low[f + i, f + j, s] += more
+                        low[g + i, g + j, s] += more
+                    low[g + i, f + j, s] -= more
+    return pairs
+
+
+@_compiled()
+def share_pairs(
+    axis: Floats, inner: Floats, held: tuple[Ints, Ints], force: Floats, between: Ints
+) -> None:
+    """Let each of two grips on one brick take what reaches its own node, in place.
+
+    As ``share_pairs`` of `seqopt.engines.rigid._grip_equations`. ``inner`` (l + 1, b): what loads
+    mean to the inner edges; ``between`` (S, p): the bricks whose inner edges then carry nothing,
+    -1 for none.
+    """
+    columns, index = held
+    width = axis.shape[1]
+    for s in range(len(columns)):
+        pairs, at = 0, columns[s]
+        for second in range(1, len(at)):
+            for first in range(second):
+                brick = at[first] // 2
+                if at[second] // 2 != brick:
+                    continue
+                carried = inner[-1, brick]
+                for k in range(index.shape[1]):
+                    carried += force[s, k] * inner[index[s, k], brick]
+                between[s, pairs] = brick
+                pairs += 1
+                carried *= 1.0 - 2.0 * (at[first] % 2)  # the axis leads to the second node
+                for i in range(width):
+                    force[s, width * first + i] += carried * axis[brick, i]
+                    force[s, width * second + i] -= carried * axis[brick, i]
 
 
 @_compiled()
@@ -145,13 +210,19 @@ def _sum_six(out: Floats, rows: Floats, at: Ints, force: Floats) -> int:
 
 @_compiled("nnan", "nsz")  # else no maximum is taken of several numbers at once
 def reduce_rows(
-    rows: Floats, counts: tuple[int, int, int], index: Ints, force: Floats, found: Floats
+    rows: Floats,
+    counts: tuple[int, int, int, int],
+    loads: tuple[Ints, Floats],
+    idle: Ints,
+    found: Floats,
 ) -> None:
     """Find extremes of what forces (S, k) at loads (S, k) and the weight mean.
 
-    ``rows`` (p, l + 1, n), ``counts``, ``found`` (4, S): as of `seqopt.engines.rigid._extremes`.
+    ``rows`` (p, l + 1, n), ``counts``, ``found`` (4, S): as of `seqopt.engines.rigid._extremes`,
+    and of how many edges in all; ``idle`` (S, q): edges that carry nothing, -1 for none.
     """
-    edges, nodes, ends = counts
+    edges, nodes, ends, total = counts
+    index, force = loads
     out = np.empty(rows.shape[2])
     tension, x, y, z = out[:edges], out[edges:], out[edges + nodes :], out[edges + 2 * nodes :]
     behind = edges + 3 * nodes
@@ -159,6 +230,10 @@ def reduce_rows(
     for part in range(len(rows)):
         for s in range(len(index)):
             _sum_into(out, rows[part], index[s], force[s])
+            for k in range(idle.shape[1]):
+                place = idle[s, k] - min(part * edges, total - edges)
+                if idle[s, k] >= 0 and 0 <= place < edges:
+                    out[place] = 0.0
             least, most, shift, moment = found[0, s], found[1, s], found[2, s], found[3, s]
             for n in range(edges):
                 least, most = min(least, tension[n]), max(most, tension[n])

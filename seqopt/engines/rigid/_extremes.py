@@ -54,6 +54,7 @@ class ExtremeRows(NamedTuple):
 
     rows: Floats
     counts: tuple[int, int, int]
+    edges: int  # in all
 
 
 _OF = {"edge_force": (Want.EDGES, 1), "displacement": (Want.DISPLACEMENTS, 3)}
@@ -70,7 +71,9 @@ def rows_of(operator: ComplianceOperator, want: Want) -> ExtremeRows:
     edges, nodes, ends = (-(-size // parts) for size in sizes)
     counts = edges, nodes, ends
     name = f"extremes of {sizes}"
-    return ExtremeRows(operator.made(name, lambda: _by_part(operator, parts, counts)), counts)
+    return ExtremeRows(
+        operator.made(name, lambda: _by_part(operator, parts, counts)), counts, sizes[0]
+    )
 
 
 def _by_part(operator: ComplianceOperator, parts: int, counts: tuple[int, int, int]) -> Floats:
@@ -91,19 +94,18 @@ def _by_part(operator: ComplianceOperator, parts: int, counts: tuple[int, int, i
     return rows
 
 
-def extremes_of(
-    known: ExtremeRows, index: Ints, force: Floats, *, compiled: bool = False
-) -> Floats:
+def extremes_of(known: ExtremeRows, index: Ints, force: Floats, idle: Ints | None = None) -> Floats:
     """Return the least and most edge force, the largest displacement and moment, (4, S).
 
-    ``index``, ``force`` (S, k): loads of the operator, and how much of each.
+    ``index``, ``force`` (S, k): loads of the operator, and how much of each; ``idle`` (S, q): edges
+    that carry nothing whatever these mean, -1 for none, for compiled loops; else these are NumPy's.
     """
     found = np.zeros((4, len(index)))
     if known.counts[0]:
         found[0], found[1] = np.inf, -np.inf
-    if compiled:
-        reduce_rows = _loops().reduce_rows
-        reduce_rows(known.rows, known.counts, index, np.ascontiguousarray(force), found)
+    if idle is not None:
+        counts = *known.counts, known.edges
+        _loops().reduce_rows(known.rows, counts, (index, force), idle, found)
     else:
         _reduce_rows(known, index, force, found)
     np.sqrt(found[2:], out=found[2:])
@@ -112,7 +114,7 @@ def extremes_of(
 
 def _reduce_rows(known: ExtremeRows, index: Ints, force: Floats, found: Floats) -> None:
     """Find extremes as ``reduce_rows`` of `seqopt.engines.rigid._compiled` does."""
-    rows, (edges, nodes, ends) = known
+    rows, (edges, nodes, ends), _ = known
     step, behind = max(16, _AT_ONCE // max(rows.shape[2], 1)), edges + 3 * nodes
     for start in range(0, len(index), step):
         part = slice(start, start + step)
@@ -158,7 +160,8 @@ def can_compile() -> bool:
 class _Loops(NamedTuple):
     """The compiled functions."""
 
-    solve_grips: Callable[..., None]
+    solve_grips: Callable[..., int]
+    share_pairs: Callable[..., None]
     reduce_rows: Callable[..., None]
 
 
@@ -167,12 +170,35 @@ def _loops() -> _Loops:
     """Return the compiled functions; loading them takes half a second."""
     from seqopt.engines.rigid import _compiled  # noqa: PLC0415  # numba is an extra
 
-    return _Loops(_compiled.solve_grips, _compiled.reduce_rows)
+    return _Loops(_compiled.solve_grips, _compiled.share_pairs, _compiled.reduce_rows)
 
 
-def solve_compiled(operator: ComplianceOperator, index: Ints) -> tuple[Floats, Floats]:
-    """Return forces (S, k) of rigid grips at loads (S, k), and scaled pivots (S, k)."""
+class Solved(NamedTuple):
+    """Forces of rigid grips as compiled loops find them.
+
+    ``force`` (S, k): at loads, N; ``pivot`` (S, k): scaled; ``shared`` (S, k): forces, what is
+    between two grips on one brick shared by them; ``idle`` (S, q): edges that carry nothing then.
+    """
+
+    force: Floats
+    pivot: Floats
+    shared: Floats
+    idle: Ints
+
+
+def solve_compiled(operator: ComplianceOperator, columns: Ints, index: Ints) -> Solved:
+    """Return what rigid grips exert on nodes (S, r), which are loads (S, k)."""
     force, pivot = np.empty(index.shape), np.empty(index.shape)
-    flexibility, dead = operator.flexibility, operator.dead_displacement
-    _loops().solve_grips(flexibility, dead, index, force, pivot)
-    return force, pivot
+    flexibility, dead, axis = operator.flexibility, operator.dead_displacement, operator.axis
+    loops, held = _loops(), (columns, index)
+    if not loops.solve_grips(flexibility, dead, axis, held, force, pivot):
+        return Solved(force, pivot, force, np.empty((len(columns), 0), dtype=np.int64))
+    inner = operator.made("inner edges", lambda: _inner(operator))
+    shared, idle = force.copy(), np.full((len(columns), columns.shape[1] // 2), -1)
+    loops.share_pairs(axis, inner, held, shared, idle)
+    return Solved(force, pivot, shared, np.where(idle < 0, -1, operator.inner_edge[idle]))
+
+
+def _inner(operator: ComplianceOperator) -> Floats:
+    """Return what every load means to the inner edges of bricks, (l + 1, b)."""
+    return np.ascontiguousarray(operator.mean("edge_force")[:, operator.inner_edge])

@@ -143,20 +143,21 @@ def _try_extremes(
 ) -> tuple[Floats, Floats, Bools]:
     """Return extremes (4, S) of rigid grips, their forces (S, r), and which sets have others.
 
-    These are the sets that an operator alone answers not well enough, or with two grips on one
-    brick.
+    These are the sets that an operator alone answers not well enough, and where loops are not
+    compiled those with two grips on one brick.
     """
-    index, pairs = operator.load_index(columns), pairs_of(operator, columns)
+    index, idle = operator.load_index(columns), None
     if compiled:
-        force, pivot = solve_compiled(operator, index)
+        force, pivot, shared, idle = solve_compiled(operator, columns, index)
         apart = ~trusted(operator, index, _GripForces(force, pivot.T), accuracy / _UNSEEN)
     else:
         tried = _try_forces(operator, columns, even=True, accuracy=accuracy)
-        force, apart = tried.force, ~tried.trusted
-    apart[pairs.sets] = True
+        force, apart = np.ascontiguousarray(tried.force), ~tried.trusted
+        apart[tried.pairs.sets] = True
+        shared = force
     force[apart] = 0.0
-    found = extremes_of(rows_of(operator, want), index, force, compiled=compiled)
-    each = force.reshape(*columns.shape, operator.directions)
+    found = extremes_of(rows_of(operator, want), index, force, idle)
+    each = shared.reshape(*columns.shape, operator.directions)
     size = np.sqrt((each * each).sum(axis=2))
     return found, size, apart | ~np.isfinite(found).all(axis=0)
 
