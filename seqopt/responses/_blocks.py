@@ -83,7 +83,7 @@ class Block(FrozenValue):
         return work(len(self.grips), self.bricks)
 
 
-COMPILED = 3e7  # work from which on compiled loops save more than loading them takes
+COMPILED = 2e7  # work from which on compiled loops save more than loading them takes
 
 
 def work(states: int, bricks: int) -> float:
