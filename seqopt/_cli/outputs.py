@@ -66,19 +66,30 @@ def softness_files(table: pd.DataFrame) -> dict[str, bytes | str]:
     return files | picture_files("grips", _softness_chart(table, [*dict.fromkeys(table["build"])]))
 
 
+TABLES = {
+    "--tables plan|all": "which tables are written: those of the plan, or all, with every choice of"
+    " every open step beside: megabytes (default: plan)"
+}
+
+
 def plan_files(
-    plan: Plan, report: Mapping[str, object], prover: BuildProver, trial: Trial | None = None
+    plan: Plan,
+    report: Mapping[str, object],
+    prover: BuildProver,
+    trial: Trial | None = None,
+    *,
+    choices: bool = False,
 ) -> dict[str, bytes | str]:
     """Return the tables of a plan, its summary, scene and page, by file name.
 
-    The trial is of the plan in other scenarios.
+    The trial is of the plan in other scenarios; ``choices``: whether every choice is in a table.
     """
     tables = {"plan": plan.responses()}
     if not isinstance(plan.graph, States):
         tables["selection"] = plan.table()
     elif plan.graph.standing is not None:
         tables["stability"] = plan.stability()
-    if isinstance(plan.graph, Layers):
+    if choices and isinstance(plan.graph, Layers):
         tables["responses"] = plan.alternatives()
     if plan.engine.network.scene.props:
         tables["props"] = plan.props()

@@ -78,14 +78,22 @@ class Recipe:
 
 @cache
 def _arithmetic() -> str:
-    """Return a mark of the code that answers come from: its text, NumPy and SciPy."""
+    """Return a mark of the code that answers come from: its text, NumPy, SciPy and numba."""
     home = Path(__file__).parents[1]
     found = (home / name for name in _ARITHMETIC)
     files = [f for p in found for f in ([p] if p.is_file() else sorted(p.rglob("*.py")))]
-    mark = hashlib.sha256(f"{np.__version__} {scipy.__version__}".encode())
+    mark = hashlib.sha256(f"{np.__version__} {scipy.__version__} {_numba()}".encode())
     for file in files:
         mark.update(file.relative_to(home).as_posix().encode() + file.read_bytes())
     return mark.hexdigest()
+
+
+def _numba() -> str:
+    """Return the version of numba, whose loops answer in its place where it is installed."""
+    try:
+        return version("numba")
+    except PackageNotFoundError:
+        return "none"
 
 
 def recipe_of(engine: object) -> Recipe | None:

@@ -10,7 +10,7 @@ from math import inf, isfinite
 import pandas as pd
 
 from seqopt.contact.mortar import Mortar
-from seqopt.engines.interface import Engine
+from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.interface import PlacementProblem
@@ -43,7 +43,7 @@ from seqopt.problem.problem import Aim, Problem, judged_by
 from seqopt.problem.requirements import Excess, overloads
 from seqopt.responses._choices import window_models
 from seqopt.responses._tolerance import value_text
-from seqopt.responses.table import analyze
+from seqopt.responses.table import response_table, step_fields
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Step, StepKind, idle_robots
@@ -304,7 +304,11 @@ class Plan(ShownBuild):
 
     @cached_property
     def _responses(self) -> pd.DataFrame:
-        table = analyze(self.engine, self.steps)
+        answers = (  # of all fields, which what steps leave is judged by too
+            (step, self._within.seen(step, step_fields(self.engine, step, Want.ALL)))
+            for step in self.steps
+        )
+        table = response_table(self.engine.network, answers)
         if not isinstance(self.graph, States):
             moves, steps = self.layers.schedule.moves, self.layers.schedule.steps
             robots = {s.number: ";".join(moves[m].robot for m in s.moves) for s in steps}

@@ -22,7 +22,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch, Polygon
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
-from scipy.spatial import ConvexHull
 
 from seqopt.arms._drawn import PosedArm
 from seqopt.arrays import Floats, Ints
@@ -325,6 +324,8 @@ def _draw_line(axes: Axes, line: Floats, *, color: str, order: float) -> None:
 
 def _draw_bodies(axes: Axes, arm: PosedArm, view: View, *, color: str, order: float) -> None:
     """Draw an arm as the outlines of its bodies, the farthest first, its tool dark."""
+    from scipy.spatial import ConvexHull  # noqa: PLC0415  # slow to import, for this only
+
     seen = [points @ view.axes().T for points in arm.bodies]
     last = len(seen) - 1 if arm.holds else None
     for k in sorted(range(len(seen)), key=lambda k: float(seen[k][:, 2].mean())):

@@ -37,12 +37,14 @@ from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines._auto import Level, LevelChoice
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
+from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import FileError, MemoryShortError, SceneError
 from seqopt.responses._arms import for_arms
 from seqopt.responses._props import excess_of, with_props
 from seqopt.responses._tolerance import allowed_by, is_tolerance, misfits
 from seqopt.responses.quantities import (
     CHOSEN_BY,
+    EXTREMES,
     PROP_EXCESS,
     lengths,
     require_finite,
@@ -64,11 +66,13 @@ class Block(FrozenValue):
     names: tuple[str, ...]  # responses of `seqopt.responses.quantities.CHOSEN_BY`
     screen: bool = True  # whether six digits are enough
     props: tuple[int, ...] = ()  # numbers of grips that all of them have beside these
+    compiled: bool = False  # whether there is so much to do that compiled loops are worth loading
 
     @cached_property
     def key(self) -> str:
         """Its content, condensed."""
         exact = (*(() if self.screen else ("exact",)), *self.props)
+        exact += ("compiled",) if self.compiled else ()
         mark = hashlib.sha256(repr((self.bricks, self.names, self.grips.shape, *exact)).encode())
         mark.update(self.grips.astype("<i8").tobytes())
         return mark.hexdigest()
@@ -77,6 +81,9 @@ class Block(FrozenValue):
     def work(self) -> float:
         """About how long it takes, in no unit: what an engine does grows with the bricks."""
         return work(len(self.grips), self.bricks)
+
+
+COMPILED = 2e7  # work from which on compiled loops save more than loading them takes
 
 
 def work(states: int, bricks: int) -> float:
@@ -104,6 +111,11 @@ def answer(engine: Engine, block: Block) -> Answers:
     want = reduce(or_, (r.needs for r in asked), Want.SCREEN if block.screen else Want(0))
     before = Counter(tally_of(engine))
     grips, robots = with_props(block.grips, block.props), block.grips.shape[1]
+    if isinstance(engine, ComplianceEngine) and set(block.names) <= EXTREMES.keys():
+        with one_thread():
+            found = engine._extremes(block.bricks, grips, want, compiled=block.compiled)
+        forces = require_finite("grip force", found.force, block.bricks)[:, :robots]
+        return Answers({name: EXTREMES[name](found) for name in block.names}, forces)
     with one_thread():  # as many threads everywhere: sums in other orders differ in the last bit
         fields = engine.solve(block.bricks, grips, want)
     forces = require_finite("grip force", lengths(fields.grip_force), block.bricks)[:, :robots]
@@ -341,15 +353,16 @@ class Batch(FrozenValue):
     states: Ints  # (S, r); the different grip sets in them, numbers ascending
     state: Ints  # (P,); which of these each choice leads to
 
-    def blocks(self) -> Iterator[Block]:
-        """Yield the states in blocks, one at least."""
+    def blocks(self, *, compiled: bool = False) -> Iterator[Block]:
+        """Yield the states in blocks, one at least. ``compiled``: as of `Block`."""
         asked = sorted(frozenset().union(*self.names))
         known = (*CHOSEN_BY, PROP_EXCESS)
         names = tuple(name for name in asked if name in known or is_tolerance(name))
         bricks = self.steps[0].bricks
         props = self.schedule.scene.prop_numbers(bricks, held=True)
         for start in range(0, max(len(self.states), 1), BLOCK):
-            yield Block(bricks, self.states[start : start + BLOCK].copy(), names, props=props)
+            states = self.states[start : start + BLOCK].copy()
+            yield Block(bricks, states, names, props=props, compiled=compiled)
 
     @property
     def count(self) -> int:

@@ -25,6 +25,7 @@ from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import MemoryShortError
 from seqopt.responses._blocks import (
+    COMPILED,
     Answers,
     Batch,
     Block,
@@ -312,7 +313,7 @@ def _by_level(
             groups = [batch_of(schedule, steps, evaluation.wanted) for steps in level]
             under_way.append(groups)
             for group in groups:
-                yield from group.blocks()
+                yield from group.blocks(compiled=total >= COMPILED)
 
     total = sum(work(choices_of(schedule, step), step.bricks) for step in chain(*chain(*levels)))
     engine, resources = evaluation.engine, evaluation.resources

@@ -17,6 +17,7 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import MechanismError
 from seqopt.responses._blocks import (
     BLOCK,
+    COMPILED,
     Answers,
     Block,
     Shipment,
@@ -25,6 +26,7 @@ from seqopt.responses._blocks import (
     engine_of,
     open_store,
     pack,
+    work,
 )
 from seqopt.responses.resources import HERE, Resources
 from seqopt.work._workers import hire, map_ordered
@@ -108,7 +110,7 @@ class GripSets:
         screen: bool = False,
     ) -> None:
         self._engine, self._resources, self._screen = engine, resources, screen
-        self.names, self._known = tuple(names), KnownRows()
+        self.names, self._known, self._work = tuple(names), KnownRows(), 0.0
         scene = engine.network.scene
         nodes = np.array([node for brick in scene.placed for node in brick.nodes])
         kinds = [k * scene.grip_kinds.span for k in range(len(scene.grip_kinds.turns))]
@@ -156,7 +158,9 @@ class GripSets:
         def solve(new: Ints) -> Floats:
             grips = self._number[nodes[new]]
             props = self._engine.network.scene.prop_numbers(bricks, held=bool(nodes.shape[1]))
-            sets = Block(bricks, grips, self.names, self._screen, props)
+            self._work += work(len(grips), bricks)
+            compiled = self._work >= COMPILED
+            sets = Block(bricks, grips, self.names, self._screen, props, compiled)
             return solve_sets(self._engine, sets, self._resources, self._store)
 
         codes = np.zeros(len(nodes), dtype=np.int64)  # a number for every set of its own

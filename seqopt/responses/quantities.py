@@ -6,13 +6,14 @@ needs. Sizes of grip forces are functions of their own, since there is one per r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Fields, Want
+from seqopt.engines.rigid._extremes import Extremes
 from seqopt.errors import SolverError
 from seqopt.network.network import Network
 
@@ -210,6 +211,16 @@ CHOSEN_BY: dict[str, Response] = {**RESPONSES, _C_MAX.name: _C_MAX}
 """Responses that criteria and limits can name: those of the tables, and ``C_max``, the largest
 compression of any edge as a size, N (``F_min`` without its sign; zero if no edge is compressed).
 """
+
+
+EXTREMES: Mapping[str, Callable[[Extremes], Floats]] = {
+    "T_max": lambda found: found.most,
+    "F_min": lambda found: found.least,
+    "C_max": lambda found: np.maximum(0.0, -found.least),
+    "D_max": lambda found: found.shift,
+    "M_sup": lambda found: found.moment,
+}
+"""Responses that are extremes of fields, which need not be written down themselves."""
 
 
 def responses_of(network: Network, fields: Fields) -> dict[str, Floats]:

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 import re
 from collections.abc import Callable
 
-import networkx as nx
 import numpy as np
 
 from seqopt.errors import did_you_mean
@@ -464,6 +463,8 @@ _PART = re.compile(r"(-?\d+)(?:\.\.(-?\d+))?")
 
 def _from_all_ends(scene: Scene) -> Order:
     """Return the order that builds from all ground ends at once, one brick each in turn."""
+    import networkx as nx  # noqa: PLC0415  # slow to import, for this only
+
     graph: nx.Graph[int] = nx.Graph([joint.bricks for joint in scene.joints])
     graph.add_nodes_from(scene.build_order)
     far: dict[int, tuple[int, int]] = {}

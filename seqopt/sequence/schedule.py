@@ -17,7 +17,6 @@ from numbers import Integral
 from operator import itemgetter
 from typing import TYPE_CHECKING
 
-import networkx as nx
 import numpy as np
 import pandas as pd
 from scipy.sparse import coo_array
@@ -69,6 +68,8 @@ class Near:
 
 def _joints_away(scene: Scene, bricks: int) -> dict[int, float]:
     """Return how many joints part the nodes of placed bricks from the newest."""
+    import networkx as nx  # noqa: PLC0415  # slow to import, for this only
+
     placed = scene.placed[:bricks]
     names = [brick.name for brick in placed]
     graph: nx.Graph[int] = nx.Graph(joint.bricks for joint in scene.joints).subgraph(names).copy()

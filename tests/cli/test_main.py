@@ -218,7 +218,7 @@ def test_a_plan_from_a_file(capsys, tmp_path):
 @pytest.mark.slow
 def test_optimize(capsys, tmp_path):
     folder = tmp_path / "new" / "out"
-    arguments = ("optimize", "--formulation", "overlap_dp", "--out", str(folder))
+    arguments = ("optimize", "--formulation", "overlap_dp", "--out", str(folder), "--tables", "all")
     status, out, _ = run(capsys, *arguments)
     assert (status, out.count("\n")) == (0, 3)
     report = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
@@ -370,7 +370,10 @@ def test_optimize_with_words_of_ones_own(capsys):
 @pytest.mark.slow
 def test_optimize_without_proof(capsys, tmp_path):
     chosen = ("--formulation", "rank_search", "--engine", "auto")
-    for folder, words in (("with", ("--option", "horizon=1")), ("without", ("--no-proof",))):
+    for folder, words in (
+        ("with", ("--option", "horizon=1")),
+        ("without", ("--no-proof", "--tables", "all")),
+    ):
         status, out, _ = run(capsys, "optimize", *chosen, *words, "--out", str(tmp_path / folder))
         assert (status, out.count("\n")) == (0, 3)
         assert ("not compared with the optimum" in out) == (folder == "without")
@@ -384,6 +387,7 @@ def test_optimize_without_proof(capsys, tmp_path):
     responses = pd.read_csv(tmp_path / "without" / "responses.csv")
     assert responses["step"].is_monotonic_increasing
     assert report["models_evaluated"] < len(responses) < 2 * report["models_evaluated"]
+    assert not (tmp_path / "with" / "responses.csv").exists()  # nobody asked for it
 
 
 @pytest.mark.slow

@@ -116,6 +116,18 @@ HEAVY = ("numpy", "pandas", "scipy", "networkx", "tqdm", "shtab")
 LOADED = f"print(*[name for name in {HEAVY} if name in sys.modules], file=sys.stderr)"
 
 
+SELDOM = ("networkx", "scipy.optimize", "scipy.spatial", "cvxpy", "highspy", "numba", "matplotlib")
+
+
+def test_a_command_loads_what_it_needs():
+    said = f"print(*[name for name in {SELDOM} if name in sys.modules])"
+    program = f"import sys\nfrom seqopt._cli.main import load\nload(['optimize'])\n{said}"
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert done.stdout.split() == []
+
+
 @pytest.mark.parametrize(
     ("words", "light"),
     [([], True), (["--help"], True), (["--version"], True), (["scene", "--help"], False)],

@@ -14,7 +14,14 @@ from experiments.__main__ import STORE
 from experiments.calibration import calibration, vault_loads
 from experiments.calibration.parts import arch_numbers, calibration_spread
 from experiments.discrete import contact_steps, discrete_arches
-from experiments.engines import engine_speed, fidelity_ladder, frame_contrast, parallel, soft_grips
+from experiments.engines import (
+    engine_speed,
+    extremes,
+    fidelity_ladder,
+    frame_contrast,
+    parallel,
+    soft_grips,
+)
 from experiments.exchange import four_arms, outside_assemblies
 from experiments.harness.claim import claims
 from experiments.harness.results import stored
@@ -110,6 +117,7 @@ CHECKS = {
         (stored("engine_speed").rename(columns={"Unnamed: 0": "name"}),),
         *("value", 900, {"name": "ratio_median"}),
     ),
+    "extremes": Check(extremes.holds, ("extremes",), *("times_numpy", 1.5, {"bricks": 17})),
     "fidelity_ladder": Check(
         lambda table: fidelity_ladder.judge(table) and fidelity_ladder.cheaper(table),
         ("fidelity_ladder",),

@@ -45,7 +45,6 @@ SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
 OPTIMIZE = (
     "plan.csv",
     "selection.csv",
-    "responses.csv",
     "trace.csv",
     "summary.json",
     "scene.json",

@@ -51,7 +51,7 @@ STARTS = (  # of lines on standard error
     *("outside the linear range: ", "Do not rely on numbers outside the linear range. "),
 )
 ARCHIVE, IMAGE = b"PK", b"\x89PNG"  # how files of fields and of pictures begin
-SET = {"plan.csv", "selection.csv", "responses.csv", "summary.json"}
+SET = {"plan.csv", "selection.csv", "summary.json"}
 
 
 @dataclass(frozen=True)

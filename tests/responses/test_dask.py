@@ -18,7 +18,6 @@ from seqopt.workflow import optimize
 distributed = pytest.importorskip("distributed", reason="extra dask")
 
 pytestmark = [
-    pytest.mark.slow,
     pytest.mark.filterwarnings("ignore"),  # what a cluster says as it starts, ends, loses workers
     pytest.mark.xdist_group("dask"),
 ]

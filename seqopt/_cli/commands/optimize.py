@@ -35,7 +35,7 @@ from seqopt._cli.options import (
     robots_option,
     scene_options,
 )
-from seqopt._cli.outputs import ALWAYS, plan_files, require_out, write_outputs, written_to
+from seqopt._cli.outputs import ALWAYS, TABLES, plan_files, require_out, write_outputs, written_to
 from seqopt._cli.posing import Asked, asked_problem
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import parse_options, parse_size, parse_time_limit
@@ -133,6 +133,7 @@ def _basic(command: argparse.ArgumentParser) -> None:
     declare(takes, about)
     robots_option(takes, "a loop, or a schedule that is named")
     declare(takes, {"--out DIR": "folder to write plan, tables, summary and page to"})
+    declare(takes, TABLES, choices=("plan", "all"), default="plan")
     declare(takes, DURATIONS)
 
 
@@ -223,7 +224,8 @@ def answered(options: argparse.Namespace, found: Found) -> Answer:
     plan, outer = found.plan, found.bases or found.props
 
     def files() -> dict[str, bytes | str]:
-        made = plan_files(plan, found.report, found.prover, found.trial)
+        choices = getattr(options, "tables", None) == "all"
+        made = plan_files(plan, found.report, found.prover, found.trial, choices=choices)
         if getattr(options, "policy", False):
             made[FILE] = find_policy(found.asked.problem, options.tell).content()
         name = "bases.csv" if found.props is None else "fewest_props.csv"

@@ -5,6 +5,7 @@ The operators of all brick counts come from what grows with the build.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -132,8 +133,9 @@ class ComplianceOperator(FrozenValue):
         and mapped; else those of the loads are mapped, once, and then summed. So are reactions,
         which few of the wrenches tell. ``loads``: from the others, if it was made before.
         """
-        few = name == "support" or 2 * self.axis.size <= max(_FEW, len(index))
-        if few:  # whatever was asked before: answers do not depend on it
+        if name == "support" or self.few_loads(
+            len(index)
+        ):  # whatever was asked before: answers do not depend on it
             loads = self.loads(index, force) if loads is None else loads
             return loads.sum(self.of_loads(name))
         states = self._states(name)
@@ -149,6 +151,10 @@ class ComplianceOperator(FrozenValue):
             self._add_grips(index, force, out)
         return out
 
+    def few_loads(self, sets: int) -> bool:
+        """Return whether what all loads mean is made before that of so many grip sets."""
+        return 2 * self.axis.size <= max(_FEW, sets)
+
     def _add_grips(self, index: Ints, force: Floats, out: Floats) -> None:
         """Add to edge forces (S, E) what forces (S, k) at second nodes send into inner edges."""
         width, moments = self.directions, self.moments
@@ -161,17 +167,25 @@ class ComplianceOperator(FrozenValue):
 
     def of_loads(self, name: str) -> Floats:
         """Return a field under every load, (l + 1, Q), made when it is first asked for."""
+        return self.made(name, lambda: self.mean(name))
+
+    def mean(self, name: str) -> Floats:
+        """Return a field under every load, (l + 1, Q), and keep it nowhere."""
+        out = self.maps.apply(name, self._states(name))
+        if name == "edge_force":
+            width = self.directions
+            out[-1, self.inner_edge] += self.at_second
+            each = 2 * width + self.moments
+            rows = each * np.arange(len(self.held))[:, None] + width + np.arange(width)
+            out[rows, self.inner_edge[self.held][:, None]] += self.axis[self.held]
+        if name == "displacement":
+            out[-1] += self.maps.ground
+        return out
+
+    def made(self, name: str, make: Callable[[], Floats]) -> Floats:
+        """Return an array that is kept with the operator, made when it is first asked for."""
         if name not in self._made:
-            out = self.maps.apply(name, self._states(name))
-            if name == "edge_force":
-                width = self.directions
-                out[-1, self.inner_edge] += self.at_second
-                each = 2 * width + self.moments
-                rows = each * np.arange(len(self.held))[:, None] + width + np.arange(width)
-                out[rows, self.inner_edge[self.held][:, None]] += self.axis[self.held]
-            if name == "displacement":
-                out[-1] += self.maps.ground
-            self._made[name] = frozen(out)
+            self._made[name] = frozen(make())
         return self._made[name]
 
     @cached_property

@@ -34,7 +34,15 @@ from seqopt.engines.interface import (
     names_wanted,
     require_finite,
 )
-from seqopt.engines.rigid._grip_equations import grip_forces, share_pairs, trusted
+from seqopt.engines.rigid._extremes import (
+    Extremes,
+    can_compile,
+    extremes_in,
+    extremes_of,
+    rows_of,
+    solve_compiled,
+)
+from seqopt.engines.rigid._grip_equations import _GripForces, grip_forces, share_pairs, trusted
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mechanism import Shared, share
 from seqopt.engines.rigid._mixed import LAST_CORRECTION
@@ -130,6 +138,30 @@ def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
     return out
 
 
+def _try_extremes(
+    operator: ComplianceOperator, columns: Ints, want: Want, accuracy: float, *, compiled: bool
+) -> tuple[Floats, Floats, Bools]:
+    """Return extremes (4, S) of rigid grips, their forces (S, r), and which sets have others.
+
+    These are the sets that an operator alone answers not well enough, and where loops are not
+    compiled those with two grips on one brick.
+    """
+    index, idle = operator.load_index(columns), None
+    if compiled:
+        force, pivot, shared, idle = solve_compiled(operator, columns, index)
+        apart = ~trusted(operator, index, _GripForces(force, pivot.T), accuracy / _UNSEEN)
+    else:
+        tried = _try_forces(operator, columns, even=True, accuracy=accuracy)
+        force, apart = np.ascontiguousarray(tried.force), ~tried.trusted
+        apart[tried.pairs.sets] = True
+        shared = force
+    force[apart] = 0.0
+    found = extremes_of(rows_of(operator, want), index, force, idle)
+    each = shared.reshape(*columns.shape, operator.directions)
+    size = np.sqrt((each * each).sum(axis=2))
+    return found, size, apart | ~np.isfinite(found).all(axis=0)
+
+
 _KEPT = 32e6  # bytes of operators that may stay when another is made
 _SCREEN = 1e-6  # the same, of what is only to be compared
 _EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole error
@@ -188,6 +220,34 @@ class ComplianceEngine(NamedEngine):
             for name, values in found.items():
                 values[wrong] = getattr(better, name)
         return Fields(**found)
+
+    @failing_in_a_line()
+    def _extremes(
+        self, bricks: int, grips: ArrayLike, want: Want, *, compiled: bool = False
+    ) -> Extremes:
+        """Return the extremes of the fields that are wanted, for grip sets (S, r).
+
+        ``compiled``: whether by compiled loops, where numba is there.
+        """
+        columns, numbers = grip_columns(self._network, bricks, grips), np.asarray(grips)
+        hands = read_hands(self._network, columns, numbers, None)
+        apart = np.ones(len(columns), dtype=bool)  # what fields are computed of
+
+        found, size = np.empty((4, len(columns))), np.empty(columns.shape)
+        if hands is None and bricks <= min(self._even, len(self._tree.spring)):
+            operator = self._operator(bricks, columns)
+            if operator.few_loads(len(columns)):
+                accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
+                found, size, apart = _try_extremes(
+                    operator, columns, want, accuracy, compiled=compiled and can_compile()
+                )
+        if apart.any():
+            fields = self._found(
+                bricks, columns[apart], hands if hands is None else hands.of(apart), want
+            )
+            rest = extremes_in(require_finite(fields, bricks, numbers[apart]), want)
+            found[:, apart], size[apart] = rest[:4], rest.force
+        return Extremes(found[0], found[1], found[2], found[3], size)
 
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""

@@ -13,8 +13,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
 
-import networkx as nx
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -25,6 +25,9 @@ from seqopt.scene._checks import short
 from seqopt.scene.boxes import as_vectors
 from seqopt.scene.imports._content import LARGEST, MOST_BLOCKS, Content, FileBlock
 from seqopt.scene.shape import FLAT, Polyhedron, Surface, bend, edges, fans
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 _Polygons = Sequence[Sequence[int]]
 _Edges = frozenset[tuple[int, int]]
@@ -314,6 +317,8 @@ def _flat(points: Floats, face: _Loop, size: float, mended: Counter[str]) -> lis
 
 def _beside(faces: list[_Loop]) -> nx.Graph[int]:
     """Return which faces meet in an edge, two alone, and whether one of them must be turned."""
+    import networkx as nx  # noqa: PLC0415  # slow to import, for this only
+
     meeting = defaultdict(list)
     for i, face in enumerate(faces):
         for a, b in edges(face):
@@ -326,6 +331,8 @@ def _beside(faces: list[_Loop]) -> nx.Graph[int]:
 
 def _agreeing(points: Floats, faces: list[_Loop], mended: Counter[str]) -> list[_Loop]:
     """Return faces turned so that they agree which side is outside, and that it is outside."""
+    import networkx as nx  # noqa: PLC0415  # slow to import, for this only
+
     beside, turned = _beside(faces), dict[int, bool]()
     for start in beside:
         if start not in turned:

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from seqopt._files import read_bytes, read_text
 from seqopt.errors import SceneError, SceneWarning
@@ -163,6 +162,8 @@ def _box(where: str, key: str, row: dict[str, str]) -> FileBlock:
     if not size.min() > 0:
         raise SceneError(f"{where}: its sizes are {size.tolist()}; give positive ones")
     angles = [_number(where, row, name, "0") for name in _TURNS]
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415  # slow to import
+
     frame = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
     density = _number(where, row, "density", "nan")
     course = _number(where, row, "course", "nan")

@@ -7,7 +7,6 @@ import io
 import warnings
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.scene import Scene
@@ -23,6 +22,8 @@ def boxes_csv(scene: Scene) -> str:
     turns, sizes = ("roll", "pitch", "yaw"), ("length", "width", "height")
     writer.writerow(["name", "x", "y", "z", *sizes, *turns, "density", "course"])
     for brick in scene.bricks:
+        from scipy.spatial.transform import Rotation  # noqa: PLC0415  # slow to import
+
         turn = Rotation.from_matrix(brick.frame.T)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of many angles for a turn one is enough

@@ -15,7 +15,6 @@ from functools import cache, partial
 
 import numpy as np
 import pandas as pd
-from scipy.spatial.transform import Rotation
 
 from seqopt._files import csv_text
 from seqopt.errors import StepError
@@ -266,6 +265,8 @@ def _places(name: str, frames: Sequence[Frame | None]) -> pd.DataFrame:
     held = [frame for frame in frames if frame is not None]
     if held:
         axes = np.array([frame.axes for frame in held])
+        from scipy.spatial.transform import Rotation  # noqa: PLC0415  # slow to import
+
         turned = Rotation.from_matrix(axes.transpose(0, 2, 1)).as_quat(canonical=True)
         out[known, :3] = [frame.point for frame in held]
         out[known, 3:] = turned[:, [3, 0, 1, 2]]

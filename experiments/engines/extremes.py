@@ -1,0 +1,116 @@
+"""Claim: compiled loops compare grip sets at least twice as fast as NumPy, with the same numbers.
+
+What optimization asks of a grip set is the largest tension of any edge, displacement of any node,
+moment at any ground end, and the forces of its grips. The engine computes these extremes and keeps
+no fields; by loops that numba compiles where it is installed and there is much to do. They agree
+with those of NumPy to 1e-11 of what adds up in them, the largest force of a grip times what a unit
+force there means; to 1e-12 where these do not nearly cancel, as on long chains they do.
+
+Method: random sets of three grips on `arch25` with 17 and with 25 bricks, a chain of 99 and the
+vault with 100 and with 337. NumPy and compiled loops take turns in one process on one core, whole
+calls of the engine with all checks, as seconds of the processor; the least of rounds. Beside them
+the fields with the same extremes taken from them, batches of a hundred sets, and single calls. The
+least arithmetic is what `experiments.peers.peers` says: operations at the rate of a dense product,
+and here nothing that is written.
+
+Inputs: the shipped scenes; seed 0; numba: nothing is stored where it is missing. Command:
+``OPENBLAS_NUM_THREADS=1 python -m experiments.engines.extremes [--quick]``.
+"""
+
+import time
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+import pandas as pd
+
+from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
+from experiments.harness.scenes import grip_sets
+from experiments.harness.timing import best
+from seqopt import build_network, load_scene
+from seqopt.arrays import Ints
+from seqopt.engines.interface import Want
+from seqopt.engines.rigid._extremes import can_compile, extremes_in
+from seqopt.engines.rigid.compliance import ComplianceEngine
+
+CASES = (
+    ("arch25", 17, 20_000),
+    ("arch25", 25, 20_000),
+    ("chain:bricks=100", 99, 8000),
+    ("vault338", 100, 4000),
+    ("vault338", 337, 2100),
+)
+TWICE, CLOSE = 2.0, 1e-11
+WANT, FEW = Want.RESPONSES | Want.SCREEN, 100  # as optimization asks
+
+
+def taken(calls: dict[str, Callable[[], object]], rounds: int) -> dict[str, float]:
+    """Return the least seconds of the processor that each call takes, in turns."""
+    least = dict.fromkeys(calls, np.inf)
+    for _ in range(rounds):
+        for name, call in calls.items():
+            start = time.process_time()
+            call()
+            least[name] = min(least[name], time.process_time() - start)
+    return least
+
+
+def difference(engine: ComplianceEngine, bricks: int, sets: Ints) -> float:
+    """Return the largest difference of both loops, over what adds up in each extreme."""
+    plain = engine._extremes(bricks, sets, WANT)
+    fast = engine._extremes(bricks, sets, WANT, compiled=True)
+    engine.solve(bricks, sets[:FEW])
+    operator = engine._kept[bricks]
+    pull = plain.force.max()
+    unit = [np.abs(operator.mean(n)[:-1]).max() for n in ("edge_force", "displacement", "support")]
+    scales = [unit[0], unit[0], unit[1], unit[2], 1.0]
+    gaps = zip(plain, fast, scales, strict=True)
+    return float(max(np.abs(a - b).max() / (pull * each) for a, b, each in gaps))
+
+
+def least_us(engine: ComplianceEngine, bricks: int) -> float:
+    """Return the time of the arithmetic of a set of three grips at the rate of a product, µs."""
+    net, square = engine.network, np.random.default_rng(0).standard_normal((400, 400))
+    rate = best(lambda: square @ square, 5) / (2 * 400**3)
+    numbers = net.count_edges(bricks) + 3 * net.count_nodes(bricks) + 3 * len(net.scene.grounds)
+    return (2 * 10 * numbers + 9**3 / 3 + 4 * 9**2) * rate * 1e6
+
+
+def row(name: str, bricks: int, count: int, rounds: int) -> dict[str, object]:
+    """Return what sets of three grips take in one case, µs each."""
+    engine = ComplianceEngine(build_network(load_scene(name)))
+    sets = grip_sets(engine.network, bricks, count)
+    ask = partial(engine._extremes, bricks, want=WANT, compiled=True)
+    many: dict[str, Callable[[], object]] = {
+        "fields": lambda: extremes_in(engine.solve(bricks, sets, WANT), WANT),
+        "numpy": lambda: engine._extremes(bricks, sets, WANT),
+        "compiled": lambda: ask(sets),
+    }
+    gap = difference(engine, bricks, sets)
+    found = {f"{k}_us": 1e6 * v / len(sets) for k, v in taken(many, rounds).items()}
+    few = {"hundred": lambda: ask(sets[:FEW]), "one": lambda: ask(sets[:1])}
+    small = taken(few, 20 * rounds)
+    found |= {"hundred_us": 1e6 * small["hundred"] / FEW, "call_us": 1e6 * small["one"]}
+    found["least_us"] = least_us(engine, bricks)
+    return {"scene": name, "bricks": bricks, **found, "difference": gap}
+
+
+def experiment(options: Options) -> Finding:
+    quick: bool = options.quick
+    if not can_compile():
+        return Finding(holds=False, without=", numba is missing", tables={})
+    cases = [("arch25", 17, 500)] if quick else CASES
+    table = pd.DataFrame([row(*case, 2 if quick else 7) for case in cases])
+    table["times_numpy"] = table["numpy_us"] / table["compiled_us"]
+    print(table.to_string(index=False, float_format="%.3g"))
+    return on_this_run(holds=holds(table), extremes=table)
+
+
+def holds(table: pd.DataFrame) -> bool:
+    return bool((table["times_numpy"] >= TWICE).all() and table["difference"].max() <= CLOSE)
+
+
+CLAIM = Claim(experiment, digits=4, quick="one case, nothing written", times=Times.JUDGED)
+
+if __name__ == "__main__":
+    CLAIM.main()

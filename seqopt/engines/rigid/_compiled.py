@@ -1,0 +1,244 @@
+"""The loops of `seqopt.engines.rigid._extremes`, compiled by numba where it is installed.
+
+Nothing else imports this file. Grip sets are solved a few at a time, side by side, so that a
+processor does the same with several at once; what loads mean is summed for one stretch of edges or
+nodes at a time, over all sets, so that it stays in the processor's cache. The code is compiled when
+it is first called and kept in the folder that numba chooses: beside this file, or the user's own
+(``NUMBA_CACHE_DIR`` names another). No function touches what another call works on, and none holds
+Python's lock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, TypeVar, cast
+
+import numba
+import numpy as np
+
+from seqopt.arrays import Floats, Ints
+
+_SIDE_BY_SIDE = 32  # sets
+
+_Function = TypeVar("_Function", bound=Callable[..., object])
+
+
+def _compiled(*freedom: str) -> Callable[[_Function], _Function]:
+    """Return what compiles a function when it is first called, and keeps it if there is a place.
+
+    ``freedom``: what may differ from arithmetic by the book, in numba's words.
+    """
+    free = {"contract", *freedom}
+
+    def compiled(function: _Function) -> _Function:
+        make = partial(numba.njit, nogil=True, fastmath=free, error_model="numpy")
+        try:
+            found: Any = make(cache=True)(function)
+        except RuntimeError:  # no folder can be written
+            found = make()(function)
+        return cast("_Function", found)
+
+    return compiled
+
+
+@_compiled()
+def solve_grips(
+    flexibility: Floats,
+    dead: Floats,
+    axis: Floats,
+    held: tuple[Ints, Ints],
+    force: Floats,
+    pivot: Floats,
+) -> int:
+    """Find the forces (S, k) that undo the displacements (l,) at grips, and scaled pivots (S, k).
+
+    As ``_solve_positive`` of `seqopt.engines.rigid._grip_equations`, of rigid grips. ``axis`` (b,
+    d): along bricks; ``held`` (S, r), (S, k): nodes and their loads. Result: how many pairs of
+    grips share a brick.
+    """
+    columns, index = held
+    (sets, count), pairs = index.shape, 0
+    low = np.empty((count, count, _SIDE_BY_SIDE))
+    share, pivots, own = np.empty((3, count, _SIDE_BY_SIDE))
+    for start in range(0, sets, _SIDE_BY_SIDE):
+        for s in range(_SIDE_BY_SIDE):
+            at = index[min(start + s, sets - 1)]
+            for i in range(count):
+                for j in range(i + 1):
+                    low[i, j, s] = flexibility[at[i], at[j]]
+                share[i, s] = -dead[at[i]]
+            pairs += _brace(low, s, axis, columns[min(start + s, sets - 1)]) * (start + s < sets)
+            for i in range(count):
+                own[i, s] = low[i, i, s]
+        _eliminate(low, pivots)
+        _substitute(low, share)
+        for s in range(min(_SIDE_BY_SIDE, sets - start)):
+            for i in range(count):
+                force[start + s, i] = share[i, s]
+                pivot[start + s, i] = pivots[i, s] / own[i, s]
+    return pairs
+
+
+@_compiled()
+def _brace(low: Floats, s: int, axis: Floats, columns: Ints) -> int:
+    """Give the force between two grips on one brick a flexibility; return how many pairs."""
+    pairs, width, scale = 0, axis.shape[1], 0.0
+    for i in range(len(low)):
+        scale += low[i, i, s]
+    for second in range(1, len(columns)):
+        for first in range(second):
+            brick = columns[first] // 2
+            if columns[second] // 2 != brick:
+                continue
+            pairs += 1
+            f, g = width * first, width * second
+            for i in range(width):
+                for j in range(width):
+                    more = scale * axis[brick, i] * axis[brick, j]
+                    if j <= i:
+                        low[f + i, f + j, s] += more
+                        low[g + i, g + j, s] += more
+                    low[g + i, f + j, s] -= more
+    return pairs
+
+
+@_compiled()
+def share_pairs(
+    axis: Floats, inner: Floats, held: tuple[Ints, Ints], force: Floats, between: Ints
+) -> None:
+    """Let each of two grips on one brick take what reaches its own node, in place.
+
+    As ``share_pairs`` of `seqopt.engines.rigid._grip_equations`. ``inner`` (l + 1, b): what loads
+    mean to the inner edges; ``between`` (S, p): the bricks whose inner edges then carry nothing,
+    -1 for none.
+    """
+    columns, index = held
+    width = axis.shape[1]
+    for s in range(len(columns)):
+        pairs, at = 0, columns[s]
+        for second in range(1, len(at)):
+            for first in range(second):
+                brick = at[first] // 2
+                if at[second] // 2 != brick:
+                    continue
+                carried = inner[-1, brick]
+                for k in range(index.shape[1]):
+                    carried += force[s, k] * inner[index[s, k], brick]
+                between[s, pairs] = brick
+                pairs += 1
+                carried *= 1.0 - 2.0 * (at[first] % 2)  # the axis leads to the second node
+                for i in range(width):
+                    force[s, width * first + i] += carried * axis[brick, i]
+                    force[s, width * second + i] -= carried * axis[brick, i]
+
+
+@_compiled()
+def _eliminate(low: Floats, pivots: Floats) -> None:
+    """Turn lower triangles (k, k, w) into their factors, with reciprocals of the pivots (k, w)."""
+    count, _, wide = low.shape
+    for j in range(count):
+        for i in range(j, count):
+            for k in range(j):
+                for s in range(wide):
+                    low[i, j, s] -= low[i, k, s] * low[j, k, s] * pivots[k, s]
+        for s in range(wide):
+            pivots[j, s] = low[j, j, s]
+            low[j, j, s] = 1.0 / low[j, j, s]
+        for i in range(j + 1, count):
+            for s in range(wide):
+                low[i, j, s] *= low[j, j, s]
+
+
+@_compiled()
+def _substitute(low: Floats, share: Floats) -> None:
+    """Turn loads (k, w) into answers."""
+    count, wide = share.shape
+    for i in range(count):
+        for k in range(i):
+            for s in range(wide):
+                share[i, s] -= low[i, k, s] * share[k, s]
+    for i in range(count - 1, -1, -1):
+        for s in range(wide):
+            share[i, s] *= low[i, i, s]
+        for k in range(i + 1, count):
+            for s in range(wide):
+                share[i, s] -= low[k, i, s] * share[k, s]
+
+
+@_compiled()
+def _sum_into(out: Floats, rows: Floats, at: Ints, force: Floats) -> None:
+    """Find what the weight, the last of the rows (l + 1, n), and forces at others mean."""
+    count, done = len(at), 0
+    if count >= 9:
+        done = _sum_nine(out, rows, at, force)
+    elif count >= 6:
+        done = _sum_six(out, rows, at, force)
+    else:
+        out[:] = rows[-1]
+    for k in range(done, count):
+        own, much = rows[at[k]], force[k]
+        for n in range(len(out)):
+            out[n] += much * own[n]
+
+
+@_compiled()
+def _sum_nine(out: Floats, rows: Floats, at: Ints, force: Floats) -> int:
+    """Begin a sum with the weight and nine loads: three grips in space."""
+    weight, a, b, c, d = rows[-1], rows[at[0]], rows[at[1]], rows[at[2]], rows[at[3]]
+    e, f, g, h, i = rows[at[4]], rows[at[5]], rows[at[6]], rows[at[7]], rows[at[8]]
+    p, q, r, s, t, u = force[0], force[1], force[2], force[3], force[4], force[5]
+    v, w, x = force[6], force[7], force[8]
+    for n in range(len(out)):
+        first = weight[n] + p * a[n] + q * b[n] + r * c[n]
+        second = s * d[n] + t * e[n] + u * f[n]
+        out[n] = first + second + v * g[n] + w * h[n] + x * i[n]
+    return 9
+
+
+@_compiled()
+def _sum_six(out: Floats, rows: Floats, at: Ints, force: Floats) -> int:
+    """Begin a sum with the weight and six loads: two grips in space."""
+    weight, a, b, c, d = rows[-1], rows[at[0]], rows[at[1]], rows[at[2]], rows[at[3]]
+    e, f = rows[at[4]], rows[at[5]]
+    p, q, r, s, t, u = force[0], force[1], force[2], force[3], force[4], force[5]
+    for n in range(len(out)):
+        first = weight[n] + p * a[n] + q * b[n] + r * c[n]
+        out[n] = first + s * d[n] + t * e[n] + u * f[n]
+    return 6
+
+
+@_compiled("nnan", "nsz")  # else no maximum is taken of several numbers at once
+def reduce_rows(
+    rows: Floats,
+    counts: tuple[int, int, int, int],
+    loads: tuple[Ints, Floats],
+    idle: Ints,
+    found: Floats,
+) -> None:
+    """Find extremes of what forces (S, k) at loads (S, k) and the weight mean.
+
+    ``rows`` (p, l + 1, n), ``counts``, ``found`` (4, S): as of `seqopt.engines.rigid._extremes`,
+    and of how many edges in all; ``idle`` (S, q): edges that carry nothing, -1 for none.
+    """
+    edges, nodes, ends, total = counts
+    index, force = loads
+    out = np.empty(rows.shape[2])
+    tension, x, y, z = out[:edges], out[edges:], out[edges + nodes :], out[edges + 2 * nodes :]
+    behind = edges + 3 * nodes
+    u, v, w = out[behind:], out[behind + ends :], out[behind + 2 * ends :]
+    for part in range(len(rows)):
+        for s in range(len(index)):
+            _sum_into(out, rows[part], index[s], force[s])
+            for k in range(idle.shape[1]):
+                place = idle[s, k] - min(part * edges, total - edges)
+                if idle[s, k] >= 0 and 0 <= place < edges:
+                    out[place] = 0.0
+            least, most, shift, moment = found[0, s], found[1, s], found[2, s], found[3, s]
+            for n in range(edges):
+                least, most = min(least, tension[n]), max(most, tension[n])
+            for n in range(nodes):
+                shift = max(shift, x[n] * x[n] + y[n] * y[n] + z[n] * z[n])
+            for n in range(ends):
+                moment = max(moment, u[n] * u[n] + v[n] * v[n] + w[n] * w[n])
+            found[0, s], found[1, s], found[2, s], found[3, s] = least, most, shift, moment

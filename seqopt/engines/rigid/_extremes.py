@@ -1,0 +1,204 @@
+"""The extremes of the fields of many grip sets, without the fields.
+
+Who compares grip sets asks for the largest tension of any edge, the largest displacement of any
+node, the largest moment at any ground end. What every load means is kept by parts of the structure,
+as many edges and nodes to a part as stay in the processor's cache while all grip sets are summed
+there; of each sum only the extremes are kept.
+
+The loops are written twice: here with NumPy, which is the reference, and in
+`seqopt.engines.rigid._compiled` for numba, which does the same in a third of the time where it is
+installed. Loading it takes half a second, so it is left to those who ask for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from importlib.util import find_spec
+from typing import NamedTuple
+
+import numpy as np
+
+from seqopt.arrays import Floats, Ints
+from seqopt.engines.interface import Fields, Want
+from seqopt.engines.rigid._operator import ComplianceOperator
+from seqopt.engines.rigid._response_maps import loads_of
+
+_PART = 2**15  # numbers under all loads of a part: a quarter of a megabyte
+_LEAST = 256  # of them under each load
+_AT_ONCE = 2**16  # numbers that are summed at once: they stay in the processor's cache
+
+
+class Extremes(NamedTuple):
+    """Extremes of the fields of S grip sets.
+
+    ``least``, ``most`` (S,): force of any edge, N; ``shift`` (S,): displacement of any node, m;
+    ``moment`` (S,): at any ground end, N m; ``force`` (S, r): of every grip, N. What was not asked
+    for means nothing.
+    """
+
+    least: Floats
+    most: Floats
+    shift: Floats
+    moment: Floats
+    force: Floats
+
+
+class ExtremeRows(NamedTuple):
+    """What every load of an operator means, by parts of the structure.
+
+    ``rows`` (p, l + 1, n): the weight's last; ``counts``: edges, nodes, ground ends of a part. A
+    row has the forces of its edges, then the displacements of its nodes along x, then y, then z,
+    then the moments at its ends so. Where the last part has fewer, some stand twice.
+    """
+
+    rows: Floats
+    counts: tuple[int, int, int]
+    edges: int  # in all
+
+
+_OF = {"edge_force": (Want.EDGES, 1), "displacement": (Want.DISPLACEMENTS, 3)}
+_OF["support"] = Want.SUPPORT, 6  # of which the last three are taken
+
+
+def rows_of(operator: ComplianceOperator, want: Want) -> ExtremeRows:
+    """Return what every load of an operator means to the extremes of some fields."""
+    loads, sizes = len(operator.twist), []
+    for name, (flag, size) in _OF.items():
+        sizes.append(operator.maps.count(name) // size if want & flag else 0)
+    total = sizes[0] + 3 * (sizes[1] + sizes[2])
+    parts = max(1, min(total * loads // _PART, total // _LEAST))
+    edges, nodes, ends = (-(-size // parts) for size in sizes)
+    counts = edges, nodes, ends
+    name = f"extremes of {sizes}"
+    return ExtremeRows(
+        operator.made(name, lambda: _by_part(operator, parts, counts)), counts, sizes[0]
+    )
+
+
+def _by_part(operator: ComplianceOperator, parts: int, counts: tuple[int, int, int]) -> Floats:
+    """Return the rows of an operator as of `ExtremeRows`."""
+    width = counts[0] + 3 * (counts[1] + counts[2])
+    rows, first = np.empty((parts, len(operator.twist), width)), 0
+    for count, (name, (_, size)) in zip(counts, _OF.items(), strict=True):
+        if not count:
+            continue
+        found = operator.mean(name)
+        field = found.reshape(len(found), -1, size).transpose(0, 2, 1)[:, -3:]
+        for part in range(parts):
+            start = min(part * count, field.shape[2] - count)
+            for axis in range(field.shape[1]):
+                here = slice(first + axis * count, first + axis * count + count)
+                rows[part, :, here] = field[:, axis, start : start + count]
+        first += count * field.shape[1]
+    return rows
+
+
+def extremes_of(known: ExtremeRows, index: Ints, force: Floats, idle: Ints | None = None) -> Floats:
+    """Return the least and most edge force, the largest displacement and moment, (4, S).
+
+    ``index``, ``force`` (S, k): loads of the operator, and how much of each; ``idle`` (S, q): edges
+    that carry nothing whatever these mean, -1 for none, for compiled loops; else these are NumPy's.
+    """
+    found = np.zeros((4, len(index)))
+    if known.counts[0]:
+        found[0], found[1] = np.inf, -np.inf
+    if idle is not None:
+        counts = *known.counts, known.edges
+        _loops().reduce_rows(known.rows, counts, (index, force), idle, found)
+    else:
+        _reduce_rows(known, index, force, found)
+    np.sqrt(found[2:], out=found[2:])
+    return found
+
+
+def _reduce_rows(known: ExtremeRows, index: Ints, force: Floats, found: Floats) -> None:
+    """Find extremes as ``reduce_rows`` of `seqopt.engines.rigid._compiled` does."""
+    rows, (edges, nodes, ends), _ = known
+    step, behind = max(16, _AT_ONCE // max(rows.shape[2], 1)), edges + 3 * nodes
+    for start in range(0, len(index), step):
+        part = slice(start, start + step)
+        loads = loads_of(index[part], force[part], rows.shape[1])
+        for each in rows:
+            sums, out = loads.sum(each), found[:, part]
+            if edges:
+                np.minimum(out[0], sums[:, :edges].min(axis=1), out=out[0])
+                np.maximum(out[1], sums[:, :edges].max(axis=1), out=out[1])
+            if nodes:
+                np.maximum(out[2], _largest_square(sums[:, edges:behind], nodes), out=out[2])
+            if ends:
+                np.maximum(out[3], _largest_square(sums[:, behind:], ends), out=out[3])
+
+
+def _largest_square(sums: Floats, count: int) -> Floats:
+    """Return the largest square (S,) of a length of vectors (S, 3n), all first components first."""
+    squares = sums * sums
+    total = squares[:, :count] + squares[:, count : 2 * count] + squares[:, 2 * count :]
+    return np.asarray(total.max(axis=1))
+
+
+def extremes_in(fields: Fields, want: Want) -> Extremes:
+    """Return the extremes of fields that are there."""
+    sets = len(fields.grip_force)
+    found = np.zeros((4, sets))
+    if want & Want.EDGES:
+        found[:2] = fields.edge_force.min(axis=1), fields.edge_force.max(axis=1)
+    if want & Want.DISPLACEMENTS:
+        found[2] = np.linalg.norm(fields.displacement, axis=2).max(axis=1)
+    if want & Want.SUPPORT:
+        found[3] = np.linalg.norm(fields.support[..., 3:], axis=2).max(axis=1)
+    size = np.linalg.norm(fields.grip_force, axis=2)
+    return Extremes(found[0], found[1], found[2], found[3], size)
+
+
+@cache
+def can_compile() -> bool:
+    """Return whether loops can be compiled: numba is there."""
+    return find_spec("numba") is not None
+
+
+class _Loops(NamedTuple):
+    """The compiled functions."""
+
+    solve_grips: Callable[..., int]
+    share_pairs: Callable[..., None]
+    reduce_rows: Callable[..., None]
+
+
+@cache
+def _loops() -> _Loops:
+    """Return the compiled functions; loading them takes half a second."""
+    from seqopt.engines.rigid import _compiled  # noqa: PLC0415  # numba is an extra
+
+    return _Loops(_compiled.solve_grips, _compiled.share_pairs, _compiled.reduce_rows)
+
+
+class Solved(NamedTuple):
+    """Forces of rigid grips as compiled loops find them.
+
+    ``force`` (S, k): at loads, N; ``pivot`` (S, k): scaled; ``shared`` (S, k): forces, what is
+    between two grips on one brick shared by them; ``idle`` (S, q): edges that carry nothing then.
+    """
+
+    force: Floats
+    pivot: Floats
+    shared: Floats
+    idle: Ints
+
+
+def solve_compiled(operator: ComplianceOperator, columns: Ints, index: Ints) -> Solved:
+    """Return what rigid grips exert on nodes (S, r), which are loads (S, k)."""
+    force, pivot = np.empty(index.shape), np.empty(index.shape)
+    flexibility, dead, axis = operator.flexibility, operator.dead_displacement, operator.axis
+    loops, held = _loops(), (columns, index)
+    if not loops.solve_grips(flexibility, dead, axis, held, force, pivot):
+        return Solved(force, pivot, force, np.empty((len(columns), 0), dtype=np.int64))
+    inner = operator.made("inner edges", lambda: _inner(operator))
+    shared, idle = force.copy(), np.full((len(columns), columns.shape[1] // 2), -1)
+    loops.share_pairs(axis, inner, held, shared, idle)
+    return Solved(force, pivot, shared, np.where(idle < 0, -1, operator.inner_edge[idle]))
+
+
+def _inner(operator: ComplianceOperator) -> Floats:
+    """Return what every load means to the inner edges of bricks, (l + 1, b)."""
+    return np.ascontiguousarray(operator.mean("edge_force")[:, operator.inner_edge])

@@ -1,0 +1,173 @@
+"""Extremes of fields without the fields, by NumPy and by compiled loops."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from seqopt.engines.interface import Want
+from seqopt.engines.rigid import _extremes
+from seqopt.engines.rigid._extremes import extremes_in, extremes_of, rows_of
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.network.build import build_network
+from seqopt.responses._blocks import COMPILED, Block, answer
+from seqopt.responses.quantities import CHOSEN_BY, EXTREMES, lengths
+from seqopt.scene.scene_file import load_scene
+from tests.builders import from_both_sides, six_bricks, small_arch
+from tests.limit_scenes import chain, loosened
+
+needs_numba = pytest.mark.skipif(not _extremes.can_compile(), reason="no numba")
+WAYS = [False, pytest.param(True, marks=needs_numba)]
+SOME = [Want.RESPONSES, Want.EDGES, Want.DISPLACEMENTS, Want.SUPPORT, Want(0)]
+NONE, MANY = np.empty((1, 0), dtype=np.int64), np.empty((500, 0), dtype=np.int64)
+CLOSE = 1e-12  # of what is largest
+
+
+def sets_of(network, bricks, grips, count=300):
+    """Random grip sets on free nodes, each node once; two may share a brick."""
+    rng, (known, index) = np.random.default_rng(0), network.index_of_grip
+    free = known[index < 2 * bricks]
+    return np.array([rng.choice(free, grips, replace=False) for _ in range(count)])
+
+
+def apart(found, true):
+    """The largest difference, over the largest of each, or a tenth of a newton or micron."""
+    scale = (0.1, 0.1, 1e-7, 0.1, 0.1)
+    pairs = zip(found, true, scale, strict=True)
+    return max(np.abs(a - b).max() / max(np.abs(b).max(), least) for a, b, least in pairs)
+
+
+def of_fields(engine, bricks, sets, want):
+    return extremes_in(engine.solve(bricks, sets, want), want)
+
+
+@pytest.mark.parametrize("compiled", WAYS)
+@pytest.mark.parametrize("want", SOME)
+@pytest.mark.parametrize("grips", [1, 2, 3, 4, 5])
+def test_they_are_those_of_the_fields(grips, want, compiled):
+    engine = ComplianceEngine(build_network(from_both_sides(6)))
+    sets = sets_of(engine.network, 6, grips)
+    found = engine._extremes(6, sets, want, compiled=compiled)
+    assert apart(found, of_fields(engine, 6, sets, want)) <= CLOSE
+
+
+@pytest.mark.parametrize("compiled", WAYS)
+def test_in_parts_of_a_larger_structure(compiled):
+    engine = ComplianceEngine(build_network(load_scene("dome163")))
+    bricks, want = 33, Want.RESPONSES
+    sets = sets_of(engine.network, bricks, 3)
+    operator = engine._operator(bricks, np.arange(2 * bricks).reshape(-1, 1))
+    assert len(rows_of(operator, want).rows) > 1
+    found = engine._extremes(bricks, sets, want, compiled=compiled)
+    assert apart(found, of_fields(engine, bricks, sets, want)) <= CLOSE
+
+
+@pytest.mark.parametrize("compiled", WAYS)
+@pytest.mark.parametrize("alter", ["soft", "loose", "few"])
+def test_what_rows_do_not_answer_is_that_of_the_fields(alter, compiled):
+    scene = {
+        "soft": small_arch(6),
+        "loose": loosened(chain(16), 1e-7, only_turning=True),
+        "few": chain(60),
+    }[alter]
+    if alter == "soft":
+        robots = tuple(replace(robot, stiffness=1e5) for robot in scene.robots)
+        scene = replace(scene, robots=robots)
+    engine = ComplianceEngine(build_network(scene))
+    bricks = len(scene.bricks)
+    sets = sets_of(engine.network, bricks, 2, 40)
+    found = engine._extremes(bricks, sets, Want.RESPONSES, compiled=compiled)
+    assert apart(found, of_fields(engine, bricks, sets, Want.RESPONSES)) == 0
+
+
+@pytest.mark.parametrize("compiled", WAYS)
+def test_blocks_answer_responses_by_them(compiled):
+    engine = ComplianceEngine(build_network(six_bricks()))
+    sets = np.sort(sets_of(engine.network, 6, 2, 50), axis=1)
+    found = answer(engine, Block(6, sets, tuple(sorted(EXTREMES)), compiled=compiled))
+    fields = engine.solve(6, sets, Want.RESPONSES)
+    for name, values in found.values.items():
+        true = CHOSEN_BY[name].of(engine.network, fields)
+        assert np.abs(values - true).max() <= CLOSE * max(np.abs(true).max(), 1e-9)
+    assert np.abs(found.forces - lengths(fields.grip_force)).max() <= 1e-9
+
+
+@pytest.mark.parametrize("compiled", WAYS)
+def test_no_sets_have_none(compiled):
+    engine = ComplianceEngine(build_network(six_bricks()))
+    none = np.zeros((0, 2), dtype=np.int64)
+    found = engine._extremes(6, none, Want.RESPONSES, compiled=compiled)
+    assert [len(each) for each in found] == [0] * 5
+
+
+@needs_numba
+def test_a_set_has_the_same_whatever_is_beside_it():
+    engine = ComplianceEngine(build_network(six_bricks()))
+    sets = sets_of(engine.network, 6, 1, 100)  # no two grips on one brick
+    whole = engine._extremes(6, sets, Want.RESPONSES, compiled=True)
+    parts = [engine._extremes(6, s, Want.RESPONSES, compiled=True) for s in np.split(sets, 20)]
+    for each, some in zip(whole, zip(*parts, strict=True), strict=True):
+        assert np.array_equal(each, np.concatenate(some))
+
+
+@pytest.mark.parametrize("compiled", WAYS)
+def test_a_wrong_row_is_seen(compiled):
+    """The control of the comparisons above."""
+    engine = ComplianceEngine(build_network(six_bricks()))
+    operator = engine._operator(6, np.arange(12).reshape(-1, 1))
+    known = rows_of(operator, Want.EDGES)
+    index, force = operator.load_index(np.array([[0, 9]])), np.ones((1, 6))
+    true = extremes_of(known, index, force, NONE if compiled else None)
+    wrong = known._replace(rows=known.rows * (1 + 1e-9))
+    found = extremes_of(wrong, index, force, NONE if compiled else None)
+    assert np.abs(found - true).max() > CLOSE * np.abs(true).max()
+
+
+@needs_numba
+def test_threads_do_not_disturb_each_other():
+    engine = ComplianceEngine(build_network(six_bricks()))
+    operator = engine._operator(6, np.arange(12).reshape(-1, 1))
+    known, index = rows_of(operator, Want.RESPONSES), operator.load_index(np.array([[0, 9]] * 500))
+    forces = [np.random.default_rng(i).normal(size=index.shape) for i in range(8)]
+    alone = [extremes_of(known, index, force, MANY) for force in forces]
+    with ThreadPoolExecutor(4) as pool:
+        beside = pool.map(lambda force: extremes_of(known, index, force, MANY), forces)
+        assert all(map(np.array_equal, alone, beside))
+
+
+@needs_numba
+@pytest.mark.slow  # compiles anew
+def test_where_no_folder_can_be_written_code_is_compiled_all_the_same(tmp_path):
+    code = (
+        "import tempfile\n"
+        "def refuse(*_, **__): raise OSError('read only')\n"
+        "tempfile.TemporaryFile = refuse\n"  # what numba tries folders by
+        "import numpy as np\n"
+        "from seqopt.engines.rigid._compiled import solve_grips as solve\n"
+        "force, pivot = np.empty((1, 1)), np.empty((1, 1))\n"
+        "held = np.zeros((1, 1), dtype=np.int64), np.zeros((1, 1), dtype=np.int64)\n"
+        "solve(np.full((1, 1), 2.0), np.ones(1), np.ones((1, 1)), held, force, pivot)\n"
+        "print(force[0, 0], type(solve._cache).__name__)\n"
+    )
+    command = [sys.executable, "-W", "error", "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["-0.5", "NullCache"]
+
+
+def test_without_numba_numpy_answers(monkeypatch):
+    monkeypatch.setattr("seqopt.engines.rigid.compliance.can_compile", lambda: False)
+    monkeypatch.setattr(_extremes, "_loops", None)
+    engine = ComplianceEngine(build_network(six_bricks()))
+    sets = sets_of(engine.network, 6, 2, 10)
+    asked = engine._extremes(6, sets, Want.RESPONSES, compiled=True)
+    plain = engine._extremes(6, sets, Want.RESPONSES)
+    assert all(map(np.array_equal, asked, plain))
+
+
+def test_much_work_is_compiled_and_little_is_not():
+    assert COMPILED > 25 * 22724 * 2  # the loop of arch25 loads nothing
