@@ -17,7 +17,7 @@ Letting go needs no preparation. Where several let go at once, the slowest count
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from seqopt.errors import ProblemError, StepError
@@ -34,7 +34,9 @@ class StepTime:
 
     ``step``: its number; ``robots``: indices of those who act in it; ``prepares``: from when the
     one who takes a grip gets ready; ``ready``: when it is; both None where robots let go;
-    ``start``, ``end``: of what changes the structure.
+    ``start``, ``end``: of what changes the structure; ``places``: whether it places a brick;
+    ``cures``: since when mortar holds what the step leads to, None where that was not asked;
+    ``joint``: the one whose mortar it waits for, empty if for none.
     """
 
     step: int
@@ -43,6 +45,14 @@ class StepTime:
     ready: float | None
     start: float
     end: float
+    places: bool = False
+    cures: float | None = None
+    joint: str = ""
+
+
+Waits = Callable[[AnyStep, Sequence[StepTime], float], tuple[float, str]]
+"""Says from when on, no sooner than a time, a step after others may be done, and for which joint it
+waits; empty if for none."""
 
 
 def require_durations(scene: Scene, robots: Sequence[int] | None = None) -> tuple[Durations, ...]:
@@ -57,10 +67,14 @@ def require_durations(scene: Scene, robots: Sequence[int] | None = None) -> tupl
     return tuple(d for r in which if (d := scene.robots[r].durations) is not None)
 
 
-def step_times(scene: Scene, steps: Sequence[AnyStep]) -> tuple[StepTime, ...]:
+def step_times(
+    scene: Scene, steps: Sequence[AnyStep], waits: Waits | None = None
+) -> tuple[StepTime, ...]:
     """Return when every step of a build happens at the earliest, in the order that is given.
 
-    Steps are all of one build, from its first on. A `StepError` names robots that act of which it
+    Steps are all of one build, from its first on. ``waits``: what a step has to wait for besides,
+    where mortar cures: since nothing is gained by acting later, every step is done as soon as it
+    may. A `StepError` names robots that act of which it
     is not known how long they take.
 
     Examples
@@ -83,18 +97,23 @@ def step_times(scene: Scene, steps: Sequence[AnyStep]) -> tuple[StepTime, ...]:
     for step in steps:
         acting = tuple(r for r in busy if step.grips[r] != before[r])
         taker = next((r for r in acting if step.grips[r] is not None), None)
-        if taker is None:
-            end = now + max((durations[r].release for r in acting), default=0.0)
-            out.append(StepTime(step.number, acting, None, None, now, end))
-            free |= dict.fromkeys(acting, end)
-        else:
-            own, node, placing = durations[taker], step.grips[taker], step.kind is StepKind.PLACE
-            ready = free[taker] + (own.fetch if placing else own.approach)
+        placing = step.kind is StepKind.PLACE
+        prepares = ready = None
+        acts, start = max((durations[r].release for r in acting), default=0.0), now
+        if taker is not None:
+            own, node, prepares = durations[taker], step.grips[taker], free[taker]
+            ready = prepares + (own.fetch if placing else own.approach)
             ready += way_seconds(scene, own, last.get(taker), node)
             start, last[taker] = max(now, ready), node
-            end = start + (own.place if placing else own.grip)
-            out.append(StepTime(step.number, acting, free[taker], ready, start, end))
-        now, before = end, step.grips
+            acts = own.place if placing else own.grip
+        cures, joint = (None, "") if waits is None else waits(step, out, start)
+        start = start if cures is None else cures
+        now = start + acts
+        times = step.number, acting, prepares, ready, start, now
+        out.append(StepTime(*times, placing, cures, joint))
+        if taker is None:
+            free |= dict.fromkeys(acting, now)
+        before = step.grips
     return tuple(out)
 
 
