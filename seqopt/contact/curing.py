@@ -70,7 +70,9 @@ class Curing(Terse):
     @property
     def is_instant(self) -> bool:
         """Whether every joint has its full bond from the first."""
-        return all(points[:1] == ((0.0, 1.0),) for points in (self.points, *dict(self.joints).values()))
+        return all(
+            points[:1] == ((0.0, 1.0),) for points in (self.points, *dict(self.joints).values())
+        )
 
     def __str__(self) -> str:
         own = [f"{name}:{_said(points)}" for name, points in self.joints]

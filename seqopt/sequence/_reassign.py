@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, TypeVar
 from seqopt.errors import StepError
 from seqopt.scene.holders._durations import Durations
 from seqopt.scene.scene import Scene
-from seqopt.sequence._timing import require_durations, way_seconds
+from seqopt.sequence._timing import Waits, require_durations, way_seconds
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.steps import Step, check_sequence
 
@@ -27,7 +27,8 @@ class _Label(NamedTuple):
 
     ``end``: of the last step, s; ``since``: since when robots are free, s; of those who hold zero;
     ``has``: number of the grip of every robot; ``last``: node that each held last; ``chosen``: the
-    robots of all grips by then, the last one first.
+    robots of all grips by then, the last one first; ``placed``: where mortar cures, when bricks were
+    in their places, s.
     """
 
     end: float
@@ -35,15 +36,20 @@ class _Label(NamedTuple):
     has: tuple[int, ...]
     last: tuple[int | None, ...]
     chosen: tuple[int, Any] | None  # a robot, and what was chosen before it
+    placed: tuple[float, ...] = ()
 
 
 def reassigned_steps(
-    scene: Scene, steps: Sequence[Step], may: May, team: Sequence[int] | None = None
+    scene: Scene,
+    steps: Sequence[Step],
+    may: May,
+    team: Sequence[int] | None = None,
+    waits: Waits | None = None,
 ) -> tuple[Step, ...]:
     """Return the same grips in the same order by those robots with which the build takes least.
 
     ``may``: whether a robot, by its index, may have a grip; ``team``: the robots that take part, by
-    default all. A `StepError` says that there is no such choice.
+    default all; ``waits``: as of `step_times`. A `StepError` says that there is no such choice.
     """
     team = range(len(scene.robots)) if team is None else team
     own = dict(zip(team, require_durations(scene, team), strict=True))
@@ -57,11 +63,13 @@ def reassigned_steps(
         found = list[_Label]()
         for label in labels:
             if ended:
-                found.append(_let_go(label, [label.has.index(i) for i in ended], own))
+                ready = _cured(label, step, label.end, waits)
+                found.append(_let_go(ready, [label.has.index(i) for i in ended], own))
                 continue
             for i in begun:
                 able = [r for r in team if label.has[r] == FREE and may(r, every[i])]
-                found += [_take(scene, label, (r, i, every[i]), own[r]) for r in able]
+                for r in able:
+                    found.append(_take(scene, label, (r, i, every[i]), own[r], (step, waits)))
         labels = _undominated(found, moves=moves)
     if not labels:
         raise StepError("no robot may have a grip of the steps; nobody can be reassigned")
@@ -73,19 +81,33 @@ def reassigned_steps(
     return _with_robots(scene, steps, every, dict(zip(order, chosen[::-1], strict=True)))
 
 
-def _take(scene: Scene, label: _Label, which: tuple[int, int, Hold], own: Durations) -> _Label:
-    """Return what follows where a robot takes a grip."""
+def _cured(label: _Label, step: Step, start: float, waits: Waits | None) -> _Label:
+    """Return a label that ends no sooner than a time, and than mortar lets a step be done."""
+    return label._replace(end=start if waits is None else waits(step, label.placed, start)[0])
+
+
+def _take(
+    scene: Scene,
+    label: _Label,
+    which: tuple[int, int, Hold],
+    own: Durations,
+    asked: tuple[Step, Waits | None],
+) -> _Label:
+    """Return what follows where a robot takes a grip in a step."""
     robot, number, hold = which
     placing = hold.places is not None
     ready = label.since[robot] + (own.fetch if placing else own.approach)
     ready += way_seconds(scene, own, label.last[robot], hold.node)
-    end = max(label.end, ready) + (own.place if placing else own.grip)
+    step, waits = asked
+    start = _cured(label, step, max(label.end, ready), waits).end
+    end = start + (own.place if placing else own.grip)
     return _Label(
         end,
         _put(label.since, robot, 0.0),
         _put(label.has, robot, number),
         _put(label.last, robot, hold.node),
         (robot, label.chosen),
+        label.placed if waits is None or not placing else (*label.placed, end),
     )
 
 
@@ -105,7 +127,7 @@ def _put(values: tuple[_Part, ...], place: int, value: _Part) -> tuple[_Part, ..
 def _undominated(labels: Sequence[_Label], *, moves: bool) -> list[_Label]:
     """Return the labels that no other one of the same grips is nowhere above."""
     kept: dict[object, list[_Label]] = {}
-    for label in sorted(labels, key=lambda each: (each.end, each.since)):
+    for label in sorted(labels, key=lambda each: (each.end, each.since, each.placed)):
         own = kept.setdefault((label.has, label.last if moves else None), [])
         if not any(_nowhere_above(other, label) for other in own):
             own.append(label)
@@ -113,7 +135,8 @@ def _undominated(labels: Sequence[_Label], *, moves: bool) -> list[_Label]:
 
 
 def _nowhere_above(first: _Label, second: _Label) -> bool:
-    return all(a <= b for a, b in zip(first.since, second.since, strict=True))
+    pairs = zip((*first.since, *first.placed), (*second.since, *second.placed), strict=True)
+    return all(a <= b for a, b in pairs)
 
 
 def _with_robots(

@@ -34,9 +34,9 @@ class StepTime:
 
     ``step``: its number; ``robots``: indices of those who act in it; ``prepares``: from when the
     one who takes a grip gets ready; ``ready``: when it is; both None where robots let go;
-    ``start``, ``end``: of what changes the structure; ``places``: whether it places a brick;
-    ``cures``: since when mortar holds what the step leads to, None where that was not asked;
-    ``joint``: the one whose mortar it waits for, empty if for none.
+    ``start``, ``end``: of what changes the structure; ``cures``: since when mortar holds what
+    the step leads to, None where that was not asked; ``joint``: the one whose mortar it waits for,
+    empty if for none.
     """
 
     step: int
@@ -45,14 +45,13 @@ class StepTime:
     ready: float | None
     start: float
     end: float
-    places: bool = False
     cures: float | None = None
     joint: str = ""
 
 
-Waits = Callable[[AnyStep, Sequence[StepTime], float], tuple[float, str]]
-"""Says from when on, no sooner than a time, a step after others may be done, and for which joint it
-waits; empty if for none."""
+Waits = Callable[[AnyStep, Sequence[float], float], tuple[float, str]]
+"""Says from when on, no sooner than a time, a step may be done after bricks were in their places at
+some times, and for which joint it waits; empty if for none."""
 
 
 def require_durations(scene: Scene, robots: Sequence[int] | None = None) -> tuple[Durations, ...]:
@@ -93,7 +92,7 @@ def step_times(
     durations = dict(zip(busy, require_durations(scene, busy), strict=True))
     free, last = dict.fromkeys(busy, 0.0), dict[int, object]()
     before: Sequence[object] = (None,) * len(robots)
-    now, out = 0.0, list[StepTime]()
+    now, out, placed = 0.0, list[StepTime](), list[float]()
     for step in steps:
         acting = tuple(r for r in busy if step.grips[r] != before[r])
         taker = next((r for r in acting if step.grips[r] is not None), None)
@@ -106,11 +105,12 @@ def step_times(
             ready += way_seconds(scene, own, last.get(taker), node)
             start, last[taker] = max(now, ready), node
             acts = own.place if placing else own.grip
-        cures, joint = (None, "") if waits is None else waits(step, out, start)
+        cures, joint = (None, "") if waits is None else waits(step, placed, start)
         start = start if cures is None else cures
         now = start + acts
         times = step.number, acting, prepares, ready, start, now
-        out.append(StepTime(*times, placing, cures, joint))
+        out.append(StepTime(*times, cures, joint))
+        placed += [now] * placing
         if taker is None:
             free |= dict.fromkeys(acting, now)
         before = step.grips

@@ -18,8 +18,7 @@ from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar
 from seqopt.errors import SceneError, StepError
 from seqopt.network.network import Network
-from seqopt.sequence._timing import StepTime
-from seqopt.sequence.steps import Grips, Step
+from seqopt.sequence.steps import AnyStep, Grips, StepKind
 from seqopt.stability._prover import Proven
 from seqopt.stability._verdict_chain import VerdictChain
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
@@ -107,7 +106,7 @@ class CuringBuilds:
             self._found[key] = _verdict_of(proven), _motion(assembly, proven)
         return self._found[key]
 
-    def since(self, step: Step, start: float, placed: Sequence[float]) -> tuple[float, str]:
+    def waits(self, step: AnyStep, placed: Sequence[float], start: float) -> tuple[float, str]:
         """Return from when on the state of a step stands, no sooner than at a time, s.
 
         ``placed``: when bricks were in their places, in build order. Beside it the joint whose bond
@@ -126,21 +125,23 @@ class CuringBuilds:
             middle = (low + high) // 2
             low, high = (low, middle) if self._stands(step, times[middle], rows) else (middle, high)
         if high == len(times):
-            raise StepError(
-                f"step {step.number}: it is not proven to stand with bricks 1 to {bricks} in their "
-                "places and all mortar cured; no wait helps: hold more, or let go later"
-            )
+            raise StepError(_never(step))
         per_joint = self.joints.ages.shape[1]
         joint = int(np.flatnonzero(events == times[high])[0]) // per_joint
         return float(times[high]), self.joints.names[joint]
 
-    def _stands(self, step: Step, time: float, placed: Floats) -> bool:
+    def _stands(self, step: AnyStep, time: float, placed: Floats) -> bool:
         bond = self.joints.at(step.bricks, np.array([time]), placed)[0]
         return self.verdict(step.bricks, step.grips, bond)[0] is Verdict.STANDS
 
-    def waits(self, step: Step, before: Sequence[StepTime], start: float) -> tuple[float, str]:
-        """Return the same of a step after others, each of which has its times."""
-        return self.since(step, start, [time.end for time in before if time.places])
+
+def _never(step: AnyStep) -> str:
+    """Return why a step is never done."""
+    if step.kind is StepKind.PLACE:
+        why = "before the joints that it closes have any bond; no wait helps, but more grips may"
+    else:
+        why = "with all mortar cured; no wait helps, but more grips may"
+    return f"step {step.number} ({step.kind.value}): it is not proven to stand {why}"
 
 
 def _motion(assembly: Assembly, proven: Proven) -> Floats | None:

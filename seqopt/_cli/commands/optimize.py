@@ -23,6 +23,7 @@ from seqopt._cli.asked import (
     strictly,
 )
 from seqopt._cli.options import (
+    CURING,
     DURATIONS,
     LIMIT,
     RULE,
@@ -102,7 +103,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     declare(command.add_argument_group("what is allowed"), LIMIT | BUDGET)
     form_options(command, strict=True, builds=True)
     states = "what plans are compared by, state after state, with any schedule"
-    declare(command.add_argument_group(states), AIM | FEWEST | STANDING)
+    declare(command.add_argument_group(states), AIM | FEWEST | STANDING | CURING)
     declare(command.add_argument_group("with --schedule free"), RULE | BASES | POLICY)
     criterion_options(command)
     engine_options(command)

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import SolverError
 from seqopt.graph.duality import _to_go
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import TIED
@@ -28,6 +29,16 @@ BLOCK = 400_000  # acts that are looked at together
 
 def makespan(scene: Scene, steps: Sequence[Step]) -> float:
     """Return when the last of some steps ends, s: the longest way through what waits for what."""
+    return ([0.0, *step_ends(scene, steps)])[-1]
+
+
+def step_ends(
+    scene: Scene, steps: Sequence[Step], starts: Sequence[float] = ()
+) -> tuple[float, ...]:
+    """Return when steps end, s, at the earliest, or where they start at some times.
+
+    Raises `SolverError` if one starts before the one before it ends, or its robot is ready.
+    """
     ends, let_go, held = [0.0], dict[int, int](), dict[int, int]()
     grips: Sequence[int | None] = (None,) * len(scene.robots)
     for i, step in enumerate(steps, start=1):
@@ -48,9 +59,14 @@ def makespan(scene: Scene, steps: Sequence[Step]) -> float:
             ready = own.fetch if placing else own.approach
             waits.append(ends[let_go.get(r, 0)] + ready + way)
             held[r] = new
-        ends.append(max(waits) + acts)
+        start = max(waits)
+        if starts:
+            if not starts[i - 1] >= start - BETTER * abs(start):
+                raise SolverError(f"step {i} starts at {starts[i - 1]:.6g} s, not from {start:.6g}")
+            start = starts[i - 1]
+        ends.append(start + acts)
         grips = step.grips
-    return ends[-1]
+    return tuple(ends[1:])
 
 
 class Team(NamedTuple):
