@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from seqopt.arrays import Terse
 from seqopt.errors import SceneError
@@ -96,7 +97,7 @@ def _checked(where: str, given: Iterable[Sequence[float]]) -> Points:
         (finite(f"{where}: age", age, 0.0), finite(f"{where}: share", share, 0.0))
         for age, share in pairs
     )
-    for before, after in zip(out, out[1:], strict=False):
+    for before, after in pairwise(out):
         if not (before[0] < after[0] and before[1] < after[1]):
             raise SceneError(f"{where}: {before} comes before {after}; ages and shares must rise")
     if out and out[-1][1] != 1.0:

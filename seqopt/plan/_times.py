@@ -91,8 +91,9 @@ def reassign(
 
     ``responses``: of the steps, as of `seqopt.analyze`. A robot may have a grip if it reaches the
     node, gives way there as the one who had it, and carries the largest force of the grip within
-    its payload; who carried more before may go on. Where mortar cures (``waits``: as of `step_times`)
-    its payload is no less than that of the one who had it. A `StepError` says that robots have arms.
+    its payload; who carried more before may go on. Where mortar cures (``waits``: as of
+    `step_times`) its payload is no less than that of the one who had it. A `StepError` says that
+    robots have arms.
     """
     if scene.has_arms:
         raise StepError(

@@ -134,7 +134,8 @@ class ShownBuild(Shown):
         taken, from when the robot ``prepares_s`` and is ``ready_s`` (none where robots let go),
         ``start_s`` and ``end_s`` of what changes the structure, and how long it ``waits_s`` for the
         robot; where mortar cures, also for the mortar, which alone it ``cures_s``, and the
-        ``joint`` that was the last to hold. Raises `StepError` if it is not known how long a robot takes that acts.
+        ``joint`` that was the last to hold. Raises `StepError` if it is not known how long a robot
+        takes that acts.
         """
         return times_table(self.engine.network.scene, self.steps, self._waits)
 

@@ -27,8 +27,8 @@ class _Label(NamedTuple):
 
     ``end``: of the last step, s; ``since``: since when robots are free, s; of those who hold zero;
     ``has``: number of the grip of every robot; ``last``: node that each held last; ``chosen``: the
-    robots of all grips by then, the last one first; ``placed``: where mortar cures, when bricks were
-    in their places, s.
+    robots of all grips by then, the last one first; ``placed``: where mortar cures, when bricks
+    were in their places, s.
     """
 
     end: float

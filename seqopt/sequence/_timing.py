@@ -107,6 +107,8 @@ def step_times(
             acts = own.place if placing else own.grip
         cures, joint = (None, "") if waits is None else waits(step, placed, start)
         start = start if cures is None else cures
+        if start == math.inf:
+            raise StepError(_never(step))
         now = start + acts
         times = step.number, acting, prepares, ready, start, now
         out.append(StepTime(*times, cures, joint))
@@ -115,6 +117,15 @@ def step_times(
             free |= dict.fromkeys(acting, now)
         before = step.grips
     return tuple(out)
+
+
+def _never(step: AnyStep) -> str:
+    """Return why a step is never done."""
+    if step.kind is StepKind.PLACE:
+        why = "before the joints that it closes have any bond; no wait helps, but more grips may"
+    else:
+        why = "with all mortar cured; no wait helps, but more grips may"
+    return f"step {step.number} ({step.kind.value}): it is not proven to stand {why}"
 
 
 def way_seconds(scene: Scene, own: Durations, last: object, node: object) -> float:

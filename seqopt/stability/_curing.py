@@ -1,12 +1,13 @@
 """Builds whose mortar cures: what bonds joints have when, and from when on a state stands.
 
 A joint's age counts from the end of the step that places the brick which closes it. Bonds only
-grow, so a state that stands with what its joints have when it begins stands for as long as it lasts.
+grow, so a state that stands with what its joints have when it begins stands while it lasts.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -16,9 +17,9 @@ from seqopt.contact.assembly import Assembly
 from seqopt.contact.curing import Curing
 from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar
-from seqopt.errors import SceneError, StepError
+from seqopt.errors import SceneError
 from seqopt.network.network import Network
-from seqopt.sequence.steps import AnyStep, Grips, StepKind
+from seqopt.sequence.steps import AnyStep, Grips
 from seqopt.stability._prover import Proven
 from seqopt.stability._verdict_chain import VerdictChain
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
@@ -51,6 +52,14 @@ class JointsInTime:
         for row, own in enumerate(points):
             for k, (age, share) in enumerate(own):
                 self.ages[row, k], self.shares[row, k] = age, share
+
+    @cached_property
+    def full(self) -> Floats:
+        """At which age all joints that a brick closes have their full bond, (b,), s."""
+        last = np.where(np.isfinite(self.ages), self.ages, 0.0).max(axis=1, initial=0.0)
+        out = np.zeros(int(self.closing.max(initial=-1)) + 1)
+        np.maximum.at(out, self.closing, last)
+        return out
 
     def count(self, bricks: int) -> int:
         """Return how many joints so many bricks have."""
@@ -110,7 +119,7 @@ class CuringBuilds:
         """Return from when on the state of a step stands, no sooner than at a time, s.
 
         ``placed``: when bricks were in their places, in build order. Beside it the joint whose bond
-        was the last that was missing, empty if none was. Raises `StepError` if no wait is enough.
+        was the last that was missing, empty if none was; never, if no wait is enough.
         """
         bricks, rows = step.bricks, np.full((1, step.bricks), np.inf)
         rows[0, : len(placed[:bricks])] = placed[:bricks]
@@ -125,23 +134,19 @@ class CuringBuilds:
             middle = (low + high) // 2
             low, high = (low, middle) if self._stands(step, times[middle], rows) else (middle, high)
         if high == len(times):
-            raise StepError(_never(step))
+            return np.inf, ""
         per_joint = self.joints.ages.shape[1]
         joint = int(np.flatnonzero(events == times[high])[0]) // per_joint
         return float(times[high]), self.joints.names[joint]
 
+    @property
+    def motions(self) -> tuple[Floats, ...]:
+        """The motions (b, 6) in which states were found to fall, m and rad."""
+        return tuple(motion for _, motion in self._found.values() if motion is not None)
+
     def _stands(self, step: AnyStep, time: float, placed: Floats) -> bool:
         bond = self.joints.at(step.bricks, np.array([time]), placed)[0]
         return self.verdict(step.bricks, step.grips, bond)[0] is Verdict.STANDS
-
-
-def _never(step: AnyStep) -> str:
-    """Return why a step is never done."""
-    if step.kind is StepKind.PLACE:
-        why = "before the joints that it closes have any bond; no wait helps, but more grips may"
-    else:
-        why = "with all mortar cured; no wait helps, but more grips may"
-    return f"step {step.number} ({step.kind.value}): it is not proven to stand {why}"
 
 
 def _motion(assembly: Assembly, proven: Proven) -> Floats | None:
