@@ -23,6 +23,7 @@ from formulations.states._search import (
     plan_by_then,
     watched,
 )
+from formulations.times._curing import Waits, require_cured
 from formulations.times._labels import STEPS, Caps, Labels, LateError, Sweep, Swept
 from formulations.times._prices import Prices, best_prices
 from seqopt.arrays import Bools, Terse
@@ -31,14 +32,12 @@ from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph._timed import LabelProof, TimedGraph, timed_graph
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, keep_best, reached, tied
-from seqopt.graph.states._visits import FreeStates, steps_of
+from seqopt.graph.states._visits import FreeStates
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.problem.problem import Measure
-from seqopt.sequence._reassign import reassigned_steps
-from seqopt.sequence._rule_space import FreeSpace, node_numbers
-from seqopt.sequence._timing import step_times
+from seqopt.stability._fall_cuts import FallCuts
 from seqopt.work.progress import Tell
 
 BEAMS = (100, 1000, 5000)  # widths of the searches for a first path
@@ -120,17 +119,24 @@ def beams(
 class Stages:
     """Goals of a problem one after the other, on a graph in time."""
 
-    def __init__(self, problem: States, visited: Visited, choose: Choose, watch: Watch) -> None:
+    def __init__(
+        self,
+        problem: States,
+        visited: Visited,
+        choose: Choose,
+        watch: Watch,
+        cuts: FallCuts | None = None,
+    ) -> None:
         self._problem, self._choose, self._watch = problem, choose, watch
         self._visited = visited
-        self._timed = timed_graph(problem, visited)
+        self._timed = timed_graph(problem, visited, cuts)
         graph = self._timed.graph
         budgets = dict(enumerate(problem.budgets, start=len(problem.aims)))
         is_time = {k: problem.goals[k].measure is Measure.MAKESPAN for k in budgets}
         time = min((tied(cap) for k, cap in budgets.items() if is_time[k]), default=np.inf)
         sums = tuple((k, tied(cap)) for k, cap in budgets.items() if not is_time[k])
         kept = _on_paths(graph, np.ones(len(graph.source), dtype=bool))
-        self._stage = _Stage(kept, Caps(time, sums), filtered=not budgets)
+        self._stage = _Stage(kept, Caps(time, sums), filtered=not budgets and cuts is None)
 
     def run(self) -> _Stage:
         """Return what is found; raise an `InfeasibleError` if no path is within all caps."""
@@ -276,6 +282,15 @@ class Stages:
         amounts = graph.amounts[np.searchsorted(codes, wanted), k]
         return float(amounts.max(initial=0.0) if graph.peaks[k] else amounts.sum())
 
+    def least(self, path: Sequence[int]) -> float:
+        """Return how long a path takes by all that is known of its waits, s."""
+        graph = self._timed.graph
+        codes = graph.source.astype(np.int64) * graph.states + graph.target
+        wanted = [a * graph.states + b for a, b in pairwise((0, *path))]
+        kept = np.isin(codes, wanted)
+        prices = best_prices(self._timed, kept, Watch(0.0))
+        return Sweep(self._timed, prices, kept, Caps()).run(Watch()).best
+
     def values(self, path: Sequence[int]) -> list[float]:
         """Return what goals take of a path, that of makespans left at zero."""
         return [self._taken(path, k) for k in range(len(self._problem.goals))]
@@ -289,7 +304,7 @@ class Stages:
         if not labels:
             none = np.zeros((0, 1 + columns))
             return LabelProof(np.zeros((0, 1 + rows.shape[1]), dtype=np.int64), none, each)
-        parts = [np.column_stack([own.end, own.since, own.sums]) for own in labels]
+        parts = [np.column_stack([own.end, own.since, own.sums, own.placed]) for own in labels]
         state = np.concatenate([own.state for own in labels])
         states = np.column_stack([self._timed.levels[state], rows[state]])
         return LabelProof(states, np.concatenate(parts), each)
@@ -307,6 +322,8 @@ class _InTime(Terse):
     """The ``solve`` of a formulation of time."""
 
     choose: Choose = field(repr=False)
+    name: str
+    cures: bool
 
     def __call__(
         self,
@@ -317,6 +334,7 @@ class _InTime(Terse):
         progress: Tell = lambda _: None,
     ) -> StatePath:
         """Return the plan of the chosen path; where time or memory ends early, the best so far."""
+        require_cured(problem, self.name, cures=self.cures)
         watch = Watch(seconds)
         tell = watched(problem, watch, max_memory, progress)
         return after_margins(
@@ -328,7 +346,7 @@ def _searched(
     problem: States, choose: Choose, watch: Watch, tell: Watching, progress: Tell
 ) -> StatePath:
     """Return the best plan of states that stand as is demanded."""
-    first = None
+    first, waits, best = None, Waits(problem), list[StatePath]()
     try:
         first = narrow(problem, WIDTH, tell)
         wide = Explorer(FreeStates(problem), tell=tell)
@@ -339,12 +357,23 @@ def _searched(
             wide.refine()
             progress("makespan")
             visited = wide.graph()
-            stages = Stages(problem, visited, choose, watch)
+            stages = Stages(problem, visited, choose, watch, waits.cuts)
             found = stages.run()
-            if not _fell(problem, wide, visited, found.path):
-                return _plan(problem, visited, stages, found)
+            if _fell(problem, wide, visited, found.path):
+                continue
+            plan = _plan(problem, visited, stages, found, waits)
+            best += [] if plan is None else [plan]
+            if plan is not None and (found.late or _is_known(stages, found, plan, waits)):
+                return _least_of(best, plan.bound, plan.stopped)
+            if not waits.learn():
+                break
+        if best:
+            return _least_of(best, best[-1].bound)
     except (StopError, KeyboardInterrupt) as stop:
-        return _by_then(problem, first, stop)
+        if best:
+            ended = "interrupt" if isinstance(stop, KeyboardInterrupt) else str(stop)
+            return _least_of(best, best[-1].bound, ended)
+        return _by_then(problem, first, stop, waits)
     raise InfeasibleError("no plan is allowed")
 
 
@@ -358,12 +387,31 @@ def _fell(problem: States, wide: Explorer, visited: Visited, path: Sequence[int]
     return fell
 
 
-def _plan(problem: States, visited: Visited, stages: Stages, found: _Stage) -> StatePath:
-    """Return a path as a plan, by the robots that are soonest done."""
+def _is_known(stages: Stages, found: _Stage, plan: StatePath, waits: Waits) -> bool:
+    """Return whether a plan takes no longer than is known of its path."""
+    return waits.cuts is None or plan.ends <= stages.least(found.path) * (1 + ALMOST)
+
+
+def _least_of(plans: Sequence[StatePath], bound: tuple[float, ...], stopped: str = "") -> StatePath:
+    """Return the best of some plans with bounds that hold for all."""
+    best = min(plans, key=lambda plan: plan.objective)
+    bounds, open_ = list[float](), True
+    for value, least in zip(best.objective, bound, strict=True):
+        bounds.append(min(value, least) if open_ else -np.inf)
+        open_ &= least >= value * (1 - ALMOST)
+    return replace(best, bound=tuple(bounds), stopped=stopped, proofs=plans[-1].proofs)
+
+
+def _plan(
+    problem: States, visited: Visited, stages: Stages, found: _Stage, waits: Waits
+) -> StatePath | None:
+    """Return a path as a plan, by the robots that are soonest done; None if mortar forbids it."""
     states = tuple((level, *state.tolist()) for level, _, state in visited.of(found.path))
-    grips, makespan = _soonest(problem, states)
+    soonest = waits.try_soonest(problem, states)
+    if soonest is None:
+        return None
     values = [
-        makespan if goal.measure is Measure.MAKESPAN else value
+        soonest.makespan if goal.measure is Measure.MAKESPAN else value
         for goal, value in zip(problem.goals, stages.values(found.path), strict=True)
     ]
     bounds = [min(b, v) for b, v in zip(found.bounds, values, strict=False)]
@@ -376,40 +424,38 @@ def _plan(problem: States, visited: Visited, stages: Stages, found: _Stage) -> S
         tuple(bounds),
         hint,
         stopped=late,
-        grips=grips,
+        grips=soonest.grips,
         proofs=(*found.proofs,),
+        starts=soonest.starts,
+        ends=soonest.makespan,
+        motions=() if waits.cuts is None else waits.cuts.motions,
     )
 
 
-def _soonest(
-    problem: States, states: Sequence[Sequence[int]]
-) -> tuple[tuple[tuple[int, ...], ...], float]:
-    """Return who of a kind acts so that a plan takes least: places held by robots, and how long."""
-    space, scene = problem.space, problem.network.scene
-    steps = steps_of(space, states)
-    if not isinstance(space, FreeSpace):
-        return (), step_times(scene, steps)[-1].end
-    kind = {robot: k for k, each in enumerate(space.kinds) for robot in each.robots}
-    steps = reassigned_steps(scene, steps, lambda r, hold: kind[r] == kind[hold.robot], [*kind])
-    place = {node: i for i, node in enumerate(node_numbers(space.network), start=1)}
-    grips = tuple(tuple(0 if n is None else place[n] for n in step.grips) for step in steps)
-    return grips, step_times(scene, steps)[-1].end
-
-
 def _by_then(
-    problem: States, first: StatePath | None, stop: StopError | KeyboardInterrupt
+    problem: States, first: StatePath | None, stop: StopError | KeyboardInterrupt, waits: Waits
 ) -> StatePath:
     """Return a first plan with its makespan; raise an error if there is none that keeps caps."""
     found = plan_by_then(first, stop)
-    grips, makespan = _soonest(problem, found.states)
+    soonest = waits.try_soonest(problem, found.states)
+    if soonest is None:
+        raise TimeUpError("no plan that stands while mortar cures was found yet; give more")
     pairs = zip(problem.goals, found.objective, strict=True)
-    values = tuple(makespan if g.measure is Measure.MAKESPAN else v for g, v in pairs)
+    values = tuple(soonest.makespan if g.measure is Measure.MAKESPAN else v for g, v in pairs)
     for value, cap in zip(values[len(problem.aims) :], problem.budgets, strict=True):
         if value > tied(cap):
             raise TimeUpError("no plan within all budgets was found yet; give more")
-    return replace(found, objective=values, grips=grips)
+    return replace(
+        found, objective=values, grips=soonest.grips, starts=soonest.starts, ends=soonest.makespan
+    )
 
 
-def in_time(name: str, summary: str, kind: FormulationKind, choose: Choose) -> Formulation:
-    """Return the formulation of time that chooses a path by a function of an `Asked`."""
-    return Formulation(name, summary, kind, None, _InTime(choose), on=On.TIMES, takes_budgets=True)
+def in_time(
+    name: str, summary: str, kind: FormulationKind, choose: Choose, *, cures: bool = False
+) -> Formulation:
+    """Return the formulation of time that chooses a path by a function of an `Asked`.
+
+    ``cures``: whether it knows mortar that cures.
+    """
+    solve = _InTime(choose, name, cures)
+    return Formulation(name, summary, kind, None, solve, on=On.TIMES, takes_budgets=True)

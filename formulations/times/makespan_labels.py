@@ -78,4 +78,5 @@ FORMULATION = in_time(
     "labels of time and readiness, bounded by prices of the robots' time",
     FormulationKind.EXACT,
     _least,
+    cures=True,
 )

@@ -86,7 +86,12 @@ def _selected(
     solve = partial(formulation.solve, problem, **options)
     try:
         selection = called(name, partial(_judged, problem), StatePath, solve)
-    except InfeasibleError:
+    except InfeasibleError as error:
+        if problem.standing is not None and problem.standing.curing is not None:
+            raise InfeasibleError(
+                f"claimed by {name}, and not proven: {error}, in which states stand while mortar "
+                "cures; more robots may help, or mortar with a share of its bond at 0 s"
+            ) from None
         left = float(options.get("seconds", math.inf)) - (time.perf_counter() - start)
         raise confirmed(twin, name, left) from None
     for kept in [*vars(problem)]:  # whatever it left behind, but counts of what was computed

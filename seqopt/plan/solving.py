@@ -228,6 +228,10 @@ def _states(problem: Problem) -> States:
         raise ProblemError("aim makespan: a build in time begins on an empty site; leave from out")
     if caps := parse_caps(problem.budgets):
         found = within(found, caps)
+    if found.standing is not None and found.standing.curing is not None and not found.is_timed:
+        raise ProblemError(
+            "curing: it says how long steps wait; add makespan to the aims, as makespan,steps"
+        )
     return over_scenarios(found, problem.scenarios, over) if problem.scenarios else found
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from seqopt.arrays import Floats, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.curing import Curing
 from seqopt.contact.faces import Contacts, step_assembly
@@ -16,6 +17,7 @@ from seqopt.problem.standing import Standing
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability.assessment import Verdict, verdict
 
+Grips = tuple[Ints, Floats]
 CLOSE = 1e-9  # of a time: what rounding may take from an age
 
 

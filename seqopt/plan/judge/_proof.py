@@ -22,8 +22,10 @@ from seqopt.graph.paths import lexicographic, reached, tied
 from seqopt.graph.states._visits import move_amounts
 from seqopt.graph.states.states import States
 from seqopt.plan.judge._answers import ask
+from seqopt.plan.judge._floors import Floors
 from seqopt.plan.judge._rule_moves import Follows, RuleTables, ScheduleTables, _alike
 from seqopt.plan.judge._standing_proof import StandingProof
+from seqopt.plan.judge._time_proof import CuredRows
 from seqopt.plan.judge._timed_goals import Claim, GoalProofs, TimedStates
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Measure
@@ -165,6 +167,10 @@ class Passable:
         """Return which states (n, c) are not proven to fall, or to lack margins of first goals."""
         held = self._held(states, self._payload)
         return self.stands.allows_rows(self.tables.bricks_at(level), *held, margins)
+
+    def held_by(self, states: Ints) -> tuple[Ints, Floats]:
+        """Return nodes that robots hold where states must stand, ascending, and the most forces."""
+        return self._held(states, self._payload)
 
     def recalled(self, level: int, states: Ints, margins: Sequence[float]) -> Ints:
         """Return the same by what is known: -1 where it is proven, else 0 or 1."""
@@ -322,8 +328,10 @@ class Proof:
                 return np.zeros(len(rows), dtype=bool)
             return ~passable.may_stand(level, rows, margins)
 
+        cured = levels.cured(claim.motions)
         while True:
-            states = TimedStates(passable.problem, passable.tables, levels.states, graph, fallen)
+            own = passable.tables, levels.states, graph, fallen, cured
+            states = TimedStates(passable.problem, *own)
             proofs = GoalProofs(states, claim)
             out = (*values[:k], *proofs.bounds(k))
             early = [b < v - BELOW * abs(v) for b, v in zip(out, values, strict=False)]
@@ -457,6 +465,19 @@ class _Levels:
         self.states.append(part.states)
         self._ends.append(tables.ends(level, part.states))
         return [pair for pair in moves if pair[1].level > level]
+
+    def cured(self, motions: Sequence[Floats]) -> CuredRows | None:
+        """Return what states ask of mortar; None where none cures."""
+        problem, tables = self._passable.problem, self._passable.tables
+        standing = problem.standing
+        if standing is None or standing.curing is None:
+            return None
+        bricks = [tables.bricks_at(level) if level else 0 for level in self.levels]
+        count = [len(rows) for rows in self.states]
+        grips = [self._passable.held_by(rows) for rows in self.states]
+        held, payload = (np.concatenate([each[k] for each in grips]) for k in (0, 1))
+        floors = Floors(problem.network, standing, motions)
+        return CuredRows(floors, np.repeat(bricks, count), held, payload)
 
     def graph(self) -> Graph:
         """Return them as a graph; the moves are then used up."""

@@ -20,6 +20,7 @@ from seqopt.errors import SolverError
 from seqopt.graph.duality import _to_go
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import TIED
+from seqopt.plan.judge._floors import Floors
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind
 
@@ -96,14 +97,38 @@ class Limits:
     strict: Bools
 
 
+class CuredRows(NamedTuple):
+    """What rows of states ask of mortar that cures.
+
+    ``floors``: under waits; ``bricks`` (n,): that stand; ``held``, ``payload`` (n, r): grips.
+    """
+
+    floors: Floors
+    bricks: Ints
+    held: Ints
+    payload: Floats
+
+    def starts(self, state: Ints, placed: Floats, start: Floats) -> Floats:
+        """Return from when on, no sooner than times (k,), s, states may begin; see `Floors`."""
+        out = start.copy()
+        for bricks in np.unique(self.bricks[state]).tolist():
+            rows = np.flatnonzero(self.bricks[state] == bricks)
+            grips = self.held[state[rows]], self.payload[state[rows]]
+            out[rows] = self.floors.starts(bricks, grips, placed[rows], start[rows])
+        return out
+
+
 class TimedMoves:
     """Moves between rows of states, and what they take of the time of robots.
 
     ``rows`` (n, c): states by their numbers in the graph; ``places`` (m,): which moves place.
     """
 
-    def __init__(self, graph: Graph, rows: Ints, places: Bools, team: Team) -> None:
+    def __init__(
+        self, graph: Graph, rows: Ints, places: Bools, team: Team, cured: CuredRows | None = None
+    ) -> None:
         self.graph, self.rows, self._places, self.team = graph, rows, places, team
+        self.cured = cured
         before, after = rows[graph.source], rows[graph.target]
         self.gains = np.zeros(
             after.shape, dtype=np.int64
@@ -169,15 +194,23 @@ class TimedMoves:
         return out
 
     def follow(
-        self, moves: Ints, column: int | None, end: Floats, since: Floats
-    ) -> tuple[Floats, Floats]:
+        self, moves: Ints, column: int | None, end: Floats, since: Floats, placed: Floats
+    ) -> tuple[Floats, Floats, Floats]:
         """Return labels after moves (k,): when they end (k,), and since when robots are free.
 
-        ``column``: who takes the grip, None where robots let go; ``end`` (k,), ``since`` (k, c): of
-        the labels before. Results: ``end`` (k,); ``since`` (k, c), sorted where robots are alike.
+        ``column``: who takes the grip, None where robots let go; ``end`` (k,), ``since`` (k, c),
+        ``placed`` (k, b): of the labels before. Results: ``end`` (k,), infinite where mortar never
+        lets it; ``since`` (k, c), sorted where robots are alike; ``placed`` (k, b).
         """
         ready, acts = self.seconds(moves, column)
         begins = end if column is None else np.maximum(end, since[:, column] + ready)
+        if self.cured is not None:
+            placed = placed.copy()
+            own = np.flatnonzero(self._places[moves])
+            brick = self.cured.bricks[self.graph.target[moves[own]]] - 1
+            placed[own, brick] = np.inf
+            begins = self.cured.starts(self.graph.target[moves], placed, begins)
+            placed[own, brick] = begins[own] + acts[own]
         ends = begins + acts
         entries, free = self.rows[self.graph.source[moves]].copy(), since.copy()
         loses = self._loses[moves]
@@ -186,7 +219,7 @@ class TimedMoves:
         if column is not None:
             group = next(g for g in self.team.groups if column in g)
             entries[:, column], free[:, column] = self.gains[moves, group[0]], 0.0
-        return ends, self.sorted(entries, free)
+        return ends, self.sorted(entries, free), placed
 
     def sorted(self, entries: Ints, since: Floats) -> Floats:
         """Return readiness (k, c) in the order of sorted entries (k, c), of equal ones as well."""
@@ -254,11 +287,14 @@ class Closed:
             takes = able.releases(move) if column is None else able.candidates(move, column)
             own, which = move[takes], label[takes]
             values = known[1][which]
-            end, since = able.follow(own, column, values[:, 0], values[:, 1 : 1 + columns])
-            sums = values[:, 1 + columns :] + self._amounts[own]
+            last = 1 + columns + self._amounts.shape[1]
+            before = values[:, 0], values[:, 1 : 1 + columns], values[:, last:]
+            end, since, placed = able.follow(own, column, *before)
+            sums = values[:, 1 + columns : last] + self._amounts[own]
             to = self._moves.graph.target[own].astype(np.int64)
-            after = np.column_stack([end, since, sums])
-            out.append(to[self._lacks(known, to, after)])
+            after = np.column_stack([end, since, sums, placed])
+            ever = np.isfinite(end)
+            out.append(to[ever][self._lacks(known, to[ever], after[ever])])
         return np.concatenate(out)
 
     def _open(self, state: Ints, values: Floats) -> Bools:
@@ -272,7 +308,8 @@ class Closed:
         for prices, left in zip(self._prices, self._left, strict=True):
             bound = prices[0] * end + busy @ prices[1:] + left[state]
             ends = np.where(over, ends, np.maximum(ends, bound))
-        bounds = np.column_stack([ends, values[:, 1 + columns :] + self._sums[state]])
+        sums = values[:, 1 + columns : 1 + columns + self._amounts.shape[1]]
+        bounds = np.column_stack([ends, sums + self._sums[state]])
         most = np.array([self._limits.time, *self._limits.sums])
         slack = 1e-12 * np.abs(most)
         beyond = np.where(self._limits.strict, bounds >= most - slack, bounds > most)
@@ -290,6 +327,12 @@ class Closed:
         counted = values.copy()
         own = values[:, 1 : 1 + columns]
         counted[:, 1 : 1 + columns] = np.where(free, np.maximum(own, later), 0.0)
+        cured = self._moves.cured
+        if cured is not None:  # what has its full bond could as well be older
+            last = 1 + columns + self._amounts.shape[1]
+            older = np.maximum(values[:, last:], values[:, [0]] - cured.floors.full)
+            stands = np.arange(older.shape[1]) < cured.bricks[state][:, None]
+            counted[:, last:] = np.where(stands, older, 0.0)
         out = self._open(state, counted)
         rows = np.flatnonzero(out & ~self._moves.graph.ends[state])
         place, end = (np.searchsorted(known[0], state[rows], side=s) for s in ("left", "right"))
