@@ -140,6 +140,8 @@ class Stages:
 
     def run(self) -> _Stage:
         """Return what is found; raise an `InfeasibleError` if no path is within all caps."""
+        if not self._stage.kept.any():
+            raise InfeasibleError("no plan is allowed")
         for k, goal in enumerate(self._problem.aims):
             if self._stage.late:
                 self._stage.bounds.append(-np.inf)
@@ -399,7 +401,10 @@ def _least_of(plans: Sequence[StatePath], bound: tuple[float, ...], stopped: str
     for value, least in zip(best.objective, bound, strict=True):
         bounds.append(min(value, least) if open_ else -np.inf)
         open_ &= least >= value * (1 - ALMOST)
-    return replace(best, bound=tuple(bounds), stopped=stopped, proofs=plans[-1].proofs)
+    last = plans[-1]
+    return replace(
+        best, bound=tuple(bounds), stopped=stopped, proofs=last.proofs, motions=last.motions
+    )
 
 
 def _plan(

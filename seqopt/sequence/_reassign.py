@@ -6,6 +6,7 @@ has the grips that are held, when the last step ended, and since when every othe
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, TypeVar
@@ -64,12 +65,13 @@ def reassigned_steps(
         for label in labels:
             if ended:
                 ready = _cured(label, step, label.end, waits)
-                found.append(_let_go(ready, [label.has.index(i) for i in ended], own))
+                if ready.end < math.inf:
+                    found.append(_let_go(ready, [label.has.index(i) for i in ended], own))
                 continue
             for i in begun:
                 able = [r for r in team if label.has[r] == FREE and may(r, every[i])]
-                for r in able:
-                    found.append(_take(scene, label, (r, i, every[i]), own[r], (step, waits)))
+                after = [_take(scene, label, (r, i, every[i]), own[r], (step, waits)) for r in able]
+                found += [each for each in after if each.end < math.inf]
         labels = _undominated(found, moves=moves)
     if not labels:
         raise StepError("no robot may have a grip of the steps; nobody can be reassigned")
