@@ -89,8 +89,8 @@ def _selected(
     except InfeasibleError as error:
         if problem.standing is not None and problem.standing.curing is not None:
             raise InfeasibleError(
-                f"claimed by {name}, and not proven: {error}, in which states stand while mortar "
-                "cures; more robots may help, or mortar with a share of its bond at 0 s"
+                f"claimed by {name}, and not proven: {error} in which all states stand while "
+                "mortar cures; more robots may help, or mortar with some bond from 0 s on"
             ) from None
         left = float(options.get("seconds", math.inf)) - (time.perf_counter() - start)
         raise confirmed(twin, name, left) from None
