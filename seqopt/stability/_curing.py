@@ -19,7 +19,7 @@ from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
-from seqopt.sequence.steps import AnyStep, Grips
+from seqopt.sequence.steps import AnyStep, Grips, Step
 from seqopt.stability._prover import Proven
 from seqopt.stability._verdict_chain import VerdictChain
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
@@ -99,7 +99,7 @@ class CuringBuilds:
         self._found: dict[tuple[int, Grips, bytes], tuple[Verdict, Floats | None]] = {}
         self.asked = 0
 
-    def _bonded(self, bricks: int, grips: Sequence[int | None]) -> Assembly:
+    def _bonded(self, bricks: int, grips: Grips) -> Assembly:
         return self._parts(bricks, grips).with_bond(self._bond)
 
     def verdict(self, bricks: int, grips: Grips, bond: Floats) -> tuple[Verdict, Floats | None]:
@@ -146,6 +146,7 @@ class CuringBuilds:
 
     def _stands(self, step: AnyStep, time: float, placed: Floats) -> bool:
         bond = self.joints.at(step.bricks, np.array([time]), placed)[0]
+        assert isinstance(step, Step)  # of a plan: no grip is open
         return self.verdict(step.bricks, step.grips, bond)[0] is Verdict.STANDS
 
 

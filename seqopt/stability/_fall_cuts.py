@@ -76,7 +76,8 @@ class FallCuts:
         tip = cohesion / case.friction if case.friction else np.full_like(tension, np.inf)
         corner = cohesion * np.linalg.norm(parting[:, 1:], axis=1)
         corner = corner + np.minimum(tension, tip) * np.maximum(opening, 0.0)
-        taken = np.bincount(assembly.contact, corner, minlength=len(assembly.bodies))
+        taken = np.zeros(len(assembly.bodies))
+        np.add.at(taken, assembly.contact, corner)
         work = float(case.loads(assembly)[0] @ flat)
         speed = np.linalg.norm((assembly.grip_map.T @ flat).reshape(-1, 3), axis=1)
         force = assembly.scales[0]

@@ -186,9 +186,9 @@ def plan_values(
     """Return what goals take of a sequence, from the responses of its steps.
 
     ``claimed``: the value of every goal; margins of stability are compared with these, and taken
-    from them; ``starts``: where mortar cures, when steps start, s. Result: SI units. Over scenarios the largest, but ways, which are those of the scene
-    itself. Raises `SolverError` if a step exceeds a limit, does not stand as is demanded, or has
-    less of a margin.
+    from them; ``starts``: where mortar cures, when steps start, s. Result: SI units. Over scenarios
+    the largest, but ways, which are those of the scene itself. Raises `SolverError` if a step
+    exceeds a limit, does not stand as is demanded, or has less of a margin.
     """
     if problem.each:
         return _in_all(problem, steps, [plan_values(each, steps, claimed) for each in problem.each])
