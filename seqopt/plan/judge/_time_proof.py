@@ -209,7 +209,8 @@ class TimedMoves:
             own = np.flatnonzero(self._places[moves])
             brick = self.cured.bricks[self.graph.target[moves[own]]] - 1
             placed[own, brick] = np.inf
-            begins = self.cured.starts(self.graph.target[moves], placed, begins)
+            to = self.graph.target[moves].astype(np.int64)
+            begins = self.cured.starts(to, placed, begins)
             placed[own, brick] = begins[own] + acts[own]
         ends = begins + acts
         entries, free = self.rows[self.graph.source[moves]].copy(), since.copy()
@@ -276,7 +277,19 @@ class Closed:
         for block in _blocks(known[0], graph):
             missing.append(self._leads_to(known, *block))
         left = np.unique(np.concatenate(missing))
-        return bool(excused(left).all()) if len(left) else True, len(known[0])
+        return self._are_dead(left, excused), len(known[0])
+
+    def _are_dead(self, states: Ints, excused: Callable[[Ints], Bools]) -> bool:
+        """Return whether all ways from some states to an end pass one that is proven to fall."""
+        graph, seen = self._moves.graph, np.zeros(self._moves.graph.states, dtype=bool)
+        while len(states):
+            seen[states] = True
+            states = states[~excused(states)]
+            if graph.ends[states].any():
+                return False
+            after = np.unique(graph.target[np.isin(graph.source, states)]).astype(np.int64)
+            states = after[~seen[after]]
+        return True
 
     def _leads_to(self, known: tuple[Ints, Floats], label: Ints, move: Ints) -> Ints:
         """Return states of what follows from labels by moves, (k,) each, that none is below."""

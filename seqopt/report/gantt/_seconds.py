@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -62,8 +61,9 @@ def seconds_picture(
             _label(axes, scene, hold, (stops[0][0], stops[-1][1], inch))
     for time in times[first - 1 : last]:
         _prepared(axes, time)
-    cured = [pair for pair in pairwise((None, *times)) if pair[1] in times[first - 1 : last]]
-    spans = [span for pair in cured if (span := _cured(*pair)) is not None]
+    ends = [0.0, *(time.end for time in times)]
+    pairs = zip(ends[first - 1 : last], times[first - 1 : last], strict=True)
+    spans = [span for end, time in pairs if (span := _cured(end, time)) is not None]
     for span in spans:
         axes.axvspan(*span, fc=CURES, lw=0, zorder=0, gid="cures")
     _frame(axes, scene, (begin, end), cures=bool(spans))
@@ -83,9 +83,9 @@ def _bar(axes: Axes, hold: Hold, stops: Sequence[tuple[float, float]], colors: n
         axes.plot([begin] * 2, [low, low + LANE], color=DARK, lw=3.2)
 
 
-def _cured(before: StepTime | None, time: StepTime) -> tuple[float, float] | None:
-    """Return from when to when a step waits for mortar alone, s; None where it does not."""
-    ready = max(0.0 if before is None else before.end, time.ready or 0.0)
+def _cured(before: float, time: StepTime) -> tuple[float, float] | None:
+    """Return from when to when a step after an end waits for mortar alone, s, if it does."""
+    ready = max(before, time.ready or 0.0)
     return (ready, time.start) if time.joint and time.start > ready else None
 
 
