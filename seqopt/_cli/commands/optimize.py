@@ -21,6 +21,7 @@ from seqopt._cli.asked import (
     refused,
     scene_facts,
     strictly,
+    waits_said,
 )
 from seqopt._cli.options import (
     CURING,
@@ -291,6 +292,7 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
     stopped = plan.ended is End.INTERRUPTED
     over = () if stopped else exceeded(scene, table)
     lines = [f"{_said(found)}; {written_to(options.out)}"]
+    lines += map(wrapped, waits_said(plan) if plan.certificate is not None else ())
     lines += [f"stability, {each}" for each in found.own]
     lines += [wrapped(each.said) for each in (found.bases, found.props) if each is not None]
     lines += [wrapped(found.whole)] if found.whole else []

@@ -6,7 +6,14 @@ import argparse
 from collections.abc import Iterator
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import asked_scene, asked_steps, idle_notes, in_seconds, scene_facts
+from seqopt._cli.asked import (
+    asked_scene,
+    asked_steps,
+    idle_notes,
+    in_seconds,
+    scene_facts,
+    waits_said,
+)
 from seqopt._cli.options import (
     CURING,
     DURATIONS,
@@ -75,7 +82,10 @@ def run(options: argparse.Namespace) -> Answer:
         least = build.times()["end_s"].iloc[-1]
     written = write_outputs(options, lambda: time_files(build))
     busy = busy_table(scene, build.steps, build._waits)
-    lines = [*_said(scene.name, len(steps), float(given), least), *_cured(build)]
+    if build.standing is not None:
+        starts = build.times()["start_s"].tolist()
+        check_cured(build.engine.network, build.steps, build.standing, starts)
+    lines = [*_said(scene.name, len(steps), float(given), least), *waits_said(build)]
     for row in busy.to_dict("records"):
         spent = (
             f"{what} {row[f'{what}_s']:.6g} s" for what in ("prepares", "acts", "holds", "idle")
@@ -100,28 +110,6 @@ def _standing(options: argparse.Namespace) -> Standing | None:
     if standing is not None and not options.curing:
         raise ProblemError("--stands: it goes with --curing here; seqopt assess says what stands")
     return standing
-
-
-def _cured(build: GivenSequence) -> Iterator[str]:
-    """Yield how long a build waits for mortar, and for which joints the longest."""
-    if build.standing is None:
-        return
-    table = build.times()
-    check_cured(build.engine.network, build.steps, build.standing, table["start_s"].tolist())
-    waits = table[table.get("cures_s", table["waits_s"] * 0.0) > 0]
-    if not len(waits):
-        yield "no step waits for mortar"
-        return
-    yield (
-        f"of these {waits['cures_s'].sum():.6g} s are waits for mortar, in {len(waits)} "
-        f"step{'s' * (len(waits) > 1)}; the longest:"
-    )
-    for row in waits.nlargest(3, "cures_s").to_dict("records"):
-        yield (
-            f"  step {row['step']} ({row['type']}) waits {row['cures_s']:.6g} s for joint "
-            f"{row['joint']}"
-        )
-    yield "every state is proven to stand with the bond that its joints have when it begins"
 
 
 def _said(name: str, steps: int, given: float, least: float | None) -> Iterator[str]:

@@ -15,6 +15,7 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
 from seqopt.graph.scenarios import engine_for, require_alike
 from seqopt.network.network import Network
+from seqopt.problem._cures import require_for_curing
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.problem import (
     LARGEST,
@@ -491,30 +492,17 @@ def over_scenarios(
     for number, scene in enumerate(scenes, start=1):
         require_alike(problem.network.scene, scene, number)
     engines = tuple(engine_for(problem.engine, scene) for scene in scenes)
-    out = replace(problem, scenarios=engines, over=over)
-    _require_for_curing(out)
-    return out
+    return _asked(replace(problem, scenarios=engines, over=over))
 
 
 def _asked(problem: States) -> States:
     """Return a problem whose stability can be asked, where it will be."""
     if problem.standing is not None or any(goal.of_margins for goal in problem.goals):
         _ = problem.stability  # what cannot be asked is refused now
-    _require_for_curing(problem)
     if problem.is_timed:
         require_for_makespan(problem.network.scene, problem.rules)
+    require_for_curing(problem)
     return problem
-
-
-def _require_for_curing(problem: States) -> None:
-    """Raise a `ProblemError` where mortar cures and what is asked beside it is not modeled."""
-    if problem.standing is None or problem.standing.curing is None:
-        return
-    wrong = [str(goal) for goal in problem.goals if goal.of_margins]
-    wrong += ["props"] if problem.network.scene.props else []
-    wrong += ["scenarios"] if problem.scenarios else []
-    if wrong:
-        raise ProblemError(f"curing: {wrong[0]} beside it is not modeled; leave one of them out")
 
 
 def _checked(limits: Sequence[Limit], network: Network) -> tuple[Limit, ...]:
