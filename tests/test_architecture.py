@@ -48,6 +48,7 @@ SHARED = {  # what formulations may import
     "formulations.times._curing",
     "formulations.times._labels",
     "formulations.times._prices",
+    "formulations.times._search",
     "formulations.times._stages",
     "formulations.states._totals",
 }

@@ -13,11 +13,11 @@ from typing import NamedTuple
 from seqopt.errors import ProblemError, StepError
 from seqopt.graph.states._visits import steps_of
 from seqopt.graph.states.states import States
-from seqopt.sequence._reassign import reassigned_steps
-from seqopt.sequence._rule_space import FreeSpace, node_numbers
-from seqopt.sequence._timing import StepTime, step_times
-from seqopt.stability._curing import CuringBuilds
-from seqopt.stability._fall_cuts import FallCuts
+from seqopt.sequence._robot_kinds import node_numbers
+from seqopt.sequence._rule_space import FreeSpace
+from seqopt.sequence._timing import StepTime, reassigned_steps, step_times
+from seqopt.stability._aging.builds import CuringBuilds
+from seqopt.stability._aging.cuts import FallCuts
 
 
 class Soonest(NamedTuple):

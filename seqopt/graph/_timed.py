@@ -19,7 +19,7 @@ from seqopt.graph.states.states import States
 from seqopt.sequence._timing import require_durations
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
-from seqopt.stability._fall_cuts import FallCuts
+from seqopt.stability._aging.cuts import FallCuts
 
 HELD, NOW = -1, -2  # where the readiness of a column comes from: it has none, the end of the act
 

@@ -19,7 +19,7 @@ from seqopt.responses._tolerance import tolerance_table
 from seqopt.responses.table import Departure, LinearRange, grips_table
 from seqopt.sequence._timing import Waits, has_durations, step_times
 from seqopt.sequence.steps import Step
-from seqopt.stability._curing import CuringBuilds
+from seqopt.stability._aging.builds import CuringBuilds
 from seqopt.stability._step_verdicts import step_verdicts
 from seqopt.stability.assessment import MARGINS, Verdict
 from seqopt.stability.steps import assess_steps, stability_table

@@ -13,11 +13,11 @@ import seqopt
 from seqopt.contact.curing import Curing, find_curing
 from seqopt.errors import InfeasibleError, ProblemError, SceneError, SolverError, StepError
 from seqopt.plan._status import Status
-from seqopt.plan.judge._cured import check_cured
+from seqopt.plan.judge._mortar.check import check_cured
 from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.problem.standing import Standing
 from seqopt.sequence.rules import FreeRules
-from seqopt.stability._curing import CuringBuilds, JointsInTime
+from seqopt.stability._aging.builds import CuringBuilds, JointsInTime
 from tests.brute_force import ONES
 from tests.times.builders import engine_of
 from tests.times.curing import least_cured_makespan

@@ -32,7 +32,7 @@ from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.plan._times import busy_table
 from seqopt.plan.build import GivenSequence
-from seqopt.plan.judge._cured import check_cured
+from seqopt.plan.judge._mortar.check import check_cured
 from seqopt.problem.standing import Standing
 
 DESCRIPTION = (

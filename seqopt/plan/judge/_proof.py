@@ -21,13 +21,11 @@ from seqopt.graph.graph import Graph
 from seqopt.graph.paths import lexicographic, reached, tied
 from seqopt.graph.states._visits import move_amounts
 from seqopt.graph.states.states import States
-from seqopt.plan.judge._answers import ask
-from seqopt.plan.judge._floors import Floors
-from seqopt.plan.judge._rule_moves import Follows, RuleTables, ScheduleTables, _alike
+from seqopt.plan.judge._answers import alike, ask, near, screens
+from seqopt.plan.judge._mortar.floors import cured_rows
+from seqopt.plan.judge._rule_moves import Follows, RuleTables, ScheduleTables
 from seqopt.plan.judge._standing_proof import StandingProof
-from seqopt.plan.judge._time_proof import CuredRows
 from seqopt.plan.judge._timed_goals import Claim, GoalProofs, TimedStates
-from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Measure
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses._grip_sets import KnownRows
@@ -36,7 +34,6 @@ from seqopt.sequence.rules import Payload
 from seqopt.sequence.schedule import Schedule
 
 FEW = 500  # grip sets of which all digits take no longer than to ask some of them twice
-BAND = 1e-3  # share of a value within which six digits do not decide, far more than they err
 
 
 Tables: TypeAlias = RuleTables | ScheduleTables
@@ -88,7 +85,7 @@ class Passable:
         self._numbers = np.concatenate([nodes + each for each in more])  # of grips, by place
         self._beyond = len(nodes) * kinds.of_robot[list(self.tables.team)]
         self.margins = sum(goal.of_margins for goal in problem.goals)
-        self._exact = not _screens(problem)  # whether all digits count
+        self._exact = not screens(problem)  # whether all digits count
 
     def least(self) -> tuple[float, ...]:
         """Return what goals take at least of any plan, for its end and the count of its steps.
@@ -97,8 +94,8 @@ class Passable:
         """
         goals, tables = self.problem.goals, self.tables
         end, counted = tables.only_end(), float(tables.least_steps())
-        last = np.full((1, len(goals)), -np.inf)
-        if end is not None:
+        last = np.full((1, len(goals)), -np.inf if end is None else 0.0)
+        if end is not None and tables.bricks_at(tables.last):
             asked = Asked(exact=True)
             last = self._answers(tables.bricks_at(tables.last), end, asked, np.inf)[0]
         known = {Measure.PEAK: last[0], Measure.STEPS: np.full(len(goals), counted)}
@@ -139,7 +136,7 @@ class Passable:
         ``states`` (n, c). Results: ``values`` (n, g); ``ok`` (n,).
         """
         goals = self.problem.goals
-        if not level:
+        if not self.tables.bricks_at(level):
             return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
         held, payload = self._held(states, self._most, self._beyond)
         most, margins, _ = asked
@@ -211,10 +208,10 @@ class Passable:
         found: Floats = np.column_stack(ask(self.problem, bricks, grips, below, rough=not exact))
         if not exact:
             goals = len(self.problem.goals)
-            close = _near(found[:, goals:-1], self._most)
+            close = near(found[:, goals:-1], self._most)
             for k, value in enumerate(asked.values):
                 if self.problem.goals[k].measure is Measure.PEAK:
-                    close |= _near(found[:, [k]], np.array([value]))
+                    close |= near(found[:, [k]], np.array([value]))
             found[close] = np.column_stack(ask(self.problem, bricks, grips[close], below))
         return found
 
@@ -224,26 +221,12 @@ class Passable:
         return move_amounts(self.problem, values, taken)
 
 
-def _screens(problem: States) -> bool:
-    """Return whether six digits of responses tell nearly as much of what goals take of states."""
-    ratios = isinstance(problem.criterion, WorstRatio)
-    of_states = [goal for goal in problem.goals if goal.of_states and not goal.of_margins]
-    peaks = all(g.measure is Measure.PEAK and (g.response or ratios) for g in of_states)
-    return peaks and not problem.limits
-
-
-def _near(values: Floats, bounds: Floats) -> Bools:
-    """Return the rows (n,) of which a value (n, k) is so close to a bound that digits decide."""
-    finite = bounds[np.isfinite(bounds)]
-    return np.asarray((np.abs(values[:, :, None] - finite) <= BAND * np.abs(finite)).any((1, 2)))
-
-
 def _tables(problem: States, most: Mapping[int, float]) -> Tables:
     """Return what rules or a schedule allow."""
     if isinstance(problem.rules, Schedule):
         return ScheduleTables(problem.rules, problem.network, parks=problem.parks)
     book = RuleBook(problem.network, problem.rules)
-    return RuleTables(book, _alike(book, most, timed=problem.is_timed), parks=problem.parks)
+    return RuleTables(book, alike(book, most, timed=problem.is_timed), parks=problem.parks)
 
 
 def _loads(problem: States, *, stand: bool) -> dict[int, float]:
@@ -328,7 +311,9 @@ class Proof:
                 return np.zeros(len(rows), dtype=bool)
             return ~passable.may_stand(level, rows, margins)
 
-        cured = levels.cured(claim.motions)
+        bricks = [passable.tables.bricks_at(level) if level else 0 for level in levels.levels]
+        grips = [passable.held_by(rows) for rows in levels.states]
+        cured = cured_rows(passable.problem, bricks, grips, claim.motions)
         while True:
             own = passable.tables, levels.states, graph, fallen, cured
             states = TimedStates(passable.problem, *own)
@@ -465,19 +450,6 @@ class _Levels:
         self.states.append(part.states)
         self._ends.append(tables.ends(level, part.states))
         return [pair for pair in moves if pair[1].level > level]
-
-    def cured(self, motions: Sequence[Floats]) -> CuredRows | None:
-        """Return what states ask of mortar; None where none cures."""
-        problem, tables = self._passable.problem, self._passable.tables
-        standing = problem.standing
-        if standing is None or standing.curing is None:
-            return None
-        bricks = [tables.bricks_at(level) if level else 0 for level in self.levels]
-        count = [len(rows) for rows in self.states]
-        grips = [self._passable.held_by(rows) for rows in self.states]
-        held, payload = (np.concatenate([each[k] for each in grips]) for k in (0, 1))
-        floors = Floors(problem.network, standing, motions)
-        return CuredRows(floors, np.repeat(bricks, count), held, payload)
 
     def graph(self) -> Graph:
         """Return them as a graph; the moves are then used up."""

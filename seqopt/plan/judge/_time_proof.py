@@ -20,7 +20,7 @@ from seqopt.errors import SolverError
 from seqopt.graph.duality import _to_go
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import TIED
-from seqopt.plan.judge._floors import Floors
+from seqopt.plan.judge._mortar.floors import CuredRows
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind
 
@@ -95,27 +95,6 @@ class Limits:
     time: float
     sums: Floats
     strict: Bools
-
-
-class CuredRows(NamedTuple):
-    """What rows of states ask of mortar that cures.
-
-    ``floors``: under waits; ``bricks`` (n,): that stand; ``held``, ``payload`` (n, r): grips.
-    """
-
-    floors: Floors
-    bricks: Ints
-    held: Ints
-    payload: Floats
-
-    def starts(self, state: Ints, placed: Floats, start: Floats) -> Floats:
-        """Return from when on, no sooner than times (k,), s, states may begin; see `Floors`."""
-        out = start.copy()
-        for bricks in np.unique(self.bricks[state]).tolist():
-            rows = np.flatnonzero(self.bricks[state] == bricks)
-            grips = self.held[state[rows]], self.payload[state[rows]]
-            out[rows] = self.floors.starts(bricks, grips, placed[rows], start[rows])
-        return out
 
 
 class TimedMoves:

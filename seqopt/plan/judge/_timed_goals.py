@@ -15,16 +15,9 @@ from seqopt.graph.duality import cut, potentials
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import tied
 from seqopt.graph.states.states import States
+from seqopt.plan.judge._mortar.floors import CuredRows
 from seqopt.plan.judge._rule_moves import RuleTables, ScheduleTables
-from seqopt.plan.judge._time_proof import (
-    Closed,
-    CuredRows,
-    Limits,
-    Team,
-    TimedMoves,
-    kept_below,
-    limit_below,
-)
+from seqopt.plan.judge._time_proof import Closed, Limits, Team, TimedMoves, kept_below, limit_below
 from seqopt.problem.problem import Measure
 from seqopt.sequence._timing import require_durations
 from seqopt.sequence.schedule import Schedule

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.curing import Curing
+from seqopt.graph.states.states import States
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
-from seqopt.stability._curing import JointsInTime
-from seqopt.stability._fall_cuts import FallCuts
+from seqopt.stability._aging.builds import JointsInTime
+from seqopt.stability._aging.cuts import FallCuts
 
 Grips = tuple[Ints, Floats]
 CLOSE = 1e-9  # of a time: what rounding may take from an age
@@ -71,3 +73,39 @@ class Floors:
                 later = then > now + 2 * CLOSE * np.abs(now)
                 out = np.where(later & (then < out), then, out)
         return out
+
+
+class CuredRows(NamedTuple):
+    """What rows of states ask of mortar that cures.
+
+    ``floors``: under waits; ``bricks`` (n,): that stand; ``held``, ``payload`` (n, r): grips.
+    """
+
+    floors: Floors
+    bricks: Ints
+    held: Ints
+    payload: Floats
+
+    def starts(self, state: Ints, placed: Floats, start: Floats) -> Floats:
+        """Return from when on, no sooner than times (k,), s, states may begin; see `Floors`."""
+        out = start.copy()
+        for bricks in np.unique(self.bricks[state]).tolist():
+            rows = np.flatnonzero(self.bricks[state] == bricks)
+            grips = self.held[state[rows]], self.payload[state[rows]]
+            out[rows] = self.floors.starts(bricks, grips, placed[rows], start[rows])
+        return out
+
+
+def cured_rows(
+    problem: States, bricks: Sequence[int], grips: Sequence[Grips], motions: Sequence[Floats]
+) -> CuredRows | None:
+    """Return what rows of states, level by level, ask of mortar; None where none cures.
+
+    ``bricks``: how many stand; ``grips``: as of `Floors.starts`.
+    """
+    standing = problem.standing
+    if standing is None or standing.curing is None:
+        return None
+    held, payload = (np.concatenate([each[k] for each in grips]) for k in (0, 1))
+    count = np.repeat(bricks, [len(each) for each, _ in grips])
+    return CuredRows(Floors(problem.network, standing, motions), count, held, payload)
