@@ -16,10 +16,10 @@ from seqopt.plan._status import Status
 from seqopt.plan.judge._mortar.check import check_cured
 from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.problem.standing import Standing
-from seqopt.sequence.rules import FreeRules
+from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.stability._aging.builds import CuringBuilds, JointsInTime
 from tests.brute_force import ONES
-from tests.times.builders import engine_of
+from tests.times.builders import WORDS, engine_of
 from tests.times.curing import least_cured_makespan
 
 ALONE = FreeRules(least_grips=1)
@@ -100,6 +100,14 @@ def test_no_step_comes_before_its_proof(plan):
             check_cured(network, plan.steps, standing, early)
 
 
+def test_the_chart_marks_waits_for_mortar(plan):
+    axes = plan.gantt().axes[0]
+    spans = [each for each in axes.patches if each.get_gid() == "cures"]
+    waits = plan.times().query("cures_s > 0")
+    assert [each.get_width() for each in spans] == pytest.approx(waits["cures_s"].tolist())
+    assert "waits for mortar" in [text.get_text() for text in axes.get_legend().get_texts()]
+
+
 def judged(plan, **changes):
     return judge_schedule(replace(plan.graph), replace(plan.selection, **changes), plan.steps)
 
@@ -119,6 +127,15 @@ def test_the_judge_refuses_early_starts_and_missing_motions(plan):
     lies = tuple(np.roll(each, 1, axis=1) for each in plan.selection.motions)
     with pytest.raises(SolverError, match="labels do not prove"):
         judged(plan, motions=lies)
+
+
+@pytest.mark.slow
+def test_states_from_which_all_ways_fall_need_no_labels():
+    scene = with_robots(seqopt.load_scene("chain:bricks=7"), 2).with_durations(WORDS)
+    engine = seqopt.make_engine("compliance", scene)
+    standing = Standing("bond=5e3", curing="0s=0.1,15min=1")
+    plan = seqopt.solve(seqopt.pose(engine, ALONE, goals="makespan", stands=standing))
+    assert (plan.makespan, plan.status) == (1180.0, Status.OPTIMAL)
 
 
 @pytest.mark.slow

@@ -17,9 +17,9 @@ from seqopt.contact.assembly import Assembly
 from seqopt.contact.curing import Curing
 from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar
-from seqopt.errors import SceneError
+from seqopt.errors import SceneError, StepError
 from seqopt.network.network import Network
-from seqopt.sequence.steps import AnyStep, Grips, Step
+from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
 from seqopt.stability._prover import Proven
 from seqopt.stability._verdict_chain import VerdictChain
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
@@ -119,8 +119,11 @@ class CuringBuilds:
         """Return from when on the state of a step stands, no sooner than at a time, s.
 
         ``placed``: when bricks were in their places, in build order. Beside it the joint whose bond
-        was the last that was missing, empty if none was; never, if no wait is enough.
+        was the last that was missing, empty if none was; never, if no wait is enough. Raises
+        `StepError` if the step takes a brick away.
         """
+        if step.kind is StepKind.REMOVE:
+            raise StepError(f"step {step.number} takes a brick away: curing is of builds alone")
         bricks, rows = step.bricks, np.full((1, step.bricks), np.inf)
         rows[0, : len(placed[:bricks])] = placed[:bricks]
         if self._stands(step, start, rows):
