@@ -45,8 +45,10 @@ SHARED = {  # what formulations may import
     "formulations.whole_program",
     "formulations._weights",
     "formulations.states._search",
+    "formulations.times._curing",
     "formulations.times._labels",
     "formulations.times._prices",
+    "formulations.times._search",
     "formulations.times._stages",
     "formulations.states._totals",
 }

@@ -33,7 +33,8 @@ class Labels(NamedTuple):
 
     ``state`` (N,); ``end`` (N,): of the last step, s; ``since`` (N, c): since when robots of
     columns are free, s, zero where they hold; ``sums`` (N, q): what sums took; ``before`` (N,):
-    number of the label that it continues, -1 at the start.
+    number of the label that it continues, -1 at the start; ``placed`` (N, b): where mortar cures,
+    when bricks were in their places, s, zero of those that are not.
     """
 
     state: Ints
@@ -41,11 +42,12 @@ class Labels(NamedTuple):
     since: Floats
     sums: Floats
     before: Ints
+    placed: Floats
 
     def only(self, rows: Ints | Bools) -> Labels:
         """Return some of them."""
         every = (self.state[rows], self.end[rows], self.since[rows])
-        return Labels(*every, self.sums[rows], self.before[rows])
+        return Labels(*every, self.sums[rows], self.before[rows], self.placed[rows])
 
     @property
     def size(self) -> int:
@@ -60,6 +62,7 @@ def _joined(parts: Sequence[Labels]) -> Labels:
         np.concatenate([part.since for part in parts]),
         np.concatenate([part.sums for part in parts]),
         np.concatenate([part.before for part in parts]),
+        np.concatenate([part.placed for part in parts]),
     )
 
 
@@ -168,7 +171,9 @@ class Sweep:
         columns = self._timed.free.shape[1]
         none = np.zeros((1, len(self._caps.sums)))
         start, since = np.zeros(1, dtype=np.int64), np.zeros((1, columns))
-        return Labels(start, np.zeros(1), since, none, np.full(1, -1))
+        bricks = 0 if self._timed.curing is None else len(self._timed.curing.full)
+        placed = np.zeros((1, bricks))
+        return Labels(start, np.zeros(1), since, none, np.full(1, -1), placed)
 
     def _bounds(self, labels: Labels) -> Floats:
         """Return when builds through labels end at least, and what sums they take, (N, 1 + q)."""
@@ -211,15 +216,40 @@ class Sweep:
         timed = self._timed
         ready = labels.since[row, column] + timed.prepares[move]
         start = np.where(column >= 0, np.maximum(labels.end[row], ready), labels.end[row])
+        state, origin, placed = self._target[act], self._origin[act], labels.placed[row]
+        if timed.curing is not None:
+            start, placed = self._cured((labels.state[row], state), placed, start, timed.acts[move])
         end = start + timed.acts[move]
-        state, origin = self._target[act], self._origin[act]
         since = np.take_along_axis(labels.since[row], origin.clip(min=0), axis=1)
         since = np.where(origin == NOW, end[:, None], since)
         since = np.maximum(since, end[:, None] - self._longest)
         since = np.where(timed.graph.ends[state][:, None], end[:, None], since)  # it is over
         since[origin == HELD] = 0.0
         self._in_order(state, since)
-        return Labels(state, end, since, labels.sums[row] + self._amounts[act], numbers[row])
+        sums = labels.sums[row] + self._amounts[act]
+        after = Labels(state, end, since, sums, numbers[row], placed)
+        return after if timed.curing is None else after.only(np.isfinite(end))
+
+    def _cured(
+        self, states: tuple[Ints, Ints], placed: Floats, start: Floats, acts: Floats
+    ) -> tuple[Floats, Floats]:
+        """Return when acts start as mortar lets them, and when bricks are placed after them.
+
+        What has its full bond by then could as well be older. ``states``: before and after.
+        """
+        curing, (before, state) = self._timed.curing, states
+        assert curing is not None
+        rows = np.flatnonzero(curing.bricks[state] > curing.bricks[before])
+        brick = curing.bricks[state[rows]] - 1
+        placed = placed.copy()
+        placed[rows, brick] = np.inf
+        start = curing.starts(state, placed, start)
+        end = start + acts
+        placed[rows, brick] = end[rows]
+        older = np.maximum(placed, end[:, None] - curing.full)
+        stands = np.arange(placed.shape[1]) < curing.bricks[state][:, None]
+        over = self._timed.graph.ends[state][:, None]
+        return start, np.where(stands & ~over, older, 0.0)
 
     def _in_order(self, state: Ints, since: Floats) -> None:
         """Sort the readiness of columns that could change places, in place."""
@@ -238,7 +268,7 @@ class Sweep:
         old = [labels.only(states[labels.state]) for labels in known]
         count = sum(labels.size for labels in old)
         every = _joined([*old, fresh])
-        keys = np.column_stack([every.end, every.since, every.sums])
+        keys = np.column_stack([every.end, every.since, every.sums, every.placed])
         new = np.arange(every.size) >= count  # of equal ones the known one comes first
         order = np.lexsort((new, *keys.T[::-1], every.state))
         state, keys = every.state[order], keys[order]

@@ -14,32 +14,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from formulations.states._search import (
-    WIDTH,
-    StopError,
-    Watching,
-    after_margins,
-    narrow,
-    plan_by_then,
-    watched,
-)
+from formulations.states._search import StopError
 from formulations.times._labels import STEPS, Caps, Labels, LateError, Sweep, Swept
 from formulations.times._prices import Prices, best_prices
-from seqopt.arrays import Bools, Terse
-from seqopt.errors import InfeasibleError, TimeUpError
-from seqopt.graph._explore import Explorer, Visited
+from seqopt.arrays import Bools
+from seqopt.errors import InfeasibleError
+from seqopt.graph._explore import Visited
 from seqopt.graph._timed import LabelProof, TimedGraph, timed_graph
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, keep_best, reached, tied
-from seqopt.graph.states._visits import FreeStates, steps_of
 from seqopt.graph.states.states import States
-from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
+from seqopt.plan.calling.formulation import Watch
 from seqopt.problem.problem import Measure
-from seqopt.sequence._robot_kinds import node_numbers
-from seqopt.sequence._rule_space import FreeSpace
-from seqopt.sequence._timing import reassigned_steps, step_times
-from seqopt.work.progress import Tell
+from seqopt.stability._aging.cuts import FallCuts
 
 BEAMS = (100, 1000, 5000)  # widths of the searches for a first path
 ALMOST = 1e-9  # over a value: a path must be better by more than this to be better
@@ -80,7 +67,7 @@ Choose = Callable[[Asked], Chosen]
 
 
 @dataclass
-class _Stage:
+class StageFound:
     """How far goals are: what is still allowed, and what was found of those before."""
 
     kept: Bools
@@ -120,20 +107,29 @@ def beams(
 class Stages:
     """Goals of a problem one after the other, on a graph in time."""
 
-    def __init__(self, problem: States, visited: Visited, choose: Choose, watch: Watch) -> None:
+    def __init__(
+        self,
+        problem: States,
+        visited: Visited,
+        choose: Choose,
+        watch: Watch,
+        cuts: FallCuts | None = None,
+    ) -> None:
         self._problem, self._choose, self._watch = problem, choose, watch
         self._visited = visited
-        self._timed = timed_graph(problem, visited)
+        self._timed = timed_graph(problem, visited, cuts)
         graph = self._timed.graph
         budgets = dict(enumerate(problem.budgets, start=len(problem.aims)))
         is_time = {k: problem.goals[k].measure is Measure.MAKESPAN for k in budgets}
         time = min((tied(cap) for k, cap in budgets.items() if is_time[k]), default=np.inf)
         sums = tuple((k, tied(cap)) for k, cap in budgets.items() if not is_time[k])
         kept = _on_paths(graph, np.ones(len(graph.source), dtype=bool))
-        self._stage = _Stage(kept, Caps(time, sums), filtered=not budgets)
+        self._stage = StageFound(kept, Caps(time, sums), filtered=not budgets and cuts is None)
 
-    def run(self) -> _Stage:
+    def run(self) -> StageFound:
         """Return what is found; raise an `InfeasibleError` if no path is within all caps."""
+        if not self._stage.kept.any():
+            raise InfeasibleError("no plan is allowed")
         for k, goal in enumerate(self._problem.aims):
             if self._stage.late:
                 self._stage.bounds.append(-np.inf)
@@ -276,6 +272,15 @@ class Stages:
         amounts = graph.amounts[np.searchsorted(codes, wanted), k]
         return float(amounts.max(initial=0.0) if graph.peaks[k] else amounts.sum())
 
+    def least(self, path: Sequence[int]) -> float:
+        """Return how long a path takes by all that is known of its waits, s."""
+        graph = self._timed.graph
+        codes = graph.source.astype(np.int64) * graph.states + graph.target
+        wanted = [a * graph.states + b for a, b in pairwise((0, *path))]
+        kept = np.isin(codes, wanted)
+        prices = best_prices(self._timed, kept, Watch(0.0))
+        return Sweep(self._timed, prices, kept, Caps()).run(Watch()).best
+
     def values(self, path: Sequence[int]) -> list[float]:
         """Return what goals take of a path, that of makespans left at zero."""
         return [self._taken(path, k) for k in range(len(self._problem.goals))]
@@ -289,7 +294,7 @@ class Stages:
         if not labels:
             none = np.zeros((0, 1 + columns))
             return LabelProof(np.zeros((0, 1 + rows.shape[1]), dtype=np.int64), none, each)
-        parts = [np.column_stack([own.end, own.since, own.sums]) for own in labels]
+        parts = [np.column_stack([own.end, own.since, own.sums, own.placed]) for own in labels]
         state = np.concatenate([own.state for own in labels])
         states = np.column_stack([self._timed.levels[state], rows[state]])
         return LabelProof(states, np.concatenate(parts), each)
@@ -300,116 +305,3 @@ def _on_paths(graph: Graph, kept: Bools) -> Bools:
     some = graph.only(kept)
     to_end = np.isfinite(distances(some, np.ones(len(some.source)), back=True))
     return kept & reached(graph, kept)[graph.source] & to_end[graph.target]
-
-
-@dataclass(frozen=True, repr=False)
-class _InTime(Terse):
-    """The ``solve`` of a formulation of time."""
-
-    choose: Choose = field(repr=False)
-
-    def __call__(
-        self,
-        problem: States,
-        *,
-        seconds: float = np.inf,
-        max_memory: float = np.inf,
-        progress: Tell = lambda _: None,
-    ) -> StatePath:
-        """Return the plan of the chosen path; where time or memory ends early, the best so far."""
-        watch = Watch(seconds)
-        tell = watched(problem, watch, max_memory, progress)
-        return after_margins(
-            problem, lambda rest: _searched(rest, self.choose, watch, tell, progress), tell
-        )
-
-
-def _searched(
-    problem: States, choose: Choose, watch: Watch, tell: Watching, progress: Tell
-) -> StatePath:
-    """Return the best plan of states that stand as is demanded."""
-    first = None
-    try:
-        first = narrow(problem, WIDTH, tell)
-        wide = Explorer(FreeStates(problem), tell=tell)
-        capped = any(g.measure is Measure.MAKESPAN for g in problem.goals[len(problem.aims) :])
-        known = first is not None and problem.goals[0].measure is Measure.PEAK and not capped
-        wide.rise(first.objective[0] if first and known else np.inf)
-        while wide.whole:
-            wide.refine()
-            progress("makespan")
-            visited = wide.graph()
-            stages = Stages(problem, visited, choose, watch)
-            found = stages.run()
-            if not _fell(problem, wide, visited, found.path):
-                return _plan(problem, visited, stages, found)
-    except (StopError, KeyboardInterrupt) as stop:
-        return _by_then(problem, first, stop)
-    raise InfeasibleError("no plan is allowed")
-
-
-def _fell(problem: States, wide: Explorer, visited: Visited, path: Sequence[int]) -> bool:
-    """Leave out states of a path that do not stand as is demanded; return whether some do not."""
-    fell = False
-    for level, part, state in visited.of(path) if problem.demands else ():
-        if not problem.stand(level, state[None])[0]:
-            wide.close((level, part), state[None])
-            fell = True
-    return fell
-
-
-def _plan(problem: States, visited: Visited, stages: Stages, found: _Stage) -> StatePath:
-    """Return a path as a plan, by the robots that are soonest done."""
-    states = tuple((level, *state.tolist()) for level, _, state in visited.of(found.path))
-    grips, makespan = _soonest(problem, states)
-    values = [
-        makespan if goal.measure is Measure.MAKESPAN else value
-        for goal, value in zip(problem.goals, stages.values(found.path), strict=True)
-    ]
-    bounds = [min(b, v) for b, v in zip(found.bounds, values, strict=False)]
-    bounds += values[len(bounds) :]
-    hint = tuple(rows for *_, rows in visited.states)
-    late = "time" if found.late else ""
-    return StatePath(
-        states,
-        tuple(values),
-        tuple(bounds),
-        hint,
-        stopped=late,
-        grips=grips,
-        proofs=(*found.proofs,),
-    )
-
-
-def _soonest(
-    problem: States, states: Sequence[Sequence[int]]
-) -> tuple[tuple[tuple[int, ...], ...], float]:
-    """Return who of a kind acts so that a plan takes least: places held by robots, and how long."""
-    space, scene = problem.space, problem.network.scene
-    steps = steps_of(space, states)
-    if not isinstance(space, FreeSpace):
-        return (), step_times(scene, steps)[-1].end
-    kind = {robot: k for k, each in enumerate(space.kinds) for robot in each.robots}
-    steps = reassigned_steps(scene, steps, lambda r, hold: kind[r] == kind[hold.robot], [*kind])
-    place = {node: i for i, node in enumerate(node_numbers(space.network), start=1)}
-    grips = tuple(tuple(0 if n is None else place[n] for n in step.grips) for step in steps)
-    return grips, step_times(scene, steps)[-1].end
-
-
-def _by_then(
-    problem: States, first: StatePath | None, stop: StopError | KeyboardInterrupt
-) -> StatePath:
-    """Return a first plan with its makespan; raise an error if there is none that keeps caps."""
-    found = plan_by_then(first, stop)
-    grips, makespan = _soonest(problem, found.states)
-    pairs = zip(problem.goals, found.objective, strict=True)
-    values = tuple(makespan if g.measure is Measure.MAKESPAN else v for g, v in pairs)
-    for value, cap in zip(values[len(problem.aims) :], problem.budgets, strict=True):
-        if value > tied(cap):
-            raise TimeUpError("no plan within all budgets was found yet; give more")
-    return replace(found, objective=values, grips=grips)
-
-
-def in_time(name: str, summary: str, kind: FormulationKind, choose: Choose) -> Formulation:
-    """Return the formulation of time that chooses a path by a function of an `Asked`."""
-    return Formulation(name, summary, kind, None, _InTime(choose), on=On.TIMES, takes_budgets=True)

@@ -24,7 +24,8 @@ from scipy import sparse
 from formulations.solvers import STOPS, minimize_rows
 from formulations.times._labels import Caps, Sweep
 from formulations.times._prices import useful
-from formulations.times._stages import Asked, Chosen, in_time
+from formulations.times._search import in_time
+from formulations.times._stages import Asked, Chosen
 from seqopt.arrays import Bools
 from seqopt.plan.calling.formulation import FormulationKind, Watch
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import pandas as pd
@@ -18,6 +18,7 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import LIMITED, make_engine
 from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.network.network import Network
+from seqopt.plan.build import ShownBuild
 from seqopt.problem._arms import arm_faults
 from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.report.comparison import idle_note
@@ -134,6 +135,27 @@ def arm_notes(scene: Scene, builds: Mapping[str, Sequence[Step]]) -> tuple[str, 
     """Return which steps of builds arms cannot be in, in words. ``builds``: by what they are."""
     faults = ((name, fault) for name, steps in builds.items() for fault in arm_faults(scene, steps))
     return tuple(f"{name}{': ' * bool(name)}{fault}" for name, fault in faults)
+
+
+def waits_said(build: ShownBuild) -> Iterator[str]:
+    """Yield how long a build waits for mortar, and for which joints the longest; judged before."""
+    if build.standing is None or build.standing.curing is None:
+        return
+    table = build.times()
+    waits = table[table["cures_s"] > 0]
+    if len(waits):
+        yield (
+            f"{waits['cures_s'].sum():.6g} s are waits for mortar, in {len(waits)} "
+            f"step{'s' * (len(waits) > 1)}; the longest:"
+        )
+    else:
+        yield "no step waits for mortar"
+    for row in waits.nlargest(3, "cures_s").to_dict("records"):
+        yield (
+            f"  step {row['step']} ({row['type']}) waits {row['cures_s']:.6g} s for joint "
+            f"{row['joint']}"
+        )
+    yield "every state is proven to stand with the bond that its joints have when it begins"
 
 
 def asked_prover(options: argparse.Namespace, network: Network) -> BuildProver:

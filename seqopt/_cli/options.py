@@ -65,6 +65,11 @@ STANDING = {
     "--friction F": "with --stands: coefficient of friction",
     "--tilt DEG": "with --stands: tilt that every state must survive",
 }
+CURING = {
+    "--curing WORDS ...": "with --stands: which share of its bond mortar has at an age: 15min (in "
+    "proportion, full then), 0s=0.005,5min=0.4,15min=1 (what is reached when), never; of one joint "
+    "with its name before, as 5-6:30min. What is let go waits for it (default: full at once)"
+}
 STRICT = {
     "--strict": "end with exit status 1 if a robot would exceed its payload in a step, or results "
     "leave the linear range"

@@ -10,6 +10,7 @@ from dataclasses import replace
 from math import radians
 from typing import Any
 
+from seqopt.contact.curing import Curing, find_curing
 from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
 from seqopt.errors import ProblemError, SceneError, SeqoptError, StepError, did_you_mean
 from seqopt.plan.calling.formulation import Formulation, as_formulation
@@ -226,15 +227,27 @@ def mortar_word(text: str, where: str) -> Mortar:
 
 def asked_standing(options: argparse.Namespace) -> Standing | None:
     """Return what is demanded of the stability of states, if anything is."""
-    names = [name for name in ("tilt", "friction") if getattr(options, name) is not None]
+    curing = getattr(options, "curing", [])
+    names = [name for name in ("tilt", "friction") if getattr(options, name, None) is not None]
+    names += ["curing"] * bool(curing)
     if options.stands is None:
         if names:
             raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands dry, say")
         return None
     mortar = mortar_word(options.stands, "--stands")
-    given = {name: number_word(getattr(options, name), f"--{name}", zero=True) for name in names}
+    numbers = [name for name in names if name != "curing"]
+    given = {name: number_word(getattr(options, name), f"--{name}", zero=True) for name in numbers}
     tilt = radians(given.pop("tilt", 0.0))
-    return Standing(replace(mortar, **given), tilt)
+    cures = _curing_words(curing) if curing else None
+    return Standing(replace(mortar, **given), tilt, cures)
+
+
+def _curing_words(words: Sequence[str]) -> Curing:
+    """Return how mortar cures by its words."""
+    try:
+        return find_curing(" ".join(words))
+    except SceneError as error:
+        raise ProblemError(f"--{error}") from error
 
 
 def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:

@@ -64,6 +64,7 @@ class PartialAssemblies:
                 "payload": np.array([*(payload for _, payload in held), *props.payload]),
                 "applied": added(_applied_rows(self.network, bricks), props.applied),
                 "grip_line": np.concatenate([np.zeros((len(held), 3)), props.line]),
+                "bond": np.zeros(0),
                 "corner_area": whole.corner_area[:corners],
                 "area": whole.area[:contacts],
                 "axes": whole.axes[:contacts],

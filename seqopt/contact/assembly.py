@@ -44,6 +44,8 @@ class Assembly(FrozenValue):
     grip_line : (L, 3) float
         Of the first grips: unit vectors along which alone they exert forces, both ways; zero for
         one in any direction, as all others are.
+    bond : (C,) float
+        Share of the mortar's bond that every contact has; no entries by default: all of it.
 
     Raises
     ------
@@ -64,11 +66,12 @@ class Assembly(FrozenValue):
     payload: Floats
     applied: Floats = field(default_factory=lambda: np.zeros((0, 6)))
     grip_line: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    bond: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         super().__post_init__()
         numbers = ("centroid", "weight", "normal", "corner", "grip_position", "payload", "applied")
-        for name in (*numbers, "grip_line"):
+        for name in (*numbers, "grip_line", "bond"):
             values = getattr(self, name)
             if not isinstance(values, np.ndarray) or not np.isfinite(values).all():
                 raise SceneError(f"assembly: {name} holds a number that is not finite")
@@ -82,6 +85,12 @@ class Assembly(FrozenValue):
         flat = np.flatnonzero(~(self.area > 0))
         if len(flat):
             raise SceneError(f"contact {self.contact_name[flat[0]]}: its face has no area")
+
+    def with_bond(self, shares: Floats) -> Assembly:
+        """Return the same with other shares of the mortar's bond, (C,); nothing is found again."""
+        out: Assembly = Assembly.__new__(Assembly)
+        out.__setstate__({**vars(self), "bond": np.array(shares, dtype=float)})
+        return out
 
     @cached_property
     def corner_area(self) -> Floats:

@@ -19,8 +19,38 @@ from seqopt.graph.states.states import States
 from seqopt.sequence._timing import require_durations
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
+from seqopt.stability._aging.cuts import FallCuts
 
 HELD, NOW = -1, -2  # where the readiness of a column comes from: it has none, the end of the act
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CuringStates(FrozenValue):
+    """What states of a build in time ask of mortar that cures.
+
+    ``cuts``: motions in which states fall, a floor under waits; ``bricks`` (n,): that stand;
+    ``held`` (n, r), ``payload`` (n, r): the grips of states, as of `FallCuts`; ``full`` (b,): at
+    which age all joints that a brick closes have their full bond, s.
+    """
+
+    cuts: FallCuts
+    bricks: Ints
+    held: Ints
+    payload: Floats
+    full: Floats
+
+    def starts(self, state: Ints, placed: Floats, start: Floats) -> Floats:
+        """Return from when on, no sooner than times (n,), s, states may begin, for all known.
+
+        ``placed`` (n, b): when bricks were in their places; that which a step places counts then.
+        """
+        out = start.copy()
+        for bricks in np.unique(self.bricks[state]).tolist():
+            rows = np.flatnonzero(self.bricks[state] == bricks)
+            if bricks:
+                grips = self.held[state[rows]], self.payload[state[rows]]
+                out[rows] = self.cuts.starts(bricks, grips, placed[rows], start[rows])
+        return out
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,6 +81,8 @@ class TimedGraph(FrozenValue):
         acting, and holding while others act.
     longest : (c,) float
         How long robots of columns take at most to be prepared, s.
+    curing : CuringStates or None
+        What mortar that cures asks for; None where none does.
     """
 
     graph: Graph
@@ -65,6 +97,7 @@ class TimedGraph(FrozenValue):
     acts: Floats
     work: Floats
     longest: Floats
+    curing: CuringStates | None = None
 
     @property
     def sizes(self) -> Ints:
@@ -100,8 +133,11 @@ class _Moves(NamedTuple):
     places: Bools  # (m,); which place a brick
 
 
-def timed_graph(problem: States, visited: Visited) -> TimedGraph:
-    """Return the states that were visited, in time; all robots have durations."""
+def timed_graph(problem: States, visited: Visited, cuts: FallCuts | None = None) -> TimedGraph:
+    """Return the states that were visited, in time; all robots have durations.
+
+    ``cuts``: what is known of states that fall while mortar cures.
+    """
     space, graph = problem.space, visited.graph
     rows = np.concatenate([each[:, : space.robots] for *_, each in visited.states])
     levels = np.repeat([key for key, *_ in visited.states], [len(s) for *_, s in visited.states])
@@ -118,7 +154,16 @@ def timed_graph(problem: States, visited: Visited) -> TimedGraph:
     origin = _origins(space.slots, found, move, column, parks=space.parks)
     work = _work(space.slots, found, prepares, acts)
     states, longest = (graph, levels, free, alike, kinds), _longest(problem)
-    return TimedGraph(*states, move, column, origin, prepares, acts, work, longest)
+    curing = None if cuts is None else _curing(problem, visited, cuts)
+    return TimedGraph(*states, move, column, origin, prepares, acts, work, longest, curing)
+
+
+def _curing(problem: States, visited: Visited, cuts: FallCuts) -> CuringStates:
+    """Return what visited states ask of mortar."""
+    every = [(level, *problem._grips(rows, stand=True)) for level, _, rows in visited.states]
+    bricks = [np.full(len(held), problem.space.bricks_at(level)) for level, held, _ in every]
+    held, payload = (np.concatenate([each[k] for each in every]) for k in (1, 2))
+    return CuringStates(cuts, np.concatenate(bricks), held, payload, cuts.joints.full)
 
 
 def _moves(problem: States, graph: Graph, rows: Ints, levels: Ints) -> _Moves:

@@ -86,9 +86,17 @@ def _selected(
     solve = partial(formulation.solve, problem, **options)
     try:
         selection = called(name, partial(_judged, problem), StatePath, solve)
-    except InfeasibleError:
+    except InfeasibleError as error:
         left = float(options.get("seconds", math.inf)) - (time.perf_counter() - start)
-        raise confirmed(twin, name, left) from None
+        why = confirmed(twin, name, left)
+        standing = problem.standing
+        if isinstance(why, SolverError) and standing is not None and standing.curing is not None:
+            why = InfeasibleError(
+                f"claimed by {name}, and not proven: {error} in which all states stand while "
+                "mortar cures, though some are once it has; more robots may help, or mortar with "
+                "some bond from 0 s on"
+            )
+        raise why from None
     for kept in [*vars(problem)]:  # whatever it left behind, but counts of what was computed
         if kept not in (*(f.name for f in fields(problem)), *COUNTED):
             del vars(problem)[kept]

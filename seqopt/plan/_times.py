@@ -10,13 +10,15 @@ from seqopt.errors import StepError
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
-from seqopt.sequence._timing import reassigned_steps, step_times
+from seqopt.sequence._timing import StepTime, Waits, reassigned_steps, step_times
 from seqopt.sequence.schedule import Hold
 from seqopt.sequence.steps import Step, idle_robots
 
 
-def times_table(scene: Scene, steps: Sequence[Step]) -> pd.DataFrame:
+def times_table(scene: Scene, steps: Sequence[Step], waits: Waits | None = None) -> pd.DataFrame:
     """Return who does what when, at the earliest: a row per step, as of `Plan.times`.
+
+    ``waits``: as of `step_times`, where mortar cures.
 
     Examples
     --------
@@ -28,7 +30,7 @@ def times_table(scene: Scene, steps: Sequence[Step]) -> pd.DataFrame:
     [[1, 'rob1', 30.0, 40.0], [2, 'rob2', 40.0, 50.0], [3, 'rob1', 50.0, 55.0]]
     """
     rows, end = [], 0.0
-    for step, time in zip(steps, step_times(scene, steps), strict=True):
+    for step, time in zip(steps, step_times(scene, steps, waits), strict=True):
         taken = [step.grips[r] for r in time.robots if step.grips[r] is not None]
         rows.append(
             {
@@ -42,15 +44,22 @@ def times_table(scene: Scene, steps: Sequence[Step]) -> pd.DataFrame:
                 "start_s": time.start,
                 "end_s": time.end,
                 "waits_s": time.start - end,
+                **({} if waits is None else _cured(time, end)),
             }
         )
         end = time.end
     return pd.DataFrame(rows).astype({"node": "Int64", "prepares_s": float, "ready_s": float})
 
 
-def busy_table(scene: Scene, steps: Sequence[Step]) -> pd.DataFrame:
+def _cured(time: StepTime, before: float) -> dict[str, object]:
+    """Return how long a step waits for mortar alone, s, and of which joint."""
+    ready = before if time.ready is None else max(before, time.ready)
+    return {"cures_s": max(0.0, time.start - ready), "joint": time.joint}
+
+
+def busy_table(scene: Scene, steps: Sequence[Step], waits: Waits | None = None) -> pd.DataFrame:
     """Return how long each robot ``prepares_s``, ``acts_s``, ``holds_s`` and is ``idle_s``."""
-    times = step_times(scene, steps)
+    times = step_times(scene, steps, waits)
     out = {
         robot.name: dict.fromkeys(("prepares_s", "acts_s", "holds_s"), 0.0)
         for robot in scene.robots
@@ -74,12 +83,16 @@ def busy_table(scene: Scene, steps: Sequence[Step]) -> pd.DataFrame:
     return table.reset_index()
 
 
-def reassign(scene: Scene, steps: Sequence[Step], responses: pd.DataFrame) -> tuple[Step, ...]:
+def reassign(
+    scene: Scene, steps: Sequence[Step], responses: pd.DataFrame, waits: Waits | None = None
+) -> tuple[Step, ...]:
     """Return the same grips in the same order by robots with which the build takes least.
 
     ``responses``: of the steps, as of `seqopt.analyze`. A robot may have a grip if it reaches the
     node, gives way there as the one who had it, and carries the largest force of the grip within
-    its payload; who carried more before may go on. A `StepError` says that robots have arms.
+    its payload; who carried more before may go on. Where mortar cures (``waits``: as of
+    `step_times`) its payload is no less than that of the one who had it. A `StepError` says that
+    robots have arms.
     """
     if scene.has_arms:
         raise StepError(
@@ -100,6 +113,8 @@ def reassign(scene: Scene, steps: Sequence[Step], responses: pd.DataFrame) -> tu
         position = scene.node_position(hold.node)
         force = float(forces[had][hold.first - 1 : hold.last].max())
         most = scene.robots[robot].payload * (1 + LIMIT_TOLERANCE)
+        if waits is not None and scene.robots[robot].payload < scene.robots[had].payload:
+            return False
         alike = bool((kinds[robot] == kinds[had]).all() and turns[robot] == turns[had])
         return alike and force <= most and scene.robots[robot].reach.covers(position)
 
@@ -109,4 +124,4 @@ def reassign(scene: Scene, steps: Sequence[Step], responses: pd.DataFrame) -> tu
         for r, robot in enumerate(scene.robots)
         if robot.durations is not None or robot.name not in idle
     ]
-    return reassigned_steps(scene, steps, may, known)
+    return reassigned_steps(scene, steps, may, known, waits)

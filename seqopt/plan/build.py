@@ -12,12 +12,14 @@ from seqopt._showing import Page, Shown, display
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.plan._times import reassign, times_table
+from seqopt.problem.standing import Standing
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._props import props_table
 from seqopt.responses._tolerance import tolerance_table
 from seqopt.responses.table import Departure, LinearRange, grips_table
-from seqopt.sequence._timing import has_durations, step_times
+from seqopt.sequence._timing import Waits, has_durations, step_times
 from seqopt.sequence.steps import Step
+from seqopt.stability._aging.builds import CuringBuilds
 from seqopt.stability._step_verdicts import step_verdicts
 from seqopt.stability.assessment import MARGINS, Verdict
 from seqopt.stability.steps import assess_steps, stability_table
@@ -59,6 +61,10 @@ class ShownBuild(Shown):
         @property
         def seconds(self) -> Mapping[str, float]:
             """What finding it took, by stage, s."""
+
+        @property
+        def standing(self) -> Standing | None:
+            """The demand that every state stands, if there is one."""
 
         def responses(self) -> pd.DataFrame:
             """Return the responses of every step, as `seqopt.analyze` makes them."""
@@ -127,15 +133,25 @@ class ShownBuild(Shown):
         Result: a row per step: ``step``, ``type``, ``bricks``, ``robots`` who act, ``node`` that is
         taken, from when the robot ``prepares_s`` and is ``ready_s`` (none where robots let go),
         ``start_s`` and ``end_s`` of what changes the structure, and how long it ``waits_s`` for the
-        robot. Raises `StepError` if it is not known how long a robot takes that acts.
+        robot; where mortar cures, also for the mortar, which alone it ``cures_s``, and the
+        ``joint`` that was the last to hold. Raises `StepError` if it is not known how long a robot
+        takes that acts.
         """
-        return times_table(self.engine.network.scene, self.steps)
+        return times_table(self.engine.network.scene, self.steps, self._waits)
 
     @property
     def makespan(self) -> float | None:
         """How long the build takes, s; None if it is not known how long robots take."""
         scene = self.engine.network.scene
-        return step_times(scene, self.steps)[-1].end if self._timed else None
+        return step_times(scene, self.steps, self._waits)[-1].end if self._timed else None
+
+    @cached_property
+    def _waits(self) -> Waits | None:
+        """Says how long steps wait for mortar, where it cures."""
+        curing = None if self.standing is None else self.standing.curing
+        if self.standing is None or curing is None:
+            return None
+        return CuringBuilds(self.engine.network, self.standing.mortar, curing).waits
 
     def reassigned(self) -> tuple[Step, ...]:
         """Return the same grips in the same order by robots with which the build takes least.
@@ -144,7 +160,7 @@ class ShownBuild(Shown):
         way as the one who had it. Raises `StepError` if it is not known how long robots take, or
         some have arms, whose postures count.
         """
-        return reassign(self.engine.network.scene, self.steps, self.responses())
+        return reassign(self.engine.network.scene, self.steps, self.responses(), self._waits)
 
     def plot(
         self, step: int | Sequence[int] | None = None, *, forces: bool = False, magnify: float = 0.0
@@ -184,8 +200,13 @@ class ShownBuild(Shown):
         """
         scene, responses = self.engine.network.scene, self.responses()
         timed = self._timed if seconds is None else seconds
-        name = "seconds_picture" if timed else "gantt_picture"
-        figure: Figure = display(name)(scene, self.steps, responses, (first, last))
+        shown = (first, last)
+        if timed:
+            drawn: Figure = display("seconds_picture")(
+                scene, self.steps, responses, shown, self._waits
+            )
+            return drawn
+        figure: Figure = display("gantt_picture")(scene, self.steps, responses, shown)
         return figure
 
     def animate(self, *, forces: bool = False, magnify: float = 0.0, seconds: float = 0.4) -> Any:
@@ -223,6 +244,8 @@ class GivenSequence(ShownBuild):
         Of `seqopt.sequential`, `seqopt.cantilever` or `seqopt.read_plan`.
     title : str, optional
         What it is called beside others.
+    standing : Standing, optional
+        With what every state must stand: where mortar cures, steps wait for it.
 
     Attributes
     ----------
@@ -249,6 +272,7 @@ class GivenSequence(ShownBuild):
     steps: tuple[Step, ...]
     title: str = "sequence"
     seconds: Mapping[str, float] = field(default_factory=dict, compare=False, hash=False)
+    standing: Standing | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(getattr(self.engine, "network", None), Network):

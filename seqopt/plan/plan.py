@@ -41,6 +41,7 @@ from seqopt.plan.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan.search._window_search import WindowSearch
 from seqopt.problem.problem import Aim, Problem, judged_by
 from seqopt.problem.requirements import Excess, overloads
+from seqopt.problem.standing import Standing
 from seqopt.responses._choices import window_models
 from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import response_table, step_fields
@@ -132,6 +133,11 @@ class Plan(ShownBuild):
     def engine(self) -> Engine:
         """What computes the responses, of the scene in the order of the plan."""
         return self._of_scene.engine
+
+    @property
+    def standing(self) -> Standing | None:
+        """The demand that every state stands, if there was one."""
+        return self.graph.standing if isinstance(self.graph, States) else None
 
     @property
     def scene_name(self) -> str:

@@ -227,10 +227,16 @@ def _states(problem: Problem) -> States:
     asked = problem.engine, problem.moves, problem.criterion, goals, problem.limits
     found = replace(build_states(*asked, problem.stands), resources=problem.resources)
     _require_moves_left(found.space)
-    if problem.is_timed and problem.moves.begin is not None:
-        raise ProblemError("aim makespan: a build in time begins on an empty site; leave from out")
+    if problem.is_timed and found.rules.begin is not None:
+        raise ProblemError(
+            "aim makespan: a build in time begins on an empty site; leave from and take-down out"
+        )
     if caps := parse_caps(problem.budgets):
         found = within(found, caps)
+    if found.standing is not None and found.standing.curing is not None and not found.is_timed:
+        raise ProblemError(
+            "curing: it says how long steps wait; add makespan to the aims, as makespan,steps"
+        )
     return over_scenarios(found, problem.scenarios, over) if problem.scenarios else found
 
 

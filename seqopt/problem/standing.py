@@ -10,6 +10,7 @@ from operator import le
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.contact.curing import Curing, find_curing
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar, find_mortar
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
@@ -34,7 +35,8 @@ class Standing:
     """The demand that every state of a schedule is proven to stand, robots within payload.
 
     ``mortar``: of all joints; or its name; ``tilt``: that every state must survive in every
-    direction, rad.
+    direction, rad; ``curing``: which share of its bond mortar has at an age, or its words, by
+    default all at once. Where nobody asks for time, all wait until it has cured.
 
     Examples
     --------
@@ -44,11 +46,24 @@ class Standing:
 
     mortar: Mortar = field(default=DRY)
     tilt: float = 0.0
+    curing: Curing | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mortar", find_mortar(self.mortar))
+        if self.curing is not None:
+            self._settle(find_curing(self.curing))
         if not (isinstance(self.tilt, int | float) and 0 <= self.tilt < pi / 2):
             raise ProblemError(f"tilt {short(self.tilt)}: give an angle from 0 to below pi/2, rad")
+
+    def _settle(self, curing: Curing) -> None:
+        """Keep how mortar cures, unless it never does or at once: that is another mortar."""
+        bare = not curing.points
+        mortar = Mortar(friction=self.mortar.friction) if bare else self.mortar
+        bonded = mortar.tensile_strength or mortar.cohesion
+        object.__setattr__(self, "mortar", mortar)
+        object.__setattr__(self, "curing", None if curing.is_instant or not bonded else curing)
+        if self.curing is not None and self.tilt:
+            raise ProblemError("tilt: it is not modeled while mortar cures; leave one of them out")
 
     def demanding(self, name: str, value: float) -> Standing:
         """Return the demand that a margin, as goals count it, is no worse than a value alone."""
@@ -63,13 +78,14 @@ class Standing:
         stronger = map(le, astuple(self.mortar), astuple(other.mortar))
         return all(stronger) and self.tilt >= other.tilt
 
-    def described(self) -> dict[str, float]:
+    def described(self) -> dict[str, float | str]:
         """Return the demand, ready for JSON: strengths in Pa, tilt in degrees."""
         return {
             "friction": self.mortar.friction,
             "tensile_strength_Pa": self.mortar.tensile_strength,
             "cohesion_Pa": self.mortar.cohesion,
             "tilt_deg": degrees(self.tilt),
+            **({} if self.curing is None else {"curing": str(self.curing)}),
         }
 
 

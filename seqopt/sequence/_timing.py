@@ -39,7 +39,9 @@ class StepTime:
 
     ``step``: its number; ``robots``: indices of those who act in it; ``prepares``: from when the
     one who takes a grip gets ready; ``ready``: when it is; both None where robots let go;
-    ``start``, ``end``: of what changes the structure.
+    ``start``, ``end``: of what changes the structure; ``cures``: since when mortar holds what
+    the step leads to, None where that was not asked; ``joint``: the one whose mortar it waits for,
+    empty if for none.
     """
 
     step: int
@@ -48,6 +50,13 @@ class StepTime:
     ready: float | None
     start: float
     end: float
+    cures: float | None = None
+    joint: str = ""
+
+
+Waits = Callable[[AnyStep, Sequence[float], float], tuple[float, str]]
+"""Says from when on, no sooner than a time, a step may be done after bricks were in their places at
+some times, and for which joint it waits; empty if for none."""
 
 
 def require_durations(scene: Scene, robots: Sequence[int] | None = None) -> tuple[Durations, ...]:
@@ -62,10 +71,14 @@ def require_durations(scene: Scene, robots: Sequence[int] | None = None) -> tupl
     return tuple(d for r in which if (d := scene.robots[r].durations) is not None)
 
 
-def step_times(scene: Scene, steps: Sequence[AnyStep]) -> tuple[StepTime, ...]:
+def step_times(
+    scene: Scene, steps: Sequence[AnyStep], waits: Waits | None = None
+) -> tuple[StepTime, ...]:
     """Return when every step of a build happens at the earliest, in the order that is given.
 
-    Steps are all of one build, from its first on. A `StepError` names robots that act of which it
+    Steps are all of one build, from its first on. ``waits``: what a step has to wait for besides,
+    where mortar cures: since nothing is gained by acting later, every step is done as soon as it
+    may. A `StepError` names robots that act of which it
     is not known how long they take.
 
     Examples
@@ -84,23 +97,39 @@ def step_times(scene: Scene, steps: Sequence[AnyStep]) -> tuple[StepTime, ...]:
     durations = dict(zip(busy, require_durations(scene, busy), strict=True))
     free, last = dict.fromkeys(busy, 0.0), dict[int, object]()
     before: Sequence[object] = (None,) * len(robots)
-    now, out = 0.0, list[StepTime]()
+    now, out, placed = 0.0, list[StepTime](), list[float]()
     for step in steps:
         acting = tuple(r for r in busy if step.grips[r] != before[r])
         taker = next((r for r in acting if step.grips[r] is not None), None)
-        if taker is None:
-            end = now + max((durations[r].release for r in acting), default=0.0)
-            out.append(StepTime(step.number, acting, None, None, now, end))
-            free |= dict.fromkeys(acting, end)
-        else:
-            own, node, placing = durations[taker], step.grips[taker], step.kind is StepKind.PLACE
-            ready = free[taker] + (own.fetch if placing else own.approach)
+        placing = step.kind is StepKind.PLACE
+        prepares = ready = None
+        acts, start = max((durations[r].release for r in acting), default=0.0), now
+        if taker is not None:
+            own, node, prepares = durations[taker], step.grips[taker], free[taker]
+            ready = prepares + (own.fetch if placing else own.approach)
             ready += way_seconds(scene, own, last.get(taker), node)
             start, last[taker] = max(now, ready), node
-            end = start + (own.place if placing else own.grip)
-            out.append(StepTime(step.number, acting, free[taker], ready, start, end))
-        now, before = end, step.grips
+            acts = own.place if placing else own.grip
+        cures, joint = (None, "") if waits is None else waits(step, placed, start)
+        start = start if cures is None else cures
+        if start == math.inf:
+            raise StepError(_never(step))
+        now = start + acts
+        out.append(StepTime(step.number, acting, prepares, ready, start, now, cures, joint))
+        placed += [now] * placing
+        if taker is None:
+            free |= dict.fromkeys(acting, now)
+        before = step.grips
     return tuple(out)
+
+
+def _never(step: AnyStep) -> str:
+    """Return why a step is never done."""
+    if step.kind is StepKind.PLACE:
+        why = "before the joints that it closes have any bond; no wait helps, but more grips may"
+    else:
+        why = "with all mortar cured; no wait helps, but more grips may"
+    return f"step {step.number} ({step.kind.value}): it is not proven to stand {why}"
 
 
 def way_seconds(scene: Scene, own: Durations, last: object, node: object) -> float:
@@ -139,7 +168,8 @@ class _Label(NamedTuple):
 
     ``end``: of the last step, s; ``since``: since when robots are free, s; of those who hold zero;
     ``has``: number of the grip of every robot; ``last``: node that each held last; ``chosen``: the
-    robots of all grips by then, the last one first.
+    robots of all grips by then, the last one first; ``placed``: where mortar cures, when bricks
+    were in their places, s.
     """
 
     end: float
@@ -147,15 +177,20 @@ class _Label(NamedTuple):
     has: tuple[int, ...]
     last: tuple[int | None, ...]
     chosen: tuple[int, Any] | None  # a robot, and what was chosen before it
+    placed: tuple[float, ...] = ()
 
 
 def reassigned_steps(
-    scene: Scene, steps: Sequence[Step], may: May, team: Sequence[int] | None = None
+    scene: Scene,
+    steps: Sequence[Step],
+    may: May,
+    team: Sequence[int] | None = None,
+    waits: Waits | None = None,
 ) -> tuple[Step, ...]:
     """Return the same grips in the same order by those robots with which the build takes least.
 
     ``may``: whether a robot, by its index, may have a grip; ``team``: the robots that take part, by
-    default all. A `StepError` says that there is no such choice.
+    default all; ``waits``: as of `step_times`. A `StepError` says that there is no such choice.
     """
     team = range(len(scene.robots)) if team is None else team
     own = dict(zip(team, require_durations(scene, team), strict=True))
@@ -169,11 +204,14 @@ def reassigned_steps(
         found = list[_Label]()
         for label in labels:
             if ended:
-                found.append(_let_go(label, [label.has.index(i) for i in ended], own))
+                ready = _cured(label, step, label.end, waits)
+                if ready.end < math.inf:
+                    found.append(_let_go(ready, [label.has.index(i) for i in ended], own))
                 continue
             for i in begun:
                 able = [r for r in team if label.has[r] == _NOTHING and may(r, every[i])]
-                found += [_take(scene, label, (r, i, every[i]), own[r]) for r in able]
+                after = [_take(scene, label, (r, i, every[i]), own[r], (step, waits)) for r in able]
+                found += [each for each in after if each.end < math.inf]
         labels = _undominated(found, moves=moves)
     if not labels:
         raise StepError("no robot may have a grip of the steps; nobody can be reassigned")
@@ -185,19 +223,33 @@ def reassigned_steps(
     return _with_robots(scene, steps, every, dict(zip(order, chosen[::-1], strict=True)))
 
 
-def _take(scene: Scene, label: _Label, which: tuple[int, int, Hold], own: Durations) -> _Label:
-    """Return what follows where a robot takes a grip."""
+def _cured(label: _Label, step: Step, start: float, waits: Waits | None) -> _Label:
+    """Return a label that ends no sooner than a time, and than mortar lets a step be done."""
+    return label._replace(end=start if waits is None else waits(step, label.placed, start)[0])
+
+
+def _take(
+    scene: Scene,
+    label: _Label,
+    which: tuple[int, int, Hold],
+    own: Durations,
+    asked: tuple[Step, Waits | None],
+) -> _Label:
+    """Return what follows where a robot takes a grip in a step."""
     robot, number, hold = which
     placing = hold.places is not None
     ready = label.since[robot] + (own.fetch if placing else own.approach)
     ready += way_seconds(scene, own, label.last[robot], hold.node)
-    end = max(label.end, ready) + (own.place if placing else own.grip)
+    step, waits = asked
+    start = _cured(label, step, max(label.end, ready), waits).end
+    end = start + (own.place if placing else own.grip)
     return _Label(
         end,
         _put(label.since, robot, 0.0),
         _put(label.has, robot, number),
         _put(label.last, robot, hold.node),
         (robot, label.chosen),
+        label.placed if waits is None or not placing else (*label.placed, end),
     )
 
 
@@ -217,7 +269,7 @@ def _put(values: tuple[_Part, ...], place: int, value: _Part) -> tuple[_Part, ..
 def _undominated(labels: Sequence[_Label], *, moves: bool) -> list[_Label]:
     """Return the labels that no other one of the same grips is nowhere above."""
     kept: dict[object, list[_Label]] = {}
-    for label in sorted(labels, key=lambda each: (each.end, each.since)):
+    for label in sorted(labels, key=lambda each: (each.end, each.since, each.placed)):
         own = kept.setdefault((label.has, label.last if moves else None), [])
         if not any(_nowhere_above(other, label) for other in own):
             own.append(label)
@@ -225,7 +277,8 @@ def _undominated(labels: Sequence[_Label], *, moves: bool) -> list[_Label]:
 
 
 def _nowhere_above(first: _Label, second: _Label) -> bool:
-    return all(a <= b for a, b in zip(first.since, second.since, strict=True))
+    pairs = zip((*first.since, *first.placed), (*second.since, *second.placed), strict=True)
+    return all(a <= b for a, b in pairs)
 
 
 def _with_robots(

@@ -13,7 +13,6 @@ from itertools import islice
 import numpy as np
 
 from seqopt.arrays import Floats
-from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.assembly import Assembly
 from seqopt.network.network import GROUND
 from seqopt.sequence.steps import Grips
@@ -37,6 +36,9 @@ class Way(Enum):
     EARLIER_MOTION = "earlier motion"
     CONES = "cone program"
 
+
+Parts = Callable[[int, Grips], Assembly]
+"""Gives partial structures with their grips, as `PartialAssemblies`."""
 
 Ask = Callable[[Assembly], Case]
 """Gives the case of an assembly: of a smallest z, of which is only asked whether it is zero."""
@@ -65,7 +67,7 @@ class VerdictChain:
     is only as good as the answer to whether it is zero.
     """
 
-    def __init__(self, parts: PartialAssemblies, ask: Ask, compiled: Compile) -> None:
+    def __init__(self, parts: Parts, ask: Ask, compiled: Compile) -> None:
         self._parts, self._ask, self._compile = parts, ask, compiled
         self._corner_force: Floats | None = None
         self._grip_force: dict[int, Floats] = {}

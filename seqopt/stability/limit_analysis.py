@@ -122,12 +122,15 @@ def limits(
 ) -> tuple[Floats, Floats, Floats]:
     """Return tension and cohesion (K,) and payloads (G,) borne at a z, over the force scale.
 
+    Of what does not grow with z, contacts bear the share that they have of the mortar's bond.
+
     ``own`` (G,): payload of every grip, N; by default the assembly's.
     """
     share = assembly.corner_area * assembly.stress_scale / assembly.scales[0]
     own = assembly.payload if own is None else own
     payload = case.payload[0] * own / assembly.scales[0] + z * case.payload[1]
-    tension, cohesion = (part[0] + z * part[1] for part in (case.tension, case.cohesion))
+    bond = assembly.bond[assembly.contact] if len(assembly.bond) else 1.0
+    tension, cohesion = (bond * part[0] + z * part[1] for part in (case.tension, case.cohesion))
     return share * tension, share * cohesion, payload
 
 

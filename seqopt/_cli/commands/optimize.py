@@ -21,8 +21,10 @@ from seqopt._cli.asked import (
     refused,
     scene_facts,
     strictly,
+    waits_said,
 )
 from seqopt._cli.options import (
+    CURING,
     DURATIONS,
     LIMIT,
     RULE,
@@ -103,7 +105,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     declare(command.add_argument_group("what is allowed"), LIMIT | BUDGET)
     form_options(command, strict=True, builds=True)
     states = "what plans are compared by, state after state, with any schedule"
-    declare(command.add_argument_group(states), AIM | FEWEST | STANDING)
+    declare(command.add_argument_group(states), AIM | FEWEST | STANDING | CURING)
     declare(command.add_argument_group("with --schedule free"), RULE | BASES | POLICY)
     criterion_options(command)
     engine_options(command)
@@ -295,6 +297,7 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
     stopped = plan.ended is End.INTERRUPTED
     over = () if stopped else exceeded(scene, table)
     lines = [f"{_said(found)}; {written_to(options.out)}"]
+    lines += map(wrapped, waits_said(plan) if plan.certificate is not None else ())
     lines += [f"stability, {each}" for each in found.own]
     lines += [wrapped(each.said) for each in (found.bases, found.props) if each is not None]
     lines += [wrapped(found.whole)] if found.whole else []

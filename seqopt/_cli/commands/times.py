@@ -6,9 +6,18 @@ import argparse
 from collections.abc import Iterator
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import asked_scene, asked_steps, idle_notes, in_seconds, scene_facts
+from seqopt._cli.asked import (
+    asked_scene,
+    asked_steps,
+    idle_notes,
+    in_seconds,
+    scene_facts,
+    waits_said,
+)
 from seqopt._cli.options import (
+    CURING,
     DURATIONS,
+    STANDING,
     STEPS_USAGE,
     declare,
     form_options,
@@ -17,11 +26,14 @@ from seqopt._cli.options import (
 )
 from seqopt._cli.outputs import figure_notes, require_out, time_files, write_outputs
 from seqopt._cli.terminal import wrapped
+from seqopt._cli.values import asked_standing
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.plan._times import busy_table
 from seqopt.plan.build import GivenSequence
+from seqopt.plan.judge._mortar.check import check_cured
+from seqopt.problem.standing import Standing
 
 DESCRIPTION = (
     "Say how long a build takes and who does what when. A robot that holds nothing prepares what "
@@ -46,6 +58,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     scene_options(basic)
     steps_options(basic)
     declare(basic, DURATIONS | REASSIGN)
+    declare(command.add_argument_group("mortar that cures"), STANDING | CURING)
     declare(basic, {"--out DIR": "folder to write plan.csv, times.csv and a chart to"})
     form_options(command)
 
@@ -56,18 +69,23 @@ def run(options: argparse.Namespace) -> Answer:
     scene = in_seconds(options, asked_scene(options))
     network = build_network(scene)
     steps = asked_steps(options, network)
-    build = GivenSequence(make_engine(USUAL, network), steps)
+    standing = _standing(options)
+    build = GivenSequence(make_engine(USUAL, network), steps, standing=standing)
     try:
         given = build.times()["end_s"].iloc[-1]
     except StepError as error:
-        raise ProblemError(f"--durations: {error}") from None
+        where = "--durations" if "durations" in str(error) else "--curing"
+        raise ProblemError(f"{where}: {error}") from None
     least = None
     if options.reassign:
-        build = GivenSequence(build.engine, build.reassigned())
+        build = GivenSequence(build.engine, build.reassigned(), standing=standing)
         least = build.times()["end_s"].iloc[-1]
     written = write_outputs(options, lambda: time_files(build))
-    busy = busy_table(scene, build.steps)
-    lines = [*_said(scene.name, len(steps), float(given), least)]
+    busy = busy_table(scene, build.steps, build._waits)
+    if build.standing is not None:
+        starts = build.times()["start_s"].tolist()
+        check_cured(build.engine.network, build.steps, build.standing, starts)
+    lines = [*_said(scene.name, len(steps), float(given), least), *waits_said(build)]
     for row in busy.to_dict("records"):
         spent = (
             f"{what} {row[f'{what}_s']:.6g} s" for what in ("prepares", "acts", "holds", "idle")
@@ -84,6 +102,14 @@ def run(options: argparse.Namespace) -> Answer:
         written=written,
         notes=(*idle_notes(scene, build.steps), *(figure_notes() if written else ())),
     )
+
+
+def _standing(options: argparse.Namespace) -> Standing | None:
+    """Return with what states must stand; mortar that does not cure says nothing of time."""
+    standing = asked_standing(options)
+    if standing is not None and not options.curing:
+        raise ProblemError("--stands: it goes with --curing here; seqopt assess says what stands")
+    return standing
 
 
 def _said(name: str, steps: int, given: float, least: float | None) -> Iterator[str]:

@@ -16,6 +16,7 @@ from seqopt.errors import ProblemError
 from seqopt.graph.scenarios import engine_for, require_alike
 from seqopt.graph.states._checks import checked_limits, of_states
 from seqopt.network.network import Network
+from seqopt.problem._cures import require_for_curing
 from seqopt.problem.problem import (
     LARGEST,
     STATE_RESPONSES,
@@ -489,7 +490,7 @@ def over_scenarios(
     for number, scene in enumerate(scenes, start=1):
         require_alike(problem.network.scene, scene, number)
     engines = tuple(engine_for(problem.engine, scene) for scene in scenes)
-    return replace(problem, scenarios=engines, over=over)
+    return _asked(replace(problem, scenarios=engines, over=over))
 
 
 def _asked(problem: States) -> States:
@@ -498,4 +499,5 @@ def _asked(problem: States) -> States:
         _ = problem.stability  # what cannot be asked is refused now
     if problem.is_timed:
         require_for_makespan(problem.network.scene, problem.rules)
+    require_for_curing(problem)
     return problem

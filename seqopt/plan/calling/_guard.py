@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from seqopt._interrupts import answered
-from seqopt.arrays import FrozenValue, Ints
+from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, SolverError, message_of
 from seqopt.graph._timed import LabelProof
 from seqopt.graph.layers.costs import LayeredCosts
@@ -172,7 +172,9 @@ class StatePath(FrozenValue):
     why the search ended before all was proven: ``time``, ``memory`` or ``interrupt``; empty if it
     did not; ``grips``: where it counts who of a kind acts, after every step the place that each
     robot of the scene holds, 0 for none; ``proofs``: of the makespan and the goals after it, of all
-    goals where there are budgets.
+    goals where there are budgets; ``starts``, ``ends``: where mortar cures, when steps start, s,
+    and the last one ends; ``motions``: by which labels there are a proof: states fall in them, (b,
+    6) in m and rad.
     """
 
     states: tuple[tuple[int, ...], ...]
@@ -183,6 +185,9 @@ class StatePath(FrozenValue):
     stopped: str = ""
     grips: tuple[tuple[int, ...], ...] = ()
     proofs: tuple[LabelProof, ...] = field(default=(), repr=False)
+    starts: tuple[float, ...] = ()
+    ends: float = 0.0
+    motions: tuple[Floats, ...] = field(default=(), repr=False)
 
 
 def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
@@ -205,8 +210,18 @@ def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
         prices = tuple(tuple(map(float, each)) for each in found.prices)
         grips = tuple(tuple(operator.index(n) for n in row) for row in found.grips)
         proofs = tuple(_arrays(proof) for proof in found.proofs)
-        told = (visited, prices, text(found.stopped), grips, proofs)
+        starts, motions = tuple(map(float, found.starts)), tuple(map(_motion, found.motions))
+        timed = starts, float(found.ends), motions
+        told = (visited, prices, text(found.stopped), grips, proofs, *timed)
         return StatePath(states, objective, bound, *told)
+
+
+def _motion(given: Floats) -> Floats:
+    """Return the motion of some bricks as numbers."""
+    out = np.array(given, dtype=float)
+    if out.ndim != 2 or out.shape[1] != 6 or not len(out):
+        raise ValueError(f"a motion of shape {out.shape}")
+    return out
 
 
 def _arrays(proof: LabelProof) -> LabelProof:

@@ -10,7 +10,8 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.states.states import States
 from seqopt.plan.judge._prop_rules import props_that_hold
-from seqopt.problem.problem import LARGEST, Goal
+from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.problem import LARGEST, Goal, Measure
 from seqopt.problem.requirements import state_costs
 from seqopt.responses._blocks import Block
 from seqopt.responses._grip_sets import solve_sets
@@ -28,6 +29,9 @@ class Answers(NamedTuple):
     values: Floats
     forces: Floats
     fit: Bools
+
+
+BAND = 1e-3  # share of a value within which six digits do not decide, far more than they err
 
 
 def ask(
@@ -98,3 +102,17 @@ def alike(
         key = (book.reached[r, last], tuple(nodes), may, most[r], gives, arm, takes)
         groups.setdefault(key, []).append(r)
     return [tuple(group) for group in groups.values() if len(group) > 1]
+
+
+def screens(problem: States) -> bool:
+    """Return whether six digits of responses tell nearly as much of what goals take of states."""
+    ratios = isinstance(problem.criterion, WorstRatio)
+    of_states = [goal for goal in problem.goals if goal.of_states and not goal.of_margins]
+    peaks = all(g.measure is Measure.PEAK and (g.response or ratios) for g in of_states)
+    return peaks and not problem.limits
+
+
+def near(values: Floats, bounds: Floats) -> Bools:
+    """Return the rows (n,) of which a value (n, k) is so close to a bound that digits decide."""
+    finite = bounds[np.isfinite(bounds)]
+    return np.asarray((np.abs(values[:, :, None] - finite) <= BAND * np.abs(finite)).any((1, 2)))

@@ -21,11 +21,11 @@ from seqopt.graph.graph import Graph
 from seqopt.graph.paths import lexicographic, reached, tied
 from seqopt.graph.states._visits import move_amounts
 from seqopt.graph.states.states import States
-from seqopt.plan.judge._answers import alike, ask
+from seqopt.plan.judge._answers import alike, ask, near, screens
+from seqopt.plan.judge._mortar.floors import cured_rows
 from seqopt.plan.judge._rule_moves import Follows, RuleTables, ScheduleTables
 from seqopt.plan.judge._standing_proof import StandingProof
 from seqopt.plan.judge._timed_goals import Claim, GoalProofs, TimedStates
-from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Measure
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses._grip_sets import KnownRows
@@ -34,7 +34,6 @@ from seqopt.sequence.rules import Payload
 from seqopt.sequence.schedule import Schedule
 
 FEW = 500  # grip sets of which all digits take no longer than to ask some of them twice
-BAND = 1e-3  # share of a value within which six digits do not decide, far more than they err
 
 
 Tables: TypeAlias = RuleTables | ScheduleTables
@@ -86,7 +85,7 @@ class Passable:
         self._numbers = np.concatenate([nodes + each for each in more])  # of grips, by place
         self._beyond = len(nodes) * kinds.of_robot[list(self.tables.team)]
         self.margins = sum(goal.of_margins for goal in problem.goals)
-        self._exact = not _screens(problem)  # whether all digits count
+        self._exact = not screens(problem)  # whether all digits count
 
     def least(self) -> tuple[float, ...]:
         """Return what goals take at least of any plan, for its end and the count of its steps.
@@ -166,6 +165,10 @@ class Passable:
         held = self._held(states, self._payload)
         return self.stands.allows_rows(self.tables.bricks_at(level), *held, margins)
 
+    def held_by(self, states: Ints) -> tuple[Ints, Floats]:
+        """Return nodes that robots hold where states must stand, ascending, and the most forces."""
+        return self._held(states, self._payload)
+
     def recalled(self, level: int, states: Ints, margins: Sequence[float]) -> Ints:
         """Return the same by what is known: -1 where it is proven, else 0 or 1."""
         held = self._held(states, self._payload)
@@ -205,10 +208,10 @@ class Passable:
         found: Floats = np.column_stack(ask(self.problem, bricks, grips, below, rough=not exact))
         if not exact:
             goals = len(self.problem.goals)
-            close = _near(found[:, goals:-1], self._most)
+            close = near(found[:, goals:-1], self._most)
             for k, value in enumerate(asked.values):
                 if self.problem.goals[k].measure is Measure.PEAK:
-                    close |= _near(found[:, [k]], np.array([value]))
+                    close |= near(found[:, [k]], np.array([value]))
             found[close] = np.column_stack(ask(self.problem, bricks, grips[close], below))
         return found
 
@@ -216,20 +219,6 @@ class Passable:
         """Return what goals take of moves to states with such values, (m, g)."""
         taken = np.column_stack([np.full(len(found.way), float(found.regrip)), found.way])
         return move_amounts(self.problem, values, taken)
-
-
-def _screens(problem: States) -> bool:
-    """Return whether six digits of responses tell nearly as much of what goals take of states."""
-    ratios = isinstance(problem.criterion, WorstRatio)
-    of_states = [goal for goal in problem.goals if goal.of_states and not goal.of_margins]
-    peaks = all(g.measure is Measure.PEAK and (g.response or ratios) for g in of_states)
-    return peaks and not problem.limits
-
-
-def _near(values: Floats, bounds: Floats) -> Bools:
-    """Return the rows (n,) of which a value (n, k) is so close to a bound that digits decide."""
-    finite = bounds[np.isfinite(bounds)]
-    return np.asarray((np.abs(values[:, :, None] - finite) <= BAND * np.abs(finite)).any((1, 2)))
 
 
 def _tables(problem: States, most: Mapping[int, float]) -> Tables:
@@ -322,8 +311,12 @@ class Proof:
                 return np.zeros(len(rows), dtype=bool)
             return ~passable.may_stand(level, rows, margins)
 
+        bricks = [passable.tables.bricks_at(level) if level else 0 for level in levels.levels]
+        grips = [passable.held_by(rows) for rows in levels.states]
+        cured = cured_rows(passable.problem, bricks, grips, claim.motions)
         while True:
-            states = TimedStates(passable.problem, passable.tables, levels.states, graph, fallen)
+            own = passable.tables, levels.states, graph, fallen, cured
+            states = TimedStates(passable.problem, *own)
             proofs = GoalProofs(states, claim)
             out = (*values[:k], *proofs.bounds(k))
             early = [b < v - BELOW * abs(v) for b, v in zip(out, values, strict=False)]

@@ -16,9 +16,11 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import SolverError
 from seqopt.graph.duality import _to_go
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import TIED
+from seqopt.plan.judge._mortar.floors import CuredRows
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind
 
@@ -28,6 +30,16 @@ BLOCK = 400_000  # acts that are looked at together
 
 def makespan(scene: Scene, steps: Sequence[Step]) -> float:
     """Return when the last of some steps ends, s: the longest way through what waits for what."""
+    return ([0.0, *step_ends(scene, steps)])[-1]
+
+
+def step_ends(
+    scene: Scene, steps: Sequence[Step], starts: Sequence[float] = ()
+) -> tuple[float, ...]:
+    """Return when steps end, s, at the earliest, or where they start at some times.
+
+    Raises `SolverError` if one starts before the one before it ends, or its robot is ready.
+    """
     ends, let_go, held = [0.0], dict[int, int](), dict[int, int]()
     grips: Sequence[int | None] = (None,) * len(scene.robots)
     for i, step in enumerate(steps, start=1):
@@ -48,9 +60,14 @@ def makespan(scene: Scene, steps: Sequence[Step]) -> float:
             ready = own.fetch if placing else own.approach
             waits.append(ends[let_go.get(r, 0)] + ready + way)
             held[r] = new
-        ends.append(max(waits) + acts)
+        start = max(waits)
+        if starts:
+            if not starts[i - 1] >= start - BETTER * abs(start):
+                raise SolverError(f"step {i} starts at {starts[i - 1]:.6g} s, not from {start:.6g}")
+            start = starts[i - 1]
+        ends.append(start + acts)
         grips = step.grips
-    return ends[-1]
+    return tuple(ends[1:])
 
 
 class Team(NamedTuple):
@@ -86,8 +103,11 @@ class TimedMoves:
     ``rows`` (n, c): states by their numbers in the graph; ``places`` (m,): which moves place.
     """
 
-    def __init__(self, graph: Graph, rows: Ints, places: Bools, team: Team) -> None:
+    def __init__(
+        self, graph: Graph, rows: Ints, places: Bools, team: Team, cured: CuredRows | None = None
+    ) -> None:
         self.graph, self.rows, self._places, self.team = graph, rows, places, team
+        self.cured = cured
         before, after = rows[graph.source], rows[graph.target]
         self.gains = np.zeros(
             after.shape, dtype=np.int64
@@ -153,15 +173,24 @@ class TimedMoves:
         return out
 
     def follow(
-        self, moves: Ints, column: int | None, end: Floats, since: Floats
-    ) -> tuple[Floats, Floats]:
+        self, moves: Ints, column: int | None, end: Floats, since: Floats, placed: Floats
+    ) -> tuple[Floats, Floats, Floats]:
         """Return labels after moves (k,): when they end (k,), and since when robots are free.
 
-        ``column``: who takes the grip, None where robots let go; ``end`` (k,), ``since`` (k, c): of
-        the labels before. Results: ``end`` (k,); ``since`` (k, c), sorted where robots are alike.
+        ``column``: who takes the grip, None where robots let go; ``end`` (k,), ``since`` (k, c),
+        ``placed`` (k, b): of the labels before. Results: ``end`` (k,), infinite where mortar never
+        lets it; ``since`` (k, c), sorted where robots are alike; ``placed`` (k, b).
         """
         ready, acts = self.seconds(moves, column)
         begins = end if column is None else np.maximum(end, since[:, column] + ready)
+        if self.cured is not None:
+            placed = placed.copy()
+            own = np.flatnonzero(self._places[moves])
+            brick = self.cured.bricks[self.graph.target[moves[own]]] - 1
+            placed[own, brick] = np.inf
+            to = self.graph.target[moves].astype(np.int64)
+            begins = self.cured.starts(to, placed, begins)
+            placed[own, brick] = begins[own] + acts[own]
         ends = begins + acts
         entries, free = self.rows[self.graph.source[moves]].copy(), since.copy()
         loses = self._loses[moves]
@@ -170,7 +199,7 @@ class TimedMoves:
         if column is not None:
             group = next(g for g in self.team.groups if column in g)
             entries[:, column], free[:, column] = self.gains[moves, group[0]], 0.0
-        return ends, self.sorted(entries, free)
+        return ends, self.sorted(entries, free), placed
 
     def sorted(self, entries: Ints, since: Floats) -> Floats:
         """Return readiness (k, c) in the order of sorted entries (k, c), of equal ones as well."""
@@ -227,7 +256,19 @@ class Closed:
         for block in _blocks(known[0], graph):
             missing.append(self._leads_to(known, *block))
         left = np.unique(np.concatenate(missing))
-        return bool(excused(left).all()) if len(left) else True, len(known[0])
+        return self._are_dead(left, excused), len(known[0])
+
+    def _are_dead(self, states: Ints, excused: Callable[[Ints], Bools]) -> bool:
+        """Return whether all ways from some states to an end pass one that is proven to fall."""
+        graph, seen = self._moves.graph, np.zeros(self._moves.graph.states, dtype=bool)
+        while len(states):
+            seen[states] = True
+            states = states[~excused(states)]
+            if graph.ends[states].any():
+                return False
+            after = np.unique(graph.target[np.isin(graph.source, states)]).astype(np.int64)
+            states = after[~seen[after]]
+        return True
 
     def _leads_to(self, known: tuple[Ints, Floats], label: Ints, move: Ints) -> Ints:
         """Return states of what follows from labels by moves, (k,) each, that none is below."""
@@ -238,11 +279,14 @@ class Closed:
             takes = able.releases(move) if column is None else able.candidates(move, column)
             own, which = move[takes], label[takes]
             values = known[1][which]
-            end, since = able.follow(own, column, values[:, 0], values[:, 1 : 1 + columns])
-            sums = values[:, 1 + columns :] + self._amounts[own]
+            last = 1 + columns + self._amounts.shape[1]
+            before = values[:, 0], values[:, 1 : 1 + columns], values[:, last:]
+            end, since, placed = able.follow(own, column, *before)
+            sums = values[:, 1 + columns : last] + self._amounts[own]
             to = self._moves.graph.target[own].astype(np.int64)
-            after = np.column_stack([end, since, sums])
-            out.append(to[self._lacks(known, to, after)])
+            after = np.column_stack([end, since, sums, placed])
+            ever = np.isfinite(end)
+            out.append(to[ever][self._lacks(known, to[ever], after[ever])])
         return np.concatenate(out)
 
     def _open(self, state: Ints, values: Floats) -> Bools:
@@ -256,7 +300,8 @@ class Closed:
         for prices, left in zip(self._prices, self._left, strict=True):
             bound = prices[0] * end + busy @ prices[1:] + left[state]
             ends = np.where(over, ends, np.maximum(ends, bound))
-        bounds = np.column_stack([ends, values[:, 1 + columns :] + self._sums[state]])
+        sums = values[:, 1 + columns : 1 + columns + self._amounts.shape[1]]
+        bounds = np.column_stack([ends, sums + self._sums[state]])
         most = np.array([self._limits.time, *self._limits.sums])
         slack = 1e-12 * np.abs(most)
         beyond = np.where(self._limits.strict, bounds >= most - slack, bounds > most)
@@ -274,6 +319,12 @@ class Closed:
         counted = values.copy()
         own = values[:, 1 : 1 + columns]
         counted[:, 1 : 1 + columns] = np.where(free, np.maximum(own, later), 0.0)
+        cured = self._moves.cured
+        if cured is not None:  # what has its full bond could as well be older
+            last = 1 + columns + self._amounts.shape[1]
+            older = np.maximum(values[:, last:], values[:, [0]] - cured.floors.full)
+            stands = np.arange(older.shape[1]) < cured.bricks[state][:, None]
+            counted[:, last:] = np.where(stands, older, 0.0)
         out = self._open(state, counted)
         rows = np.flatnonzero(out & ~self._moves.graph.ends[state])
         place, end = (np.searchsorted(known[0], state[rows], side=s) for s in ("left", "right"))

@@ -15,6 +15,7 @@ from seqopt.graph.duality import cut, potentials
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import tied
 from seqopt.graph.states.states import States
+from seqopt.plan.judge._mortar.floors import CuredRows
 from seqopt.plan.judge._rule_moves import RuleTables, ScheduleTables
 from seqopt.plan.judge._time_proof import Closed, Limits, Team, TimedMoves, kept_below, limit_below
 from seqopt.problem.problem import Measure
@@ -30,7 +31,7 @@ class TimedStates:
     """The states that a better build could pass, by level, and the moves between them.
 
     ``levels``: of rows (n, c), numbered one level after the other; ``fallen``: which rows (k,) of a
-    level are proven to fall.
+    level are proven to fall; ``cured``: what all of them ask of mortar, where it cures.
     """
 
     problem: States
@@ -38,6 +39,7 @@ class TimedStates:
     levels: Sequence[Ints]
     graph: Graph
     fallen: Fallen
+    cured: CuredRows | None = None
 
     @property
     def starts(self) -> Ints:
@@ -53,7 +55,7 @@ class TimedStates:
         if isinstance(rules, Schedule):
             kinds = [False, *(step.kind is StepKind.PLACE for step in rules.steps)]
             places = np.array(kinds)[level[graph.target]]
-        return TimedMoves(graph, rows.astype(np.int64), places, self._team())
+        return TimedMoves(graph, rows.astype(np.int64), places, self._team(), self.cured)
 
     def _team(self) -> Team:
         scene, tables = self.problem.network.scene, self.tables
@@ -120,12 +122,14 @@ class TimedStates:
 class Claim(NamedTuple):
     """What is claimed of a build in time.
 
-    ``values``: of all goals; ``bounds``: what no build stays below; ``proofs``: of the latter.
+    ``values``: of all goals; ``bounds``: what no build stays below; ``proofs``: of the latter;
+    ``motions``: in which states fall while mortar cures.
     """
 
     values: Sequence[float]
     bounds: Sequence[float]
     proofs: Sequence[LabelProof]
+    motions: Sequence[Floats] = ()
 
 
 class GoalProofs:
@@ -141,7 +145,7 @@ class GoalProofs:
         self._time, self._sums = np.inf, list[tuple[int, float]]()
         for k, cap in caps:
             self._cap(k, tied(cap))
-        self._filtered = not problem.budgets
+        self._filtered = not problem.budgets and states.cured is None
         self.states = 0
 
     def _cap(self, k: int, most: float) -> None:
@@ -190,8 +194,11 @@ class GoalProofs:
         prices = self._in_order(proof.prices)
         closed = Closed(moves, graph.amounts[:, columns], prices, limits)
         labels = self._states.numbers(proof)
-        if labels[1].shape[1] != 1 + self._states.tables.robots + len(columns):
-            labels = labels[0][:0], np.zeros((0, 1 + self._states.tables.robots + len(columns)))
+        cured = self._states.cured
+        bricks = 0 if cured is None else len(cured.floors.full)
+        width = 1 + self._states.tables.robots + len(columns) + bricks
+        if labels[1].shape[1] != width:
+            labels = labels[0][:0], np.zeros((0, width))
         is_proof, count = closed.is_proof(labels, self._states.all_fallen)
         self.states += count
         if is_proof:

@@ -19,11 +19,12 @@ import pandas as pd
 from seqopt.errors import SolverError, StepError
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
+from seqopt.plan.judge._mortar.check import check_cured
 from seqopt.plan.judge._posture_rules import check_postures
 from seqopt.plan.judge._proof import BELOW, Hint, Proof
 from seqopt.plan.judge._prop_rules import check_props
 from seqopt.plan.judge._standing_proof import proven_margins, require_margin
-from seqopt.plan.judge._time_proof import makespan
+from seqopt.plan.judge._time_proof import makespan, step_ends
 from seqopt.plan.judge._timed_goals import Claim
 from seqopt.plan.judge.certificate import Certificate
 from seqopt.problem.problem import LARGEST, Goal, Measure
@@ -83,7 +84,7 @@ def _in_time(
         if not spent <= cap + TOLERANCE * cap:
             raise SolverError(f"{goal} is {spent:.9g}, more than the {cap:g} that are allowed")
     margins = _margin_bounds(problem, proof, values)
-    claim = Claim(values, selection.bound, selection.proofs)
+    claim = Claim(values, selection.bound, selection.proofs, selection.motions)
     bounds = (*margins, *proof.timed_bounds(claim)[len(margins) :])
     pairs = list(zip(bounds, values, strict=False))
     bounds = tuple(v if b >= v - BELOW * abs(v) else b for b, v in pairs)
@@ -108,7 +109,7 @@ def _as_claimed(problem: States, selection: StatePath, steps: Sequence[Step]) ->
     else:
         check_free(problem.network, problem.rules, steps)
     check_postures(problem.network.scene, steps)
-    values = plan_values(problem, steps, selection.objective)
+    values = plan_values(problem, steps, selection.objective, selection.starts)
     for goal, value, claimed in zip(problem.names, values, selection.objective, strict=True):
         if not abs(value - claimed) <= TOLERANCE * max(abs(value), abs(claimed)):
             raise SolverError(f"{goal} is {value:.9g}, not {claimed:.9g} as claimed")
@@ -197,14 +198,17 @@ def _over_totals(
 
 
 def plan_values(
-    problem: States, steps: Sequence[Step], claimed: Sequence[float] = ()
+    problem: States,
+    steps: Sequence[Step],
+    claimed: Sequence[float] = (),
+    starts: Sequence[float] = (),
 ) -> tuple[float, ...]:
     """Return what goals take of a sequence, from the responses of its steps.
 
     ``claimed``: the value of every goal; margins of stability are compared with these, and taken
-    from them. Result: SI units. Over scenarios the largest, but ways, which are those of the scene
-    itself. Raises `SolverError` if a step exceeds a limit, does not stand as is demanded, or has
-    less of a margin.
+    from them; ``starts``: where mortar cures, when steps start, s. Result: SI units. Over scenarios
+    the largest, but ways, which are those of the scene itself. Raises `SolverError` if a step
+    exceeds a limit, does not stand as is demanded, or has less of a margin.
     """
     if problem.each:
         return _in_all(problem, steps, [plan_values(each, steps, claimed) for each in problem.each])
@@ -215,7 +219,7 @@ def plan_values(
     regrips = sum(step.kind is StepKind.REPOSITION for step in steps)
     travel = _travel_of(problem, steps)
     moves: dict[Measure, float] = {Measure.STEPS: len(steps), Measure.REGRIPS: regrips}
-    moves |= {Measure.TRAVEL: travel, Measure.MAKESPAN: makespan(problem.network.scene, steps)}
+    moves |= {Measure.TRAVEL: travel, Measure.MAKESPAN: _makespan(problem, steps, starts)}
     out = []
     for k, goal in enumerate(problem.goals):
         if goal.of_margins:
@@ -227,6 +231,15 @@ def plan_values(
             costs = _costs(problem, goal, columns, len(steps))
             out.append(float(costs.max() if goal.measure is Measure.PEAK else costs.sum()))
     return tuple(out)
+
+
+def _makespan(problem: States, steps: Sequence[Step], starts: Sequence[float]) -> float:
+    """Return how long a build takes, s, and require that no step comes before its mortar holds."""
+    standing, scene = problem.standing, problem.network.scene
+    if standing is None or standing.curing is None:
+        return makespan(scene, steps)
+    check_cured(problem.network, steps, standing, starts)
+    return step_ends(scene, steps, starts)[-1]
 
 
 def _in_all(

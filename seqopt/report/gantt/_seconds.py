@@ -20,13 +20,14 @@ from seqopt.report._pictures import DARK, LANE, LETTER, SHADES
 from seqopt.report._style import SMALL, new_picture, styled
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
-from seqopt.sequence._timing import StepTime, step_times
+from seqopt.sequence._timing import StepTime, Waits, step_times
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.steps import Step
 
 PER_STEP, NARROWEST, WIDEST = 0.15, 7.0, 30.0  # inches
 BESIDE = 1.8  # inches that names and the key of shades take
 PREPARES = "#e8e8e8"
+CURES = "#f3dcc0"
 
 
 @styled
@@ -35,12 +36,16 @@ def seconds_picture(
     steps: Sequence[Step],
     responses: pd.DataFrame,
     shown: tuple[int | None, int | None] = (None, None),
+    waits: Waits | None = None,
 ) -> Figure:
-    """Return the grips of a build over seconds, a lane per robot, shaded by their forces."""
+    """Return the grips of a build over seconds, a lane per robot, shaded by their forces.
+
+    ``waits``: as of `step_times`, where mortar cures: such waits are marked behind all lanes.
+    """
     first, last = shown[0] or 1, len(steps) if shown[1] is None else shown[1]
     if not 1 <= first <= last <= len(steps):
         raise StepError(f"steps {first} to {last}: the build has steps 1 to {len(steps)}")
-    times = step_times(scene, steps)
+    times = step_times(scene, steps, waits)
     begin, end = 0.0 if first == 1 else times[first - 2].end, times[last - 1].end
     width = float(np.clip(PER_STEP * (last - first + 1) + BESIDE, NARROWEST, WIDEST))
     figure = new_picture(width, 0.62 * len(scene.robots) + 1.3)
@@ -56,7 +61,12 @@ def seconds_picture(
             _label(axes, scene, hold, (stops[0][0], stops[-1][1], inch))
     for time in times[first - 1 : last]:
         _prepared(axes, time)
-    _frame(axes, scene, (begin, end))
+    ends = [0.0, *(time.end for time in times)]
+    pairs = zip(ends[first - 1 : last], times[first - 1 : last], strict=True)
+    spans = [span for end, time in pairs if (span := _cured(end, time)) is not None]
+    for span in spans:
+        axes.axvspan(*span, fc=CURES, lw=0, zorder=0, gid="cures")
+    _frame(axes, scene, (begin, end), cures=bool(spans))
     figure.colorbar(shade, ax=axes, label="grip force, N", pad=0.01)
     return figure
 
@@ -73,7 +83,13 @@ def _bar(axes: Axes, hold: Hold, stops: Sequence[tuple[float, float]], colors: n
         axes.plot([begin] * 2, [low, low + LANE], color=DARK, lw=3.2)
 
 
-def _frame(axes: Axes, scene: Scene, span: tuple[float, float]) -> None:
+def _cured(before: float, time: StepTime) -> tuple[float, float] | None:
+    """Return from when to when a step after an end waits for mortar alone, s, if it does."""
+    ready = max(before, time.ready or 0.0)
+    return (ready, time.start) if time.joint and time.start > ready else None
+
+
+def _frame(axes: Axes, scene: Scene, span: tuple[float, float], *, cures: bool) -> None:
     """Set lanes, limits and names, and explain the marks."""
     room = 0.01 * (span[1] - span[0])
     limits: Any = {"xlim": (span[0] - room, span[1] + room)}
@@ -87,8 +103,10 @@ def _frame(axes: Axes, scene: Scene, span: tuple[float, float]) -> None:
         Line2D([], [], color=DARK, marker="|", ms=11, mew=3.2, lw=0, label="places the brick"),
         Patch(fc="white", ec=DARK, label="holds it (brick · node)"),
     ]
+    if cures:
+        handles.append(Patch(fc=CURES, label="waits for mortar"))
     place: Any = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.2}
-    axes.legend(handles=handles, ncols=3, frameon=False, **place)
+    axes.legend(handles=handles, ncols=len(handles), frameon=False, **place)
 
 
 def _stops(times: Sequence[StepTime], hold: Hold) -> list[tuple[float, float]]:

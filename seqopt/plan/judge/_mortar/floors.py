@@ -1,0 +1,111 @@
+"""How long states of a build wait at least for mortar that cures, as its judge finds it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.contact.curing import Curing
+from seqopt.graph.states.states import States
+from seqopt.network.network import Network
+from seqopt.problem.standing import Standing
+from seqopt.stability._aging.builds import JointsInTime
+from seqopt.stability._aging.cuts import FallCuts
+
+Grips = tuple[Ints, Floats]
+CLOSE = 1e-9  # of a time: what rounding may take from an age
+
+
+class Floors:
+    """How long states wait for mortar at least, by motions in which they fall; each is checked.
+
+    ``motions``: as told, (b, 6) in m and rad.
+    """
+
+    def __init__(self, network: Network, standing: Standing, motions: Sequence[Floats]) -> None:
+        curing = standing.curing or Curing()
+        joints = JointsInTime(network, curing)
+        self._cuts = FallCuts(network, standing.mortar, joints)
+        for motion in motions:
+            if len(motion) <= len(network.inner):
+                self._cuts.add(motion)
+        self._brick, self._points = joints.closing, [curing.points_of(n) for n in joints.names]
+        ages = np.array([points[-1][0] if points else 0.0 for points in self._points])
+        self.full = np.zeros(len(network.inner))  # age at which all joints of a brick are cured, s
+        np.maximum.at(self.full, self._brick, ages)
+
+    def starts(self, bricks: int, grips: Grips, placed: Floats, start: Floats) -> Floats:
+        """Return from when on, no sooner than times (k,), s, states are not proven to fall.
+
+        ``grips``: nodes held, ascending, as places in build order from 1, and largest forces, N,
+        (k, r); ``placed`` (k, b): when bricks were in their places, infinite for the one that is
+        placed. Result: infinite where no wait is enough.
+        """
+        out = start.copy()
+        rows = np.flatnonzero(self._falls(bricks, grips, placed, out))
+        while len(rows):
+            out[rows] = self._next(bricks, placed[rows], out[rows])
+            rows = rows[np.isfinite(out[rows])]
+            own = grips[0][rows], grips[1][rows]
+            rows = rows[self._falls(bricks, own, placed[rows], out[rows])]
+        return out
+
+    def _joints(self, bricks: int) -> list[int]:
+        return [j for j, brick in enumerate(self._brick.tolist()) if brick < bricks]
+
+    def _falls(self, bricks: int, grips: Grips, placed: Floats, now: Floats) -> Bools:
+        bond = np.zeros((len(now), len(self._joints(bricks))))
+        for j in self._joints(bricks):
+            age = np.maximum(now - placed[:, self._brick[j]], 0.0) + CLOSE * np.abs(now)
+            for at, share in self._points[j]:
+                bond[age >= at, j] = share
+        return self._cuts.fall(bricks, grips, bond)
+
+    def _next(self, bricks: int, placed: Floats, now: Floats) -> Floats:
+        """Return when the next joint has more of its bond, (k,), s."""
+        out = np.full(len(now), np.inf)
+        for j in self._joints(bricks):
+            for at, _ in self._points[j]:
+                then = placed[:, self._brick[j]] + at
+                later = then > now + 2 * CLOSE * np.abs(now)
+                out = np.where(later & (then < out), then, out)
+        return out
+
+
+class CuredRows(NamedTuple):
+    """What rows of states ask of mortar that cures.
+
+    ``floors``: under waits; ``bricks`` (n,): that stand; ``held``, ``payload`` (n, r): grips.
+    """
+
+    floors: Floors
+    bricks: Ints
+    held: Ints
+    payload: Floats
+
+    def starts(self, state: Ints, placed: Floats, start: Floats) -> Floats:
+        """Return from when on, no sooner than times (k,), s, states may begin; see `Floors`."""
+        out = start.copy()
+        for bricks in np.unique(self.bricks[state]).tolist():
+            rows = np.flatnonzero(self.bricks[state] == bricks)
+            grips = self.held[state[rows]], self.payload[state[rows]]
+            out[rows] = self.floors.starts(bricks, grips, placed[rows], start[rows])
+        return out
+
+
+def cured_rows(
+    problem: States, bricks: Sequence[int], grips: Sequence[Grips], motions: Sequence[Floats]
+) -> CuredRows | None:
+    """Return what rows of states, level by level, ask of mortar; None where none cures.
+
+    ``bricks``: how many stand; ``grips``: as of `Floors.starts`.
+    """
+    standing = problem.standing
+    if standing is None or standing.curing is None:
+        return None
+    held, payload = (np.concatenate([each[k] for each in grips]) for k in (0, 1))
+    count = np.repeat(bricks, [len(each) for each, _ in grips])
+    return CuredRows(Floors(problem.network, standing, motions), count, held, payload)

@@ -1,0 +1,159 @@
+"""Builds whose mortar cures: what bonds joints have when, and from when on a state stands.
+
+A joint's age counts from the end of the step that places the brick which closes it. Bonds only
+grow, so a state that stands with what its joints have when it begins stands while it lasts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from seqopt.arrays import Floats
+from seqopt.contact._partial_assemblies import PartialAssemblies
+from seqopt.contact.assembly import Assembly
+from seqopt.contact.curing import Curing
+from seqopt.contact.faces import Contacts
+from seqopt.contact.mortar import Mortar
+from seqopt.errors import SceneError, StepError
+from seqopt.network.network import Network
+from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
+from seqopt.stability._prover import Proven
+from seqopt.stability._verdict_chain import VerdictChain
+from seqopt.stability.assessment import Verdict, _verdict_of, bonded
+from seqopt.stability.limit_analysis import compile_equilibrium
+
+SLACK = 1e-9  # of a time: ages this much short of a point count as there
+
+
+class JointsInTime:
+    """The joints of a scene, and which share of its bond each has when.
+
+    ``names`` (J,): in the order of contacts; ``closing`` (J,): index, in build order, of the brick
+    that closes it; ``ages``, ``shares`` (J, k): what is reached when; infinite, and 1, where a
+    joint has fewer points.
+    """
+
+    def __init__(self, network: Network, curing: Curing) -> None:
+        contacts, springs = Contacts(network), network.springs
+        self.names = tuple(contacts[i][0] for i in springs.acting(len(network.inner)).tolist())
+        unknown = [name for name, _ in curing.joints if name not in self.names]
+        if unknown:
+            raise SceneError(
+                f"curing: scene {network.scene.name} has no joint {unknown[0]}; its joints are "
+                f"named as {', '.join(self.names[:3])}"
+            )
+        self.closing = np.asarray(springs.since[springs.acting(len(network.inner))] - 1)
+        points = [curing.points_of(name) for name in self.names]
+        most = max(map(len, points), default=0)
+        self.ages, self.shares = np.full((len(points), most), np.inf), np.ones((len(points), most))
+        for row, own in enumerate(points):
+            for k, (age, share) in enumerate(own):
+                self.ages[row, k], self.shares[row, k] = age, share
+
+    @cached_property
+    def full(self) -> Floats:
+        """At which age all joints that a brick closes have their full bond, (b,), s."""
+        last = np.where(np.isfinite(self.ages), self.ages, 0.0).max(axis=1, initial=0.0)
+        out = np.zeros(int(self.closing.max(initial=-1)) + 1)
+        np.maximum.at(out, self.closing, last)
+        return out
+
+    def count(self, bricks: int) -> int:
+        """Return how many joints so many bricks have."""
+        return int(np.searchsorted(self.closing, bricks))
+
+    def at(self, bricks: int, time: Floats, placed: Floats) -> Floats:
+        """Return the shares of bond (n, j) that joints have at times (n,), s.
+
+        ``placed`` (n, b): when bricks were in their places; that which a step places counts as
+        placed with it.
+        """
+        count = self.count(bricks)
+        since = placed[:, self.closing[:count]]
+        age = np.maximum(time[:, None] - since, 0.0) + SLACK * np.abs(time[:, None])
+        reached = (age[:, :, None] >= self.ages[:count]).sum(axis=2)
+        table = np.pad(self.shares[:count], ((0, 0), (1, 0)))
+        return np.asarray(np.take_along_axis(table[None], reached[:, :, None], axis=2)[:, :, 0])
+
+    def events(self, bricks: int, placed: Floats) -> Floats:
+        """Return when joints reach points, (n, j * k), s; see `at`."""
+        count = self.count(bricks)
+        since = placed[:, self.closing[:count]]
+        return np.asarray((since[:, :, None] + self.ages[:count]).reshape(len(placed), -1))
+
+
+class CuringBuilds:
+    """Says from when on states of a build stand with what their joints have then; proven.
+
+    ``asked``: how many states were looked at, each with bonds.
+    """
+
+    def __init__(self, network: Network, mortar: Mortar, curing: Curing) -> None:
+        self.network, self.joints = network, JointsInTime(network, curing)
+        self._parts = PartialAssemblies(network, len(network.inner))
+        self._bond = np.zeros(0)
+        self._chain = VerdictChain(self._bonded, lambda a: bonded(a, mortar), compile_equilibrium)
+        self._found: dict[tuple[int, Grips, bytes], tuple[Verdict, Floats | None]] = {}
+        self.asked = 0
+
+    def _bonded(self, bricks: int, grips: Grips) -> Assembly:
+        return self._parts(bricks, grips).with_bond(self._bond)
+
+    def verdict(self, bricks: int, grips: Grips, bond: Floats) -> tuple[Verdict, Floats | None]:
+        """Return whether a state stands with shares of bond (j,), and in which motion it falls.
+
+        The motion (b, 6) is in m and rad; None where it does not fall.
+        """
+        key = bricks, grips, bond.tobytes()
+        if key not in self._found:
+            self._bond = bond
+            assembly, proven, _ = self._chain(bricks, grips)
+            self.asked += 1
+            self._found[key] = _verdict_of(proven), _motion(assembly, proven)
+        return self._found[key]
+
+    def waits(self, step: AnyStep, placed: Sequence[float], start: float) -> tuple[float, str]:
+        """Return from when on the state of a step stands, no sooner than at a time, s.
+
+        ``placed``: when bricks were in their places, in build order. Beside it the joint whose bond
+        was the last that was missing, empty if none was; never, if no wait is enough. Raises
+        `StepError` if the step takes a brick away.
+        """
+        if step.kind is StepKind.REMOVE:
+            raise StepError(f"step {step.number} takes a brick away: curing is of builds alone")
+        bricks, rows = step.bricks, np.full((1, step.bricks), np.inf)
+        rows[0, : len(placed[:bricks])] = placed[:bricks]
+        if self._stands(step, start, rows):
+            return start, ""
+        events = self.joints.events(bricks, rows)[0]
+        times = np.unique(events[np.isfinite(events) & (events > start)])
+        low, high = -1, len(times)
+        if high and self._stands(step, float(times[-1]), rows):
+            high -= 1
+        while high - low > 1 and high < len(times):
+            middle = (low + high) // 2
+            low, high = (low, middle) if self._stands(step, times[middle], rows) else (middle, high)
+        if high == len(times):
+            return np.inf, ""
+        per_joint = self.joints.ages.shape[1]
+        joint = int(np.flatnonzero(events == times[high])[0]) // per_joint
+        return float(times[high]), self.joints.names[joint]
+
+    @property
+    def motions(self) -> tuple[Floats, ...]:
+        """The motions (b, 6) in which states were found to fall, m and rad."""
+        return tuple(motion for _, motion in self._found.values() if motion is not None)
+
+    def _stands(self, step: AnyStep, time: float, placed: Floats) -> bool:
+        bond = self.joints.at(step.bricks, np.array([time]), placed)[0]
+        assert isinstance(step, Step)  # of a plan: no grip is open
+        return self.verdict(step.bricks, step.grips, bond)[0] is Verdict.STANDS
+
+
+def _motion(assembly: Assembly, proven: Proven) -> Floats | None:
+    if _verdict_of(proven) is not Verdict.FALLS:
+        return None
+    return np.asarray(proven.answer.motion / np.repeat([1.0, assembly.scales[1]], 3))

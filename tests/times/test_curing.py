@@ -1,0 +1,228 @@
+"""Mortar that cures: least times by enumeration, limits, and a judge that looks again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import seqopt
+from seqopt.contact.curing import Curing, find_curing
+from seqopt.errors import InfeasibleError, ProblemError, SceneError, SolverError, StepError
+from seqopt.plan._status import Status
+from seqopt.plan.judge._mortar.check import check_cured
+from seqopt.plan.judge.schedules import judge_schedule
+from seqopt.problem.standing import Standing
+from seqopt.sequence.rules import FreeRules, with_robots
+from seqopt.stability._aging.builds import CuringBuilds, JointsInTime
+from tests.brute_force import ONES
+from tests.times.builders import WORDS, engine_of
+from tests.times.curing import least_cured_makespan
+
+ALONE = FreeRules(least_grips=1)
+CRITERION = seqopt.CRITERIA["worst-ratio-published"]
+TACK = "0s=0.005,1min=0.02,5min=0.4,15min=1"
+
+
+def cured(engine, words, aim="makespan", rules=ALONE, **asked):
+    standing = Standing("epoxy", curing=words)
+    return seqopt.solve(seqopt.pose(engine, rules, ONES, aim, stands=standing, **asked))
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return cured(engine_of(4, 2), "10h")
+
+
+CASES = [
+    (3, 2, (), ALONE, "0s=0.002,10min=1"),
+    pytest.param(
+        *(3, 2, ("rob2:slower=2.5",), ALONE, "0s=0.002,10min=1 2-3:0s=0.002,1h=1"),
+        marks=pytest.mark.slow,
+    ),
+    pytest.param(4, 2, (), ALONE, "5min=1", marks=pytest.mark.slow),
+    pytest.param(
+        *(4, 2, (), ALONE, "1min=0.001,10min=1"), marks=[pytest.mark.slow, pytest.mark.long]
+    ),
+]
+
+
+@pytest.mark.parametrize(("bricks", "robots", "words", "rules", "curing"), CASES)
+def test_the_least_is_that_of_all_builds_and_waits(bricks, robots, words, rules, curing):
+    engine = engine_of(bricks, robots, *words)
+    plan = cured(engine, curing, rules=rules)
+    least = least_cured_makespan(engine, rules, curing, plan.makespan + 1e-6)
+    assert plan.makespan == pytest.approx(least, rel=1e-9)
+    assert plan.status is Status.OPTIMAL
+    assert plan.certificate.bounds == pytest.approx(plan.certificate.values)
+
+
+def test_where_no_wait_is_enough_there_is_no_plan():
+    engine = engine_of(3, 2)
+    assert np.isinf(least_cured_makespan(engine, ALONE, "10min=1"))
+    with pytest.raises(InfeasibleError, match="stand while mortar cures"):
+        cured(engine, "10min=1")
+
+
+def test_instant_bond_takes_as_long_as_ever_and_none_as_dry():
+    engine = engine_of(4, 3)
+    rules = FreeRules()
+    usual = seqopt.solve(seqopt.pose(engine, rules, ONES, "makespan", stands="epoxy"))
+    dry = seqopt.solve(seqopt.pose(engine, rules, ONES, "makespan", stands="dry"))
+    for words, same in (("0", usual), ("1e-6s", usual), ("never", dry), ("1e9h=1", dry)):
+        plan = cured(engine, words, rules=rules)
+        assert plan.makespan == pytest.approx(same.makespan), words
+        assert plan.status is Status.OPTIMAL
+
+
+@pytest.mark.parametrize("robots", [2, pytest.param(3, marks=pytest.mark.slow)])
+def test_slower_mortar_makes_no_build_shorter(robots):
+    engine = engine_of(4 if robots == 2 else 6, robots)
+    rules = FreeRules(least_grips=robots - 1)
+    found = [cured(engine, words, rules=rules).makespan for words in ("0", "10h", "100h")]
+    assert found == sorted(found)
+    if robots == 2:
+        assert found[-1] > found[0]
+
+
+def test_no_step_comes_before_its_proof(plan):
+    times, standing, network = plan.times(), plan.standing, plan.engine.network
+    starts = times["start_s"].tolist()
+    check_cured(network, plan.steps, standing, starts)
+    waits = np.flatnonzero(times["cures_s"] > 0)
+    assert len(waits) == 2
+    assert set(times["joint"].iloc[waits]) == {"1-2", "2-3"}
+    for i in waits.tolist():
+        early = list(starts)
+        early[i] -= 0.02 * times["cures_s"].iloc[i]
+        with pytest.raises(SolverError, match=f"step {i + 1} is not proven to stand with the bond"):
+            check_cured(network, plan.steps, standing, early)
+
+
+def test_the_chart_marks_waits_for_mortar(plan):
+    axes = plan.gantt().axes[0]
+    spans = [each for each in axes.patches if each.get_gid() == "cures"]
+    waits = plan.times().query("cures_s > 0")
+    assert [each.get_width() for each in spans] == pytest.approx(waits["cures_s"].tolist())
+    assert "waits for mortar" in [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def judged(plan, **changes):
+    return judge_schedule(replace(plan.graph), replace(plan.selection, **changes), plan.steps)
+
+
+def test_the_judge_refuses_early_starts_and_missing_motions(plan):
+    assert judged(plan).gap == 0
+    starts = plan.selection.starts
+    early = (*starts[:2], starts[2] - 1.0, *starts[3:])
+    with pytest.raises(SolverError, match="step 3 is not proven to stand"):
+        judged(plan, starts=early)
+    with pytest.raises(SolverError, match="step 2 starts at"):
+        judged(plan, starts=(*starts[:1], starts[1] - 1.0, *starts[2:]))
+    with pytest.raises(SolverError, match="0 starts for"):
+        judged(plan, starts=())
+    with pytest.raises(SolverError, match="labels do not prove"):
+        judged(plan, motions=plan.selection.motions[:1])
+    lies = tuple(np.roll(each, 1, axis=1) for each in plan.selection.motions)
+    with pytest.raises(SolverError, match="labels do not prove"):
+        judged(plan, motions=lies)
+
+
+@pytest.mark.slow
+def test_states_from_which_all_ways_fall_need_no_labels():
+    scene = with_robots(seqopt.load_scene("chain:bricks=7"), 2).with_durations(WORDS)
+    engine = seqopt.make_engine("compliance", scene)
+    standing = Standing("bond=5e3", curing="0s=0.1,15min=1")
+    plan = seqopt.solve(seqopt.pose(engine, ALONE, CRITERION, "makespan", stands=standing))
+    assert (plan.makespan, plan.status) == (1180.0, Status.OPTIMAL)
+
+
+@pytest.mark.slow
+def test_waits_of_a_given_plan_are_the_least():
+    scene = seqopt.load_scene("arch25").with_durations(
+        "fetch=30,place=10,approach=10,grip=5,release=5"
+    )
+    network = seqopt.build_network(scene)
+    steps, standing = seqopt.cantilever(network), Standing("epoxy", curing=TACK)
+    engine = seqopt.make_engine("compliance", network)
+    build = seqopt.GivenSequence(engine, steps, standing=standing)
+    table = build.times()
+    assert build.makespan > seqopt.GivenSequence(engine, steps).makespan
+    row = table.loc[table["cures_s"].idxmax()]
+    early = table["start_s"].to_numpy().copy()
+    early[int(row["step"]) - 1] -= 0.02 * row["cures_s"]
+    with pytest.raises(SolverError, match=f"step {row['step']} is not proven to stand"):
+        check_cured(network, steps, standing, early.tolist())
+    moved = seqopt.GivenSequence(engine, build.reassigned(), standing=standing)
+    assert moved.makespan <= build.makespan
+    check_cured(network, moved.steps, standing, moved.times()["start_s"].tolist())
+    unbonded = seqopt.GivenSequence(engine, steps, standing=Standing("epoxy", curing="15min"))
+    with pytest.raises(StepError, match="before the joints that it closes have any"):
+        unbonded.times()
+
+
+SHARES = st.lists(st.floats(1e-6, 0.99), min_size=1, max_size=4, unique=True).map(sorted)
+
+
+@settings(max_examples=10, deadline=None)
+@given(SHARES, st.integers(1, 10**4), st.lists(st.floats(0, 1e5), min_size=5, max_size=5))
+def test_bonds_only_grow(shares, last, times):
+    ages = [last * k for k in range(len(shares) + 1)]
+    curing = Curing(tuple(zip(ages, [*shares, 1.0], strict=True)))
+    joints = JointsInTime(engine_of(5, 2).network, curing)
+    placed = np.sort(np.array(times))[None]
+    found = [joints.at(5, np.array([now]), placed)[0] for now in np.linspace(0, 3e5, 20)]
+    assert (np.diff(found, axis=0) >= 0).all()
+    assert (found[-1] == 1.0).all()
+    again = find_curing(str(curing))
+    assert [again.share(age) for age in ages] == pytest.approx([*shares, 1.0], rel=1e-5)
+
+
+def test_with_full_bond_verdicts_are_those_without_age():
+    network = engine_of(5, 2).network
+    builds = CuringBuilds(network, seqopt.EPOXY, find_curing("15min"))
+    steps = [step for step in seqopt.sequential(network) if step.bricks > 1]
+    for mortar, share in ((seqopt.EPOXY, 1.0), (seqopt.DRY, 0.0)):
+        wanted = [r.verdict for r in seqopt.assess_steps(network, steps, mortar)]
+        shares = [np.full(builds.joints.count(step.bricks), share) for step in steps]
+        pairs = zip(steps, shares, strict=True)
+        assert [builds.verdict(s.bricks, s.grips, bond)[0] for s, bond in pairs] == wanted
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("15", None),
+        ("soon", "'soon' is no age; give 15min"),
+        ("-1min", "no age; give zero or more"),
+        ("5min=0.4", "the last share is 0.4; give 1 last"),
+        ("5min=0.4,3min=1", "ages and shares must rise"),
+        ("5min=x,15min=1", "share 'x'"),
+        ("15min 30min", "give one law for all joints"),
+        ("1-2:15min", "give one law for all joints"),
+        ("never 1-2:15min", "never cures beside others"),
+        ("15min 8-9:1h", "no joint 8-9; its joints are named as ground-1"),
+    ],
+)
+def test_words_of_curing(words, said):
+    if said is None:
+        assert find_curing(words).points[-1] == (15.0, 1.0)
+        return
+    with pytest.raises(SceneError, match=said):
+        JointsInTime(engine_of(4, 2).network, find_curing(words))
+
+
+def test_what_is_not_modeled_says_so():
+    engine = engine_of(4, 2)
+    with pytest.raises(ProblemError, match="add makespan to the aims"):
+        cured(engine, "15min", "steps")
+    with pytest.raises(ProblemError, match="bond beside it is not modeled"):
+        cured(engine, "15min", "bond,makespan")
+    with pytest.raises(ProblemError, match="tilt: it is not modeled while mortar cures"):
+        Standing("epoxy", 0.1, "15min")
+    problem = seqopt.pose(engine, ALONE, ONES, "makespan", stands=Standing("epoxy", curing="1h"))
+    with pytest.raises(ProblemError, match="makespan_flow: it does not know mortar that cures"):
+        seqopt.solve(problem, "makespan_flow")
