@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, cast
 
 import numpy as np
 
@@ -26,16 +26,17 @@ from formulations.states._search import (
 from formulations.times._labels import STEPS, Caps, Labels, LateError, Sweep, Swept
 from formulations.times._prices import Prices, best_prices
 from seqopt.arrays import Bools, Terse
-from seqopt.errors import InfeasibleError, TimeUpError
+from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph._timed import LabelProof, TimedGraph, timed_graph
 from seqopt.graph.graph import Graph
+from seqopt.graph.instances.instance import PEAK, TIME, Instance
 from seqopt.graph.paths import distances, keep_best, reached, tied
 from seqopt.graph.states._visits import FreeStates, steps_of
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
-from seqopt.problem.problem import Measure
+from seqopt.problem.problem import Goal, Measure
 from seqopt.sequence._reassign import reassigned_steps
 from seqopt.sequence._rule_space import FreeSpace, node_numbers
 from seqopt.sequence._timing import step_times
@@ -117,13 +118,33 @@ def beams(
     return best
 
 
+class _Goals(Protocol):
+    """What is asked: by goals, of which the last ones are capped."""
+
+    @property
+    def goals(self) -> tuple[Goal, ...]: ...
+
+    @property
+    def aims(self) -> tuple[Goal, ...]: ...
+
+    @property
+    def budgets(self) -> tuple[float, ...]: ...
+
+
 class Stages:
     """Goals of a problem one after the other, on a graph in time."""
 
-    def __init__(self, problem: States, visited: Visited, choose: Choose, watch: Watch) -> None:
+    def __init__(
+        self,
+        problem: _Goals,
+        visited: Visited,
+        choose: Choose,
+        watch: Watch,
+        timed: TimedGraph | None = None,
+    ) -> None:
         self._problem, self._choose, self._watch = problem, choose, watch
         self._visited = visited
-        self._timed = timed_graph(problem, visited)
+        self._timed = timed or timed_graph(cast(States, problem), visited)
         graph = self._timed.graph
         budgets = dict(enumerate(problem.budgets, start=len(problem.aims)))
         is_time = {k: problem.goals[k].measure is Measure.MAKESPAN for k in budgets}
@@ -280,6 +301,14 @@ class Stages:
         """Return what goals take of a path, that of makespans left at zero."""
         return [self._taken(path, k) for k in range(len(self._problem.goals))]
 
+    def makespan(self, path: Sequence[int]) -> float:
+        """Return when a path ends if those act who are soonest ready."""
+        graph, kept = self._timed.graph, np.zeros(len(self._timed.prepares), dtype=bool)
+        codes = graph.source.astype(np.int64) * graph.states + graph.target
+        kept[np.searchsorted(codes, [a * graph.states + b for a, b in pairwise((0, *path))])] = True
+        prices = best_prices(self._timed, kept, Watch(0.0))
+        return Sweep(self._timed, prices, kept, Caps()).run(Watch()).best
+
     def _proof(self, labels: Sequence[Labels], prices: Prices) -> LabelProof:
         """Return labels with the states that they are of."""
         columns = self._timed.free.shape[1]
@@ -310,7 +339,7 @@ class _InTime(Terse):
 
     def __call__(
         self,
-        problem: States,
+        problem: States | Instance,
         *,
         seconds: float = np.inf,
         max_memory: float = np.inf,
@@ -318,6 +347,8 @@ class _InTime(Terse):
     ) -> StatePath:
         """Return the plan of the chosen path; where time or memory ends early, the best so far."""
         watch = Watch(seconds)
+        if isinstance(problem, Instance):
+            return _of_instance(problem, self.choose, watch)
         tell = watched(problem, watch, max_memory, progress)
         return after_margins(
             problem, lambda rest: _searched(rest, self.choose, watch, tell, progress), tell
@@ -410,6 +441,36 @@ def _by_then(
     return replace(found, objective=values, grips=grips)
 
 
+class _Asking(NamedTuple):
+    goals: tuple[Goal, ...]
+    aims: tuple[Goal, ...]
+    budgets: tuple[float, ...]
+
+
+def _of_instance(instance: Instance, choose: Choose, watch: Watch) -> StatePath:
+    """Return the best path through an instance, its states the numbers of nodes."""
+    timed = instance.timed
+    if timed is None:
+        raise ProblemError(f"instance {instance.name}: no times are asked; take path_dp")
+    own = {PEAK: Measure.PEAK, TIME: Measure.MAKESPAN}
+    aims = tuple(Goal(own.get(goal.kind, Measure.SUM)) for goal in instance.goals)
+    caps = [Measure.MAKESPAN if c.column is None else Measure.SUM for c in instance.caps]
+    asked = _Asking((*aims, *map(Goal, caps)), aims, tuple(cap.most for cap in instance.caps))
+    stages = Stages(asked, Visited(timed.graph, ((0, 0, instance.states),)), choose, watch, timed)
+    try:
+        found = stages.run()
+    except StopError as stop:
+        return plan_by_then(None, stop)
+    makespan = stages.makespan(found.path)
+    pairs = zip(aims, stages.values(found.path), strict=False)
+    values = [makespan if goal.measure is Measure.MAKESPAN else v for goal, v in pairs]
+    bounds = [min(b, v) for b, v in zip(found.bounds, values, strict=False)]
+    bounds += values[len(bounds) :]
+    states, late = tuple((node,) for node in found.path), "time" * found.late
+    proofs = tuple(found.proofs)
+    return StatePath(states, tuple(values), tuple(bounds), stopped=late, proofs=proofs)
+
+
 def in_time(name: str, summary: str, kind: FormulationKind, choose: Choose) -> Formulation:
     """Return the formulation of time that chooses a path by a function of an `Asked`."""
-    return Formulation(name, summary, kind, None, _InTime(choose), on=On.TIMES, takes_budgets=True)
+    return Formulation(name, summary, kind, None, _InTime(choose), on=On.TIMES, also=(On.GRAPHS,), takes_budgets=True)

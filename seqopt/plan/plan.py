@@ -13,12 +13,13 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError
-from seqopt.graph.layers.interface import PlacementProblem
+from seqopt.graph.instances.instance import Instance
+from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.graph.states.states import States
-from seqopt.plan._status import ENDS, FoundOrder, KeptPostures, Status
+from seqopt.plan._status import ENDS, FoundOrder, KeptPostures, Status, bare_summary
 from seqopt.plan._tables import (
     Objectives,
     alternatives,
@@ -60,7 +61,7 @@ class Plan(ShownBuild):
     ----------
     problem : Problem or PlacementProblem
         What was asked; or the graph of choices, where that was given.
-    graph : Layers, ScenarioLayers, States or PlacementProblem
+    graph : Layers, ScenarioLayers, States, Instance or PlacementProblem
         What was chosen from.
     formulation : Formulation
         The formulation that solved it.
@@ -91,8 +92,8 @@ class Plan(ShownBuild):
     (<Status.OPTIMAL: 'optimal'>, 0)
     """
 
-    problem: Problem | PlacementProblem | States | AllOrders
-    graph: PlacementProblem | States
+    problem: Problem | PlacementProblem | States | AllOrders | Instance
+    graph: PlacementProblem | States | Instance
     formulation: Formulation
     selection: Selection | StatePath
     certificate: Certificate | None
@@ -105,7 +106,8 @@ class Plan(ShownBuild):
 
     def __repr__(self) -> str:
         what = f"{self.scene_name!r}, {self.method!r}, " if self.steps else ""
-        return f"Plan({what}by {self.formulation.name}: {len(self.steps)} steps, {self.result})"
+        count = f"{len(self.steps)} steps" if self.steps else f"{len(self.nodes)} nodes"
+        return f"Plan({what}by {self.formulation.name}: {count}, {self.result})"
 
     @property
     def layers(self) -> Layers:
@@ -157,6 +159,8 @@ class Plan(ShownBuild):
         """The names of what was made small, the most important first, then of what has budgets."""
         if isinstance(self.graph, States):
             return self.graph.names
+        if isinstance(self.problem, Instance):
+            return tuple(goal.name for goal in self.problem.goals)
         if isinstance(self.graph, ScenarioLayers):
             return (str(self.graph.aim),)
         return ("minmax" if self.formulation.aim is Aim.PEAK else "sum",)
@@ -254,7 +258,9 @@ class Plan(ShownBuild):
 
     @property
     def nodes(self) -> tuple[int, ...]:
-        """The node chosen for every move."""
+        """The node chosen for every move, or the nodes of a path through an instance."""
+        if isinstance(self.graph, Instance):
+            return tuple(state[0] for state in self.selection.states)
         choice = self.choice
         assert not isinstance(self.graph, States)  # it has no choice
         return self.graph.nodes(choice)
@@ -377,7 +383,7 @@ class Plan(ShownBuild):
         ``order_bound`` (on the first aim, of any order), ``order_bound_proven``,
         ``order_evaluated`` and ``order_stopped``; the ``engine`` and ``versions``.
         """
-        return _summarized(self)
+        return bare_summary(self) if isinstance(self.graph, CostProblem | Instance) else _summarized(self)
 
 
 def _summarized(plan: Plan) -> dict[str, object]:
