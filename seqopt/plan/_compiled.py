@@ -15,7 +15,7 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph._timed import TimedGraph, timed_graph
 from seqopt.graph.graph import Graph
-from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _Cap, _Target, by_goal
+from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _Cap, _Target, _by_goal
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.orders import MOST_PARTS, AllOrders, OrderStates
 from seqopt.graph.paths import distances, reached
@@ -158,7 +158,7 @@ def _of_states(name: str, graph: States | AllOrders, below: float) -> Instance:
         whole = Graph(whole.source, whole.target, whole.amounts[:, every], peaks, whole.ends)
     small, kept = _useful(whole)
     if timed is not None:
-        timed = _cut(timed, whole, kept, by_goal(small, asked[1:]))
+        timed = _cut(timed, whole, kept, _by_goal(small, asked[1:]))
     return _instance(name, small, asked, rows[kept], timed)
 
 

@@ -25,7 +25,7 @@ from seqopt.plan.calling.formulation import (
     formulations,
 )
 from seqopt.plan.judge.bare._claims import Claim, as_layers
-from seqopt.plan.judge.bare.judging import judge_instance
+from seqopt.plan.judge.bare._judging import judge_instance
 from seqopt.plan.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Aim
@@ -128,7 +128,11 @@ def _claims(instance: Instance, found: StatePath) -> list[Claim]:
         own = [Claim() for _ in kinds]
         for k, proof in enumerate(found.proofs[: len(kinds) - first], start=first):
             if kinds[k] == TIME and len(proof.prices):
-                own[k] = Claim(shares=_shares(instance, proof.prices[0]))
+                shares, labels = _shares(instance, proof.prices), None
+                if len(proof.labels):
+                    labels = proof.states[:, 1], proof.labels
+                value = None if labels is None else found.bound[k]
+                own[k] = Claim(value, shares=shares, labels=labels)
         return own
     if kinds == [TAIL]:
         return [Claim(weights=np.array(found.prices[0]))] if found.prices else []
@@ -145,7 +149,7 @@ def _claims(instance: Instance, found: StatePath) -> list[Claim]:
 
 
 def _shares(instance: Instance, prices: Floats) -> Floats:
-    """Return the share of all, and of a robot of every kind, of prices by column."""
+    """Return the share of all, and of a robot of every kind, of prices (L, 1 + c) by column."""
     assert instance.timed is not None  # prices are of robots
-    kinds = instance.timed.kinds
-    return np.array([prices[0], *(prices[1 + np.flatnonzero(kinds == k)[0]] for k in set(kinds))])
+    _, firsts = np.unique(instance.timed.kinds, return_index=True)
+    return np.asarray(prices[:, [0, *(1 + firsts)]])

@@ -15,7 +15,7 @@ from seqopt._files import read_bytes
 from seqopt.errors import FileError
 from seqopt.graph._timed import TimedGraph
 from seqopt.graph.graph import Graph
-from seqopt.graph.instances.instance import Instance, _Cap, _Target, by_goal
+from seqopt.graph.instances.instance import Instance, _Cap, _Target, _by_goal
 
 FORMAT, VERSION = "seqopt-instance", 1
 TEXT = "instance.json"  # the name of the text in the archive
@@ -159,6 +159,6 @@ def _instance(document: dict[str, Any], arrays: dict[str, np.ndarray]) -> Instan
         own = [arrays[f"timed_{name}"] for name in (*TIMED, "longest")]
         whole = [each.astype(np.int64) if each.dtype.kind in "iu" else each for each in own]
         graph = Graph(*rows, amounts, (False,) * len(names), ends)
-        timed = TimedGraph(by_goal(graph, (goals, caps)), states[:, 0], *whole)
+        timed = TimedGraph(_by_goal(graph, (goals, caps)), states[:, 0], *whole)
     made = (goals, caps, states, timed, document["facts"])
     return Instance(document["name"], *rows, ends, names, amounts, *made)

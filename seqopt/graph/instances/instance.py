@@ -161,13 +161,13 @@ class Instance(FrozenValue, Shown):
         }
 
 
-def target_sums(goal: _Target, totals: Floats) -> float:
+def _target_sums(goal: _Target, totals: Floats) -> float:
     """Return what a ``tail`` makes of totals (S,): the mean of the largest, by their weights."""
     weights = np.clip(1.0 - goal.most * np.arange(len(totals)), 0.0, goal.most)
     return float(np.sort(totals)[::-1] @ weights / weights.sum())
 
 
-def by_goal(graph: Graph, asked: tuple[tuple[_Target, ...], tuple[_Cap, ...]]) -> Graph:
+def _by_goal(graph: Graph, asked: tuple[tuple[_Target, ...], tuple[_Cap, ...]]) -> Graph:
     """Return a graph with one column for every goal and cap, nothing where a time is asked."""
     goals, caps = asked
     columns = [g.columns[0] if g.columns else None for g in goals] + [cap.column for cap in caps]

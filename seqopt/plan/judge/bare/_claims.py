@@ -19,11 +19,12 @@ from seqopt.errors import SolverError
 from seqopt.graph._budgets import _least_sum, _least_worst
 from seqopt.graph.duality import ROUNDING, cut, least_sum
 from seqopt.graph.graph import Graph
-from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _Target
+from seqopt.graph.instances.instance import PEAK, SUM, TAIL, Instance, _Target
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.paths import TIED, tied
 from seqopt.plan.judge._budget_proof import least_within
+from seqopt.plan.judge.bare._labels import Labels, labels_prove
 
 ABOVE = 1e-6  # over a value: how far a claim may be above what is proven
 
@@ -34,7 +35,9 @@ class Claim(FrozenValue):
 
     ``potentials`` (n,): infinite where nothing is said of a node; ``cut``: nodes, the start among
     them; ``prices``: by name of a cap or of a sum before; ``weights``: of columns of a tail;
-    ``shares``: of the time of all, then of a robot of every kind.
+    ``shares`` (L, 1 + k): of the time of all, then of a robot of every kind; ``labels``: nodes
+    (N,), and (N, 1 + c + q) when the last act ended, since when robots are free, zero where they
+    hold, and sums that are limited.
     """
 
     value: float | None = None
@@ -43,6 +46,7 @@ class Claim(FrozenValue):
     prices: Mapping[str, float] = field(default_factory=dict)
     weights: Floats | None = None
     shares: Floats | None = None
+    labels: Labels | None = None
 
 
 class Stage(NamedTuple):
@@ -241,21 +245,44 @@ def _time(
     """Return when the last act ends at the earliest, by shares of the time of robots."""
     timed = instance.timed
     assert timed is not None  # an instance that asks for a time has it
-    sizes = timed.sizes.astype(float)
     kept = np.isin(_codes(instance.graph), _codes(stage.graph))
-    if claim.shares is None:
-        tries = np.eye(len(sizes)) / sizes
-        if claim.potentials is None:
-            bounds = [_sum(stage, timed.work[kept] @ own, claim, limited) for own in tries]
-            return max(bounds)
+    if claim.shares is None and claim.potentials is not None:
         raise SolverError("potentials of a time: give the shares that they are for as well")
-    shares = claim.shares
-    if shares.shape != sizes.shape or not (shares >= 0).all() or shares @ sizes > 1 + 1e-9:
+    shares = _shares(timed.sizes.astype(float), claim.shares)
+    if claim.labels is not None and claim.value is not None:
+        columns = np.array([c for _, c, _ in stage.limited], dtype=np.int64)
+        most = np.array([most for *_, most in stage.limited])
+        _require_labels(instance, claim.labels, len(columns))
+        said = claim.value, claim.labels, shares
+        if labels_prove(timed, (stage.graph, kept), (columns, most), said):
+            return claim.value
+        raise SolverError(f"labels do not prove that no path ends before {claim.value:.9g}")
+    bounds = [_sum(stage, timed.work[kept] @ own, claim, limited) for own in shares]
+    return max(bounds) * (1 - 1e-12)
+
+
+def _require_labels(instance: Instance, labels: Labels, sums: int) -> None:
+    """Raise an error unless labels are of nodes, with as many numbers as there should be."""
+    assert instance.timed is not None  # labels are asked of times alone
+    nodes, values = labels
+    width = 1 + len(instance.timed.kinds) + sums
+    named = len(nodes) == 0 or (nodes.min() >= 0 and nodes.max() < instance.nodes)
+    if values.shape != (len(nodes), width) or not named or not np.isfinite(values).all():
+        raise SolverError(f"labels: give nodes, and for each a row of {width} numbers")
+
+
+def _shares(sizes: Floats, given: Floats | None) -> Floats:
+    """Return shares (L, 1 + k) that prove a bound; those of one kind each if none are given."""
+    if given is None:
+        return np.asarray(np.eye(len(sizes)) / sizes)
+    shares = np.atleast_2d(given)
+    wrong = shares.shape[1] != len(sizes) or not (shares >= 0).all()
+    if wrong or (shares @ sizes > 1 + 1e-9).any():
         raise SolverError(
             f"shares: give {len(sizes)} numbers from 0, that of all and one for a robot of every "
             f"kind; with {', '.join(f'{s:g}' for s in sizes)} of each they add up to 1 at most"
         )
-    return _sum(stage, timed.work[kept] @ shares, claim, limited) * (1 - 1e-12)
+    return shares
 
 
 def _codes(graph: Graph) -> Ints:

@@ -18,7 +18,7 @@ from seqopt.plan.judge.bare._claims import Claim
 from seqopt.scene._checks import short
 
 WHAT = ("nodes", "arcs", "acts")
-KEYS = ("value", "potentials", "cut", "prices", "weights", "shares")
+KEYS = ("value", "potentials", "cut", "prices", "weights", "shares", "labels")
 
 
 class Answer(NamedTuple):
@@ -134,8 +134,25 @@ def _claim(given: Any, where: str) -> Claim:
         raise ProblemError(f"{where}, prices: give them by name of a cap, or of a sum before")
     arrays = {
         name: None if given.get(name) is None else _floats(given[name], f"{where}, {name}")
-        for name in ("potentials", "weights", "shares")
+        for name in ("potentials", "weights")
     }
+    shares = None if given.get("shares") is None else _table(given["shares"], f"{where}, shares")
     cut = None if given.get("cut") is None else _whole(given["cut"], f"{where}, cut")
+    labels = None if given.get("labels") is None else _labels(given["labels"], f"{where}, labels")
     number = None if value is None else float(_floats([value], where)[0])
-    return Claim(number, arrays["potentials"], cut, dict(prices), arrays["weights"], arrays["shares"])
+    return Claim(number, **arrays, cut=cut, prices=dict(prices), shares=shares, labels=labels)
+
+
+def _table(given: Any, where: str) -> Floats:
+    """Return rows of numbers; one row may be given alone."""
+    try:
+        return np.atleast_2d(np.array(given, dtype=float))
+    except (TypeError, ValueError):
+        raise ProblemError(f"{where}: give rows of as many numbers each") from None
+
+
+def _labels(given: Any, where: str) -> tuple[Ints, Floats]:
+    """Return labels: nodes and a row of numbers for each."""
+    if not isinstance(given, Mapping) or {*given} != {"nodes", "values"}:
+        raise ProblemError(f"{where}: give nodes and values")
+    return _whole(given["nodes"], f"{where}, nodes"), _table(given["values"], f"{where}, values")

@@ -10,7 +10,7 @@ import numpy as np
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import SolverError
 from seqopt.graph._timed import HELD, NOW, TimedGraph
-from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _Target, target_sums
+from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _Target, _target_sums
 from seqopt.plan.judge.bare._claims import (
     ABOVE,
     Claim,
@@ -37,7 +37,7 @@ def judge_instance(instance: Instance, solution: Any, bounds: Any = ()) -> Certi
         ``nodes``, ``arcs`` or ``acts`` and, if they are to be checked, ``values`` and ``bounds``.
     bounds : path, sequence or mapping, optional
         For every goal, the most important first, a mapping: ``value`` and what proves it:
-        ``potentials``, ``cut``, ``prices``, ``weights``, ``shares``.
+        ``potentials``, ``cut``, ``prices``, ``weights``, ``shares``, ``labels``.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def judge_instance(instance: Instance, solution: Any, bounds: Any = ()) -> Certi
     >>> import seqopt
     >>> instance = seqopt.compile_instance(seqopt.optimize("arch25").problem)
     >>> plan = seqopt.solve(instance)
-    >>> proof = seqopt.judge_instance(instance, plan.selection.nodes)
+    >>> proof = seqopt.judge_instance(instance, plan.nodes)
     >>> round(proof.objective, 5), proof.gap
     (657.46456, 0.0)
     """
@@ -137,7 +137,7 @@ def _value(instance: Instance, goal: _Target, path: _Walk) -> float:
     worth = {
         SUM: lambda: float(own.sum()),
         PEAK: lambda: float(own.max(initial=0.0)),
-        TAIL: lambda: target_sums(goal, own.sum(axis=0)),
+        TAIL: lambda: _target_sums(goal, own.sum(axis=0)),
         TIME: lambda: path.ends,
     }
     return worth[goal.kind]()
@@ -170,6 +170,7 @@ def _bounds(
             bound = max(bound, within_caps(instance, value, claim.prices))
         bare = claim.potentials is None and claim.cut is None
         bare &= claim.weights is None and claim.shares is None and not claim.prices
+        bare &= claim.labels is None
         _require_modest(goal, claim, (value, bound), bare=bare)
         if not bound < value - BELOW * abs(value):
             bound = value
