@@ -54,10 +54,10 @@ def _mps(instance: Instance, found: Program) -> Iterator[str]:
     yield "COLUMNS"
     whole = int(found.whole.sum())
     columns, later = found.matrix.tocsc(), found.later.tocsc()
-    yield " MARKER MARKER 'MARKER' 'INTORG'"
+    yield " MARKER 'MARKER' 'INTORG'"
     for j, name in enumerate(found.names):
         if j == whole:
-            yield " MARKER MARKER 'MARKER' 'INTEND'"
+            yield " MARKER 'MARKER' 'INTEND'"
         yield f" {name} goal_0 {float(found.cost[j])!r}"
         for part, called in ((later, "goal"), (columns, "")):
             for i in range(part.indptr[j], part.indptr[j + 1]):
@@ -65,7 +65,7 @@ def _mps(instance: Instance, found: Program) -> Iterator[str]:
                 label = f"goal_{row + 1}" if called else found.rows[row]
                 yield f" {name} {label} {float(part.data[i])!r}"
     if whole == len(found.names):
-        yield " MARKER MARKER 'MARKER' 'INTEND'"
+        yield " MARKER 'MARKER' 'INTEND'"
     yield "RHS"
     right = np.where(np.isfinite(found.low), found.low, found.high)
     for row in np.flatnonzero(right).tolist():
