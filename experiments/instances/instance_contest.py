@@ -112,7 +112,9 @@ def _listed(name: str, found: dict) -> dict[str, object]:
         "instance": name,
         "nodes": one.nodes,
         "arcs": one.arcs,
-        "asked": ", ".join([g.name for g in one.goals] + [f"{c.name} <= {c.most:g}" for c in one.caps]),
+        "asked": ", ".join(
+            [g.name for g in one.goals] + [f"{c.name} <= {c.most:g}" for c in one.caps]
+        ),
         "value": proof.values[0],
         "proven": proof.bounds[0],
         "values": " ".join(f"{v:.9g}" for v in proof.values),

@@ -72,7 +72,6 @@ class _OnGraph(Terse):
             return best_total(problem, self.choose, watch, tell)
         return after_margins(problem, lambda rest: chosen(rest, self.choose, watch, tell), tell)
 
-
     def _of_instance(self, instance: Instance, watch: Watch) -> StatePath:
         if instance.caps:
             raise ProblemError(f"formulation {self.name}: it takes no caps; take schedule_search")

@@ -456,7 +456,13 @@ def _of_instance(instance: Instance, choose: Choose, watch: Watch) -> StatePath:
     aims = tuple(Goal(own.get(goal.kind, Measure.SUM)) for goal in instance.goals)
     caps = [Measure.MAKESPAN if c.column is None else Measure.SUM for c in instance.caps]
     asked = _Asking((*aims, *map(Goal, caps)), aims, tuple(cap.most for cap in instance.caps))
-    stages = Stages(asked, Visited(timed.graph, ((0, 0, np.arange(instance.nodes)[:, None]),)), choose, watch, timed)
+    stages = Stages(
+        asked,
+        Visited(timed.graph, ((0, 0, np.arange(instance.nodes)[:, None]),)),
+        choose,
+        watch,
+        timed,
+    )
     try:
         found = stages.run()
     except StopError as stop:
@@ -473,4 +479,13 @@ def _of_instance(instance: Instance, choose: Choose, watch: Watch) -> StatePath:
 
 def in_time(name: str, summary: str, kind: FormulationKind, choose: Choose) -> Formulation:
     """Return the formulation of time that chooses a path by a function of an `Asked`."""
-    return Formulation(name, summary, kind, None, _InTime(choose), on=On.TIMES, also=(On.GRAPHS,), takes_budgets=True)
+    return Formulation(
+        name,
+        summary,
+        kind,
+        None,
+        _InTime(choose),
+        on=On.TIMES,
+        also=(On.GRAPHS,),
+        takes_budgets=True,
+    )

@@ -235,13 +235,14 @@ class Plan(ShownBuild):
     @property
     def result(self) -> str:
         """The value of the plan, and what is proven about it, in words."""
-        if isinstance(self.graph, States):
+        if isinstance(self.graph, States | Instance):
             values = ", ".join(
                 f"{name} {value_text(name, v)}" for name, v in self.objective.items()
             )
             left = 0.0 if self.certificate is None else self.certificate.gap
             within = f" within {left:.2g}" if TOLERANCE < left < inf else ""
-            among = f" among candidates {self.among}" if self.among else ""
+            among = getattr(self.graph, "among", "")
+            among = f" among candidates {among}" if among else ""
             return f"{values}, {self.status}{within}{among}"
         if self.certificate is None:
             return "not compared with the optimum"
@@ -383,7 +384,11 @@ class Plan(ShownBuild):
         ``order_bound`` (on the first aim, of any order), ``order_bound_proven``,
         ``order_evaluated`` and ``order_stopped``; the ``engine`` and ``versions``.
         """
-        return bare_summary(self) if isinstance(self.graph, CostProblem | Instance) else _summarized(self)
+        return (
+            bare_summary(self)
+            if isinstance(self.graph, CostProblem | Instance)
+            else _summarized(self)
+        )
 
 
 def _summarized(plan: Plan) -> dict[str, object]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from importlib.resources import files
 from pathlib import Path
 
 from seqopt._files import write_bytes, write_folder
@@ -21,7 +22,8 @@ def read_instance(path: Path | str) -> Instance:
     Parameters
     ----------
     path : path
-        An archive (``.npz``), as `save_instance` writes it.
+        An archive (``.npz``), as `save_instance` writes it, or a folder with one; or the name of a
+        built-in instance, as ``chain-12-way``.
 
     Returns
     -------
@@ -43,7 +45,16 @@ def read_instance(path: Path | str) -> Instance:
     ...     seqopt.read_instance(f"{folder}/arch25.npz") == instance
     True
     """
-    return read(Path(path))
+    path = Path(path)
+    if path.is_dir():
+        return read(path / "instance.npz")
+    built_in = Path(str(files("seqopt").joinpath("data/instances")))
+    if not path.exists() and (built_in / f"{path}.npz").is_file():
+        return read(built_in / f"{path}.npz")
+    if not path.exists() and path.suffix == "":
+        known = ", ".join(sorted(each.stem for each in built_in.glob("*.npz")))
+        raise FileError(f"instance {path} does not exist; give a file, or one of {known}")
+    return read(path)
 
 
 def save_instance(instance: Instance, path: Path | str) -> None:
@@ -67,7 +78,9 @@ def save_instance(instance: Instance, path: Path | str) -> None:
         return
     if path.suffix not in WRITERS:
         known = ", ".join(WRITERS)
-        raise FileError(f"{path}: {path.suffix} is no format of instances; give {known}, or a folder")
+        raise FileError(
+            f"{path}: {path.suffix} is no format of instances; give {known}, or a folder"
+        )
     write_bytes(path, WRITERS[path.suffix](instance))
 
 

@@ -128,7 +128,7 @@ def _more(instance: Instance, timed: TimedGraph | None) -> _More:
     if timed is None:
         return _More(names, at, np.inf)
     at["end"] = first + len(names)
-    names.append("end")
+    names.append("makespan")  # what LP files call end is their own
     at["node"] = first + len(names)
     names += [f"T{v}" for v in range(instance.nodes)]
     at["since"] = first + len(names)
@@ -224,14 +224,16 @@ def _times(draft: _Draft, instance: Instance, timed: TimedGraph, more: _More) ->
     _after(draft, "act", (node + after, node + before), acts, (every, big))
     own = column >= 0
     free = since + robots * before + column
-    _after(draft, "own", ((node + after)[own], free[own]), (acts + prepares)[own], (every[own], big))
+    _after(
+        draft, "own", ((node + after)[own], free[own]), (acts + prepares)[own], (every[own], big)
+    )
     for c in range(robots):
         origin = timed.origin[:, c]
         rows = np.flatnonzero(origin != HELD)
         from_node = origin[rows] == NOW
         was = np.where(from_node, node + after[rows], since + robots * before[rows] + origin[rows])
         is_ = since + robots * after[rows] + c
-        _after(draft, f"free{c}", (is_, was), np.zeros(len(rows)), (rows, big))
+        _after(draft, f"ready{c}", (is_, was), np.zeros(len(rows)), (rows, big))
     ends = np.flatnonzero(instance.ends)
     none = np.full(len(ends), NEVER)
     last = np.full(len(ends), more.at["end"])

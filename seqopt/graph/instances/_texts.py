@@ -112,9 +112,7 @@ def _lp(instance: Instance, found: Program) -> Iterator[str]:
     yield "End"
 
 
-def _terms(
-    start: str, columns: np.ndarray, values: np.ndarray, names: list[str]
-) -> Iterator[str]:
+def _terms(start: str, columns: np.ndarray, values: np.ndarray, names: list[str]) -> Iterator[str]:
     """Yield lines of a sum; one of nothing has a term that is nothing."""
     terms = [
         f"{'-' if v < 0 else '+'} {abs(float(v))!r} {names[c]}"

@@ -258,7 +258,7 @@ class Closed:
             ends = np.where(over, ends, np.maximum(ends, bound))
         bounds = np.column_stack([ends, values[:, 1 + columns :] + self._sums[state]])
         most = np.array([self._limits.time, *self._limits.sums])
-        slack = 1e-12 * np.abs(most)
+        slack = np.where(np.isfinite(most), 1e-12 * np.abs(most), 0.0)
         beyond = np.where(self._limits.strict, bounds >= most - slack, bounds > most)
         return np.asarray(~beyond.any(axis=1))
 

@@ -99,7 +99,9 @@ def _walked(instance: Instance, answer: Answer) -> _Walk:
     for step, arc in enumerate(arcs.tolist(), start=1):
         if instance.source[arc] != at:
             where = f"{instance.source[arc]} to {instance.target[arc]}"
-            raise SolverError(f"step {step}: arc {arc} leads from {where}; the path is at node {at}")
+            raise SolverError(
+                f"step {step}: arc {arc} leads from {where}; the path is at node {at}"
+            )
         at = int(instance.target[arc])
     if not instance.ends[at]:
         raise SolverError(f"the path stops at node {at}, where none may end")
@@ -189,9 +191,7 @@ def _lays_down(instance: Instance, claim: Claim) -> bool:
     return one and columns and known and instance.is_layered
 
 
-def _require_modest(
-    goal: _Target, claim: Claim, found: tuple[float, float], *, bare: bool
-) -> None:
+def _require_modest(goal: _Target, claim: Claim, found: tuple[float, float], *, bare: bool) -> None:
     """Raise an error if a bound is above the value of a path, or above what is to prove it."""
     value, bound = found
     if bound > value + ABOVE * abs(value):
