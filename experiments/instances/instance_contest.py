@@ -115,9 +115,9 @@ def _listed(name: str, found: dict) -> dict[str, object]:
         "asked": ", ".join(
             [g.name for g in one.goals] + [f"{c.name} <= {c.most:g}" for c in one.caps]
         ),
-        "value": proof.values[0],
+        "value": proof.objective,
         "proven": proof.bounds[0],
-        "values": " ".join(f"{v:.9g}" for v in proof.values),
+        "values": " ".join(f"{v:.9g}" for v in proof.values),  # noqa: PD011  # no frame
         "gap": proof.gap,
         "by": found["by"],
         "bound_by": found["bound_by"],

@@ -10,19 +10,19 @@ from typing import Any
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, Ints
+from seqopt.arrays import Bools, Ints
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph._timed import TimedGraph, timed_graph
 from seqopt.graph.graph import Graph
-from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _Cap, _Target, _by_goal
+from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _by_goal, _Cap, _Target
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.orders import MOST_PARTS, AllOrders, OrderStates
 from seqopt.graph.paths import distances, reached
 from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.graph.states._visits import FreeStates, ScenarioSums
 from seqopt.graph.states.states import States
-from seqopt.plan.calling.formulation import Formulation, On, as_formulation
+from seqopt.plan.calling.formulation import Formulation, as_formulation
 from seqopt.plan.solving import graph_of, natural, usual
 from seqopt.problem.problem import Aim, Measure, Problem, RobustAim
 from seqopt.sequence._rule_space import node_numbers
@@ -214,9 +214,9 @@ def _useful(graph: Graph) -> tuple[Graph, Ints]:
         raise InfeasibleError("no path leads to an end")
     arcs = _arcs_between(graph, on)
     number = np.cumsum(on) - 1
-    rows = (number[each[arcs]].astype(np.int32) for each in (graph.source, graph.target))
+    source, target = (number[each[arcs]].astype(np.int32) for each in (graph.source, graph.target))
     kept = np.flatnonzero(on)
-    return Graph(*rows, graph.amounts[arcs], graph.peaks, graph.ends[on]), kept
+    return Graph(source, target, graph.amounts[arcs], graph.peaks, graph.ends[on]), kept
 
 
 def _arcs_between(graph: Graph, on: Bools) -> Bools:
@@ -237,7 +237,7 @@ def _cut(timed: TimedGraph, whole: Graph, kept: Ints, graph: Graph) -> TimedGrap
     on = np.isin(np.arange(whole.states), kept)
     arcs = _arcs_between(whole, on)
     acts = arcs[timed.move]
-    own: list[Floats] = [timed.prepares[arcs], timed.acts[arcs], timed.work[arcs]]
+    own = timed.prepares[arcs], timed.acts[arcs], timed.work[arcs]
     who = (np.cumsum(arcs) - 1)[timed.move[acts]], timed.column[acts], timed.origin[acts]
     states = timed.levels[on], timed.free[on], timed.alike[on], timed.kinds
     return TimedGraph(graph, *states, *who, *own, timed.longest)

@@ -124,16 +124,7 @@ def _claims(instance: Instance, found: StatePath) -> list[Claim]:
     """Return what proves the bound of every goal, as far as the formulation says."""
     kinds = [goal.kind for goal in instance.goals]
     if instance.asks_time:
-        first = 0 if instance.caps else kinds.index(TIME)
-        own = [Claim() for _ in kinds]
-        for k, proof in enumerate(found.proofs[: len(kinds) - first], start=first):
-            if kinds[k] == TIME and len(proof.prices):
-                shares, labels = _shares(instance, proof.prices), None
-                if len(proof.labels):
-                    labels = proof.states[:, 1], proof.labels
-                value = None if labels is None else found.bound[k]
-                own[k] = Claim(value, shares=shares, labels=labels)
-        return own
+        return _of_times(instance, found, kinds)
     if kinds == [TAIL]:
         return [Claim(weights=np.array(found.prices[0]))] if found.prices else []
     if not instance.caps:
@@ -146,6 +137,20 @@ def _claims(instance: Instance, found: StatePath) -> list[Claim]:
         if goal.kind == SUM:
             sums.append(goal.name)
     return out
+
+
+def _of_times(instance: Instance, found: StatePath, kinds: list[str]) -> list[Claim]:
+    """Return what proves times: labels where there are any, and shares."""
+    first = 0 if instance.caps else kinds.index(TIME)
+    own = [Claim() for _ in kinds]
+    for k, proof in enumerate(found.proofs[: len(kinds) - first], start=first):
+        if kinds[k] == TIME and len(proof.prices):
+            shares, labels = _shares(instance, proof.prices), None
+            if len(proof.labels):
+                labels = proof.states[:, 1], proof.labels
+            value = None if labels is None else found.bound[k]
+            own[k] = Claim(value, shares=shares, labels=labels)
+    return own
 
 
 def _shares(instance: Instance, prices: Floats) -> Floats:

@@ -30,7 +30,8 @@ class Status(StrEnum):
 
 def bare_summary(plan: Any) -> dict[str, object]:
     """Return the summary of a plan of an instance, or of costs alone: a path without steps."""
-    proof, known = plan.certificate, getattr(plan.problem, "facts_of", dict)()
+    proof = plan.certificate
+    known: dict[str, object] = getattr(plan.problem, "facts_of", dict)()
     bounds = () if proof is None else proof.bounds
     names = [name for name in plan.goals if name in plan.objective]
     return {

@@ -260,10 +260,10 @@ class Plan(ShownBuild):
     @property
     def nodes(self) -> tuple[int, ...]:
         """The node chosen for every move, or the nodes of a path through an instance."""
-        if isinstance(self.graph, Instance):
+        if isinstance(self.selection, StatePath) and isinstance(self.graph, Instance):
             return tuple(state[0] for state in self.selection.states)
         choice = self.choice
-        assert not isinstance(self.graph, States)  # it has no choice
+        assert not isinstance(self.graph, States | Instance)  # they have no choice
         return self.graph.nodes(choice)
 
     @property
@@ -384,11 +384,8 @@ class Plan(ShownBuild):
         ``order_bound`` (on the first aim, of any order), ``order_bound_proven``,
         ``order_evaluated`` and ``order_stopped``; the ``engine`` and ``versions``.
         """
-        return (
-            bare_summary(self)
-            if isinstance(self.graph, CostProblem | Instance)
-            else _summarized(self)
-        )
+        bare = isinstance(self.graph, CostProblem | Instance)
+        return bare_summary(self) if bare else _summarized(self)
 
 
 def _summarized(plan: Plan) -> dict[str, object]:
@@ -479,6 +476,7 @@ def _spent(plan: Plan) -> dict[str, dict[str, float | None]]:
             name: {"bound": cap, "spent": plan.objective[name], "price": None}
             for name, cap in capped
         }
+    assert not isinstance(plan.graph, Instance)  # of which there is another summary
     for budget in plan.graph.budgets:
         bound = budget.bound if isfinite(budget.bound) else None
         price = chosen.prices.get(budget.name) if isinstance(chosen, Selection) else None

@@ -1,4 +1,4 @@
-"""Instances: compiled, written, read, solved and judged; each check is also given a wrong answer."""
+"""Instances: compiled, written, read, solved and judged; checks are given wrong answers too."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def test_a_solver_reads_its_program_back(compiled, tmp_path, kind, suffix):
     one, path = compiled(kind), tmp_path / f"x{suffix}"
     seqopt.save_instance(one, path)
     solver = highspy.Highs()
-    solver.setOptionValue("log_to_console", False)
+    solver.setOptionValue("log_to_console", False)  # noqa: FBT003
     assert solver.readModel(str(path)) == highspy.HighsStatus.kOk
     end, value, bound, found = _solve_file(str(path), 3.0 if kind == "time" else 60.0)
     least = seqopt.solve(one).certificate.objective
@@ -176,6 +176,7 @@ def test_wrong_answers_are_refused(compiled):
     high = least.copy()
     high[one.ends] += 1.0
     none = {"value": value, "potentials": least[:-1]}
+    low = {"value": value, "potentials": (0.5 * least).tolist()}
     for wrong, said in [
         ({"nodes": [nodes[0], nodes[0]]}, "no arc leads from node"),
         ({"nodes": nodes[:-1]}, "the path stops at node"),
@@ -186,8 +187,8 @@ def test_wrong_answers_are_refused(compiled):
         ({"nodes": nodes, "bounds": [{"potentials": high.tolist()}]}, "potentials: the arc"),
         ({"nodes": nodes, "bounds": [none]}, "potentials; give"),
         ({"nodes": nodes, "bounds": [{"prices": {"way": 1.0}}]}, "it is no cap"),
-        ({"nodes": nodes, "bounds": [{"value": value, "potentials": (0.5 * least).tolist()}]}, "is proven"),
-    ]:  # fmt: skip
+        ({"nodes": nodes, "bounds": [low]}, "is proven"),
+    ]:
         with pytest.raises(SolverError, match=said):
             seqopt.judge_instance(one, wrong)
 

@@ -125,8 +125,8 @@ def _cp_sat(one: Instance, folder: Path, seconds: float):
     return solver.status_name(status).capitalize(), solver.best_objective_bound, found
 
 
-def _linopy(one: Instance, folder: Path, seconds: float):
-    """A unit flow as a user of linopy writes it, caps and peak as rows."""
+def _linopy(one: Instance, _: Path, seconds: float):
+    """Solve a unit flow as a user of linopy writes it, caps and peak as rows."""
     import linopy  # noqa: PLC0415  # for this comparison alone
     import pandas as pd  # noqa: PLC0415
     import xarray as xr  # noqa: PLC0415
@@ -150,7 +150,7 @@ def _linopy(one: Instance, folder: Path, seconds: float):
         model.add_constraints((cost * x).groupby(target).sum() - worst <= 0)
         model.add_objective(1 * worst)
     model.solve("highs", time_limit=seconds, output_flag=False, progress=False)
-    found = x.solution.values if model.solution is not None else None
+    found = x.solution.to_numpy() if model.solution is not None else None
     known = found is not None and np.isfinite(found).all()
     info = model.solver_model.getInfo()
     end = str(model.termination_condition).capitalize()

@@ -42,7 +42,7 @@ def _library(library: pd.DataFrame) -> str:
 
 
 def _ways(contest: pd.DataFrame, library: pd.DataFrame) -> str:
-    """Return a row per way to solve: how many it was given, found, closed, and its times and gaps."""
+    """Return a row per way to solve: what it was given, found and closed, its times and gaps."""
     best = contest["instance"].map(library.set_index("instance")["value"])
     off = (contest["value"] - best).abs() <= 1e-5 * best.abs()
     size = contest["value"].abs().replace(0.0, 1.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 
@@ -13,7 +14,12 @@ from seqopt.graph.instances._stored import TEXT, read, stored
 from seqopt.graph.instances._texts import as_cp_sat, as_lp, as_mps
 from seqopt.graph.instances.instance import Instance
 
-WRITERS = {".npz": stored, ".mps": as_mps, ".lp": as_lp, ".pbtxt": as_cp_sat}
+WRITERS: dict[str, Callable[[Instance], bytes | str]] = {
+    ".npz": stored,
+    ".mps": as_mps,
+    ".lp": as_lp,
+    ".pbtxt": as_cp_sat,
+}
 
 
 def read_instance(path: Path | str) -> Instance:

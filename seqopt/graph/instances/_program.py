@@ -102,9 +102,10 @@ def program(instance: Instance) -> Program:
     costs = sparse.csr_array(np.array([np.pad(g, (0, total - len(g))) for g in goals]))
     whole = np.arange(total) < count
     upper = np.where(whole, 1.0, more.most)
-    limits = (np.concatenate(each) for each in (draft.low, draft.high, draft.where, draft.slack))
+    limits = np.concatenate(draft.low), np.concatenate(draft.high)
+    switches = np.concatenate(draft.where), np.concatenate(draft.slack)
     cost = costs[[0]].toarray()[0]
-    return Program(names, cost, upper, whole, matrix, *limits, costs[1:], draft.names)
+    return Program(names, cost, upper, whole, matrix, *limits, *switches, costs[1:], draft.names)
 
 
 class _More(NamedTuple):
@@ -144,7 +145,7 @@ def horizon(timed: TimedGraph) -> float:
 
 
 def _flow(draft: _Draft, instance: Instance, arc: Ints) -> None:
-    """One unit leaves node 0, what comes to a node that is no end leaves it, one comes to ends."""
+    """Say that one unit leaves node 0, leaves all nodes but ends, and comes to an end."""
     source, target = instance.source[arc], instance.target[arc]
     column, ones = np.arange(len(arc)), np.ones(len(arc))
     inner = ~instance.ends
@@ -177,15 +178,14 @@ def _goal(draft: _Draft, instance: Instance, goal: _Target, arc: Ints, more: _Mo
     else:
         first, count = more.at[f"tail {k}"], len(goal.columns)
         out[first], out[first + 1 : first + 1 + count] = 1.0, goal.most
-        _tail(draft, instance.amounts[np.ix_(arc, goal.columns)], first)
+        _tail(draft, instance.amounts[np.ix_(arc, np.array(goal.columns))], first)
     return out
 
 
 def _peak(draft: _Draft, instance: Instance, goal: _Target, arc: Ints, variable: int) -> None:
-    """The peak is no less than what is taken on a level, or to a node."""
-    groups = instance.target[arc]
-    if instance.is_layered:
-        groups = instance.levels[groups]
+    """Say that the peak is no less than what is taken on a level, or to a node."""
+    to = instance.target[arc]
+    groups = instance.levels[to] if instance.is_layered else to
     own, rows = np.unique(groups, return_inverse=True)
     count = len(own)
     at = np.concatenate([rows, np.arange(count)])
@@ -195,7 +195,7 @@ def _peak(draft: _Draft, instance: Instance, goal: _Target, arc: Ints, variable:
 
 
 def _tail(draft: _Draft, amounts: Floats, first: int) -> None:
-    """What a total is above the threshold."""
+    """Say what every total is above the threshold."""
     for s, own in enumerate(amounts.T):
         columns = np.concatenate([np.arange(len(own)), [first, first + 1 + s]])
         values = np.concatenate([-own, [1.0, 1.0]])
@@ -215,7 +215,7 @@ def _caps(draft: _Draft, instance: Instance, arc: Ints, more: _More) -> None:
 
 
 def _times(draft: _Draft, instance: Instance, timed: TimedGraph, more: _More) -> None:
-    """When acts end, since when robots are free after them, and that nobody does two at once."""
+    """Say when acts end, since when robots are free, and that nobody does two at once."""
     move, column, big = timed.move, timed.column, more.most
     node, since, robots = more.at["node"], more.at["since"], len(timed.kinds)
     before, after = instance.source[move].astype(int), instance.target[move].astype(int)
@@ -252,7 +252,7 @@ def _after(
     least: Floats,
     switch: tuple[Ints, float],
 ) -> None:
-    """One variable is no less than another and some more, row by row."""
+    """Say that one variable is no less than another and some more, row by row."""
     first, second = variables
     count = len(first)
     rows = np.tile(np.arange(count), 2)

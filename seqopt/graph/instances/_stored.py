@@ -15,7 +15,7 @@ from seqopt._files import read_bytes
 from seqopt.errors import FileError
 from seqopt.graph._timed import TimedGraph
 from seqopt.graph.graph import Graph
-from seqopt.graph.instances.instance import Instance, _Cap, _Target, _by_goal
+from seqopt.graph.instances.instance import Instance, _by_goal, _Cap, _Target
 
 FORMAT, VERSION = "seqopt-instance", 1
 TEXT = "instance.json"  # the name of the text in the archive
@@ -108,7 +108,8 @@ def read(path: Path) -> Instance:
                 if name.endswith(".npy")
             }
     except (zipfile.BadZipFile, KeyError, ValueError, EOFError) as error:
-        raise FileError(f"{path}: it is no instance ({error}); write one with seqopt instance")
+        why = f"it is no instance ({error}); write one with seqopt instance"
+        raise FileError(f"{path}: {why}") from error
     _check(document, path)
     try:
         return _instance(document, arrays)
@@ -156,9 +157,11 @@ def _instance(document: dict[str, Any], arrays: dict[str, np.ndarray]) -> Instan
     rows = arrays["source"].astype(np.int32), arrays["target"].astype(np.int32)
     timed = None
     if document["timed"]:
-        own = [arrays[f"timed_{name}"] for name in (*TIMED, "longest")]
-        whole = [each.astype(np.int64) if each.dtype.kind in "iu" else each for each in own]
+        own: list[Any] = [arrays[f"timed_{name}"] for name in (*TIMED, "longest")]
+        whole: list[Any] = [
+            each.astype(np.int64) if each.dtype.kind in "iu" else each for each in own
+        ]
         graph = Graph(*rows, amounts, (False,) * len(names), ends)
         timed = TimedGraph(_by_goal(graph, (goals, caps)), states[:, 0], *whole)
-    made = (goals, caps, states, timed, document["facts"])
+    made: Any = (goals, caps, states, timed, document["facts"])
     return Instance(document["name"], *rows, ends, names, amounts, *made)

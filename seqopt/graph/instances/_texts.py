@@ -51,6 +51,21 @@ def _mps(instance: Instance, found: Program) -> Iterator[str]:
     yield from (f" N goal_{k + 1}" for k in range(found.later.shape[0]))
     kinds = _kinds(found)
     yield from (f" {kind} {name}" for kind, name in zip(kinds, found.rows, strict=True))
+    yield from _columns(found)
+    yield "RHS"
+    right = np.where(np.isfinite(found.low), found.low, found.high)
+    for row in np.flatnonzero(right).tolist():
+        yield f" RHS {found.rows[row]} {float(right[row])!r}"
+    yield "BOUNDS"
+    for name, upper, is_whole in zip(found.names, found.upper, found.whole, strict=True):
+        if is_whole:
+            yield f" BV BND {name}"
+        elif np.isfinite(upper):
+            yield f" UP BND {name} {float(upper)!r}"
+    yield "ENDATA"
+
+
+def _columns(found: Program) -> Iterator[str]:
     yield "COLUMNS"
     whole = int(found.whole.sum())
     columns, later = found.matrix.tocsc(), found.later.tocsc()
@@ -66,22 +81,12 @@ def _mps(instance: Instance, found: Program) -> Iterator[str]:
                 yield f" {name} {label} {float(part.data[i])!r}"
     if whole == len(found.names):
         yield " MARKER 'MARKER' 'INTEND'"
-    yield "RHS"
-    right = np.where(np.isfinite(found.low), found.low, found.high)
-    for row in np.flatnonzero(right).tolist():
-        yield f" RHS {found.rows[row]} {float(right[row])!r}"
-    yield "BOUNDS"
-    for name, upper, is_whole in zip(found.names, found.upper, found.whole, strict=True):
-        if is_whole:
-            yield f" BV BND {name}"
-        elif np.isfinite(upper):
-            yield f" UP BND {name} {float(upper)!r}"
-    yield "ENDATA"
 
 
 def _kinds(found: Program) -> list[str]:
     equal = found.low == found.high
-    return np.where(equal, "E", np.where(np.isfinite(found.low), "G", "L")).tolist()
+    kinds: list[str] = np.where(equal, "E", np.where(np.isfinite(found.low), "G", "L")).tolist()
+    return kinds
 
 
 def _lp(instance: Instance, found: Program) -> Iterator[str]:

@@ -92,7 +92,7 @@ class Instance(FrozenValue, Shown):
             raise ProblemError(f"instance {self.name}: nothing is to be made small; name a goal")
         for name in ("source", "target"):
             rows = np.ascontiguousarray(getattr(self, name), dtype=np.int32)
-            if len(rows) and not (0 <= rows.min() and rows.max() < self.nodes):
+            if len(rows) and not (rows.min() >= 0 and rows.max() < self.nodes):
                 raise ProblemError(f"instance {self.name}: an arc names a node that is none")
             object.__setattr__(self, name, rows)
         codes = self.source.astype(np.int64) * self.nodes + self.target

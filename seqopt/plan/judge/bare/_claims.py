@@ -80,11 +80,11 @@ def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim) -> flo
     """
     limited = _priced(stage, claim)
     if goal.kind == PEAK:
-        return _peak(instance, stage, goal, claim, limited)
+        return _peak(stage, goal, claim, limited)
     if goal.kind == SUM:
         costs = stage.graph.amounts[:, goal.columns[0]]
         if not claim.prices and claim.potentials is None:
-            return _own_sum(instance, stage, goal)
+            return _own_sum(stage, goal)
     elif goal.kind == TAIL:
         costs = stage.graph.amounts[:, list(goal.columns)] @ _weights(goal, claim)
     else:
@@ -136,7 +136,7 @@ def _kept(graph: Graph, costs: Floats, potentials: Floats) -> float:
     return float(potentials[graph.ends].min(initial=np.inf))
 
 
-def _own_sum(instance: Instance, stage: Stage, goal: _Target) -> float:
+def _own_sum(stage: Stage, goal: _Target) -> float:
     """Return what a sum is at least, by prices that the judge finds."""
     costs = stage.graph.amounts[:, goal.columns[0]]
     if not stage.limited:
@@ -186,11 +186,7 @@ def _nothing(part: Floats, parts: Sequence[Floats]) -> Floats:
 
 
 def _peak(
-    instance: Instance,
-    stage: Stage,
-    goal: _Target,
-    claim: Claim,
-    limited: Sequence[tuple[float, int, float]],
+    stage: Stage, goal: _Target, claim: Claim, limited: Sequence[tuple[float, int, float]]
 ) -> float:
     """Return what a peak is at least."""
     graph, column = stage.graph, goal.columns[0]
@@ -206,14 +202,14 @@ def _peak(
         bound, prices, _ = _least_worst(graph, column, asked)
         pairs = zip(np.maximum(prices, 0.0).tolist(), asked, strict=True)
         again = [(price, c, most) for price, (c, most) in pairs]
-        least = _peak(instance, stage, goal, Claim(bound), again)
+        least = _peak(stage, goal, Claim(bound), again)
         return max(least, cut(graph, column, np.inf)[0])
     return cut(graph, column, np.inf)[0]
 
 
 def _left(graph: Graph, column: int, inside: Ints) -> float:
     """Return the least amount of what leaves a cut; a `SolverError` says if it is none."""
-    if len(inside) and not (0 <= inside.min() and inside.max() < graph.states):
+    if len(inside) and not (inside.min() >= 0 and inside.max() < graph.states):
         raise SolverError(f"cut: it names a node that is none of 0 to {graph.states - 1}")
     within = np.zeros(graph.states, dtype=bool)
     within[inside] = True
