@@ -49,7 +49,6 @@ _HOMES = {
     "workflow": ("optimize",),
     "scene.scenarios": ("scenarios",),
     "plan.plan": ("Plan",),
-    "graph.instances.instance": ("Instance",),
     "graph.instances._files": ("read_instance", "save_instance"),
     "plan._compiled": ("compile_instance",),
     "plan.judge.bare._judging": ("judge_instance",),

@@ -5,7 +5,6 @@ from seqopt.engines.registry import make_engine as make_engine
 from seqopt.errors import SeqoptError as SeqoptError
 from seqopt.graph.instances._files import read_instance as read_instance
 from seqopt.graph.instances._files import save_instance as save_instance
-from seqopt.graph.instances.instance import Instance as Instance
 from seqopt.network.build import build_network as build_network
 from seqopt.network.network import Network as Network
 from seqopt.plan._compiled import compile_instance as compile_instance

@@ -32,8 +32,9 @@ from typing import Any
 
 import numpy as np
 
+from formulations.times._in_time import in_time
 from formulations.times._labels import Caps, Sweep
-from formulations.times._stages import Asked, Chosen, in_time
+from formulations.times._stages import Asked, Chosen
 from seqopt.arrays import Ints
 from seqopt.errors import ExtraError, ProblemError
 from seqopt.graph._timed import HELD, NOW

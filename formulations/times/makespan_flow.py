@@ -22,9 +22,10 @@ import numpy as np
 from scipy import sparse
 
 from formulations.solvers import STOPS, minimize_rows
+from formulations.times._in_time import in_time
 from formulations.times._labels import Caps, Sweep
 from formulations.times._prices import useful
-from formulations.times._stages import Asked, Chosen, in_time
+from formulations.times._stages import Asked, Chosen
 from seqopt.arrays import Bools
 from seqopt.plan.calling.formulation import FormulationKind, Watch
 

@@ -32,8 +32,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from formulations.times._in_time import in_time
 from formulations.times._labels import Labels, LateError, Sweep
-from formulations.times._stages import ALMOST, Asked, Chosen, in_time
+from formulations.times._stages import ALMOST, Asked, Chosen
 from seqopt.plan.calling.formulation import FormulationKind
 
 SHARES = (0.25, 0.5, 0.75, 1.0)  # of the gap that is left, up to which labels are set

@@ -72,17 +72,18 @@ def compile_instance(
     >>> seqopt.compile_instance(problem, below=40.0)
     <Instance 'arch25': 3174 nodes, 6806 arcs, minmax, steps>
     """
-    on = natural(problem)
-    graph = graph_of(problem, on)
     name = name or problem.engine.network.scene.name
     told = {"seqopt": version("seqopt"), **(facts or {})}
-    if isinstance(graph, Layers | ScenarioLayers):
-        if below < np.inf:
-            raise ProblemError("below: it is about states; name aims, or leave it out")
-        made = _of_layers(name, graph, aim or _usual_aim(problem))
-    else:
-        made = _of_states(name, graph, below)
-    return replace(made, facts=told)
+    return replace(_made(problem, name, aim, below), facts=told)
+
+
+def _made(problem: Problem, name: str, aim: Aim | None, below: float) -> Instance:
+    graph = graph_of(problem, natural(problem))
+    if not isinstance(graph, Layers | ScenarioLayers):
+        return _of_states(name, graph, below)
+    if below < np.inf:
+        raise ProblemError("below: it is about states; name aims, or leave it out")
+    return _of_layers(name, graph, aim or _usual_aim(problem))
 
 
 def _usual_aim(problem: Problem) -> Aim | None:

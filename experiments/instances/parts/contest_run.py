@@ -15,8 +15,9 @@ import numpy as np
 
 from experiments.instances.parts.library import instance
 from formulations.solvers import _solve_file
-from seqopt import Instance, judge_instance, save_instance, solve
+from seqopt import judge_instance, save_instance, solve
 from seqopt.errors import SeqoptError
+from seqopt.graph.instances.instance import Instance
 from seqopt.graph.paths import fewest_moves, reached
 from seqopt.plan._instances import _claims, able
 from seqopt.plan.calling._guard import StatePath

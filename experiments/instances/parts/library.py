@@ -12,8 +12,9 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from seqopt import Instance, read_instance
+from seqopt import read_instance
 from seqopt._cli.main import main
+from seqopt.graph.instances.instance import Instance
 
 HOME = Path(__file__).resolve().parent.parent / "library"
 KNOWN = HOME.parent / "known.json"  # best known paths, values and bounds, and who found them
