@@ -28,9 +28,9 @@ from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.problem.problem import Goal, Measure
-from seqopt.sequence._reassign import reassigned_steps
-from seqopt.sequence._rule_space import FreeSpace, node_numbers
-from seqopt.sequence._timing import step_times
+from seqopt.sequence._robot_kinds import node_numbers
+from seqopt.sequence._rule_space import FreeSpace
+from seqopt.sequence._timing import reassigned_steps, step_times
 from seqopt.work.progress import Tell
 
 

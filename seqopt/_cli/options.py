@@ -55,6 +55,9 @@ WHERE = {
     "or with so many bricks that nobody holds",
     "--to PLAN:STEP|STATE|N": "where it ends, said in the same ways; a number of bricks leaves "
     "grips to the rule ending",
+    "--direction build|take-down": "with --schedule free: take-down removes bricks, the newest "
+    "first, from the whole structure to the empty site, if nothing else is said",
+    "--keep BRICK,BRICK": "with --direction take-down: bricks that stay, as 1..12",
 }
 STANDING = {
     "--stands MORTAR": "every state must be proven to stand, robots within payload: dry, epoxy or "

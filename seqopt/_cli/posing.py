@@ -20,7 +20,7 @@ from seqopt._cli.values import (
     parse_rules,
 )
 from seqopt._cli.words.props import parse_props
-from seqopt._cli.words.where import Place, asked_place, between
+from seqopt._cli.words.where import Place, _kept_place, asked_place, between
 from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
@@ -39,7 +39,7 @@ from seqopt.problem.requirements import Criterion
 from seqopt.scene.holders._props import Prop
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
-from seqopt.sequence.rules import FREE, FreeRules, with_robots
+from seqopt.sequence.rules import FREE, Direction, FreeRules, with_robots
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.workflow import SEARCH, posed
@@ -145,6 +145,8 @@ def _asked_ends(options: argparse.Namespace, scene: Scene) -> tuple[Scene, Place
     scene, begin = asked_place(options, "from", scene)
     if hasattr(options, "change"):
         scene, begin, options.robots = options.change(scene, begin)
+    if getattr(options, "keep", None) is not None:
+        return _kept_place(options, scene, begin)
     later, end = asked_place(options, "to", scene)
     if later != scene:
         raise StepError(f"--to {options.to}: its bricks are not those that follow in this order")
@@ -176,6 +178,7 @@ def _asked_moves(options: argparse.Namespace, network: Network) -> Schedule | Fr
         return schedule if rule is None else thin(schedule, rule)
     names = () if options.robots.isdecimal() else parse_robots(options.robots)
     rules = parse_rules(options.rule, names)
+    rules = replace(rules, direction=getattr(options, "direction", None) or Direction.BUILD)
     return replace(rules, candidates=rule) if rule else rules
 
 
@@ -189,6 +192,7 @@ def _require_known(options: argparse.Namespace, *, of_states: bool) -> None:
                     "worst-total or as cvar=0.9"
                 )
     free = options.schedule == FREE
+    _require_direction(options, free=free)
     for name, why in _WRONG["free" if free else "states" if of_states else "candidates"].items():
         if getattr(options, name, None):
             raise ProblemError(f"--{name}: {why}")
@@ -197,6 +201,16 @@ def _require_known(options: argparse.Namespace, *, of_states: bool) -> None:
         if of_states:
             said = f"--schedule {options.schedule}: a count of robots goes with {FREE}"
         raise StepError(said)
+
+
+def _require_direction(options: argparse.Namespace, *, free: bool) -> None:
+    """Raise an error if a take-down is asked for that does not go with the rest."""
+    down, keep = Direction.TAKE_DOWN.value, getattr(options, "keep", None)
+    asked = getattr(options, "direction", None)
+    if asked == down and not free:
+        raise ProblemError(f"--direction {down}: it goes with --schedule {FREE}")
+    if keep is not None and asked != down:
+        raise ProblemError(f"--keep {keep}: it goes with --direction {down}")
 
 
 def _asked_aim(options: argparse.Namespace) -> RobustAim:

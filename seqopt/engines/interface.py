@@ -270,6 +270,12 @@ def no_sets(network: Network, bricks: int, held: int) -> Fields:
     return Fields(grip_force=np.empty((0, held, 3)), **empty)
 
 
+def _empty_site(network: Network) -> Fields:
+    """Return the fields of a site on which nothing stands, of one set of no grips."""
+    empty = no_sets(network, 0, 0)
+    return Fields(**{n: np.zeros((1, *getattr(empty, n).shape[1:])) for n in _NAMES})
+
+
 def counts_of_fields(network: Network, bricks: int) -> dict[str, int]:
     """Return of how many edges, nodes, ends, springs or bricks each field tells."""
     edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)

@@ -50,8 +50,8 @@ def to_go(graph: Graph) -> ToGo:
     moves = np.flatnonzero(kept & np.isfinite(worst[graph.source]))
     moves = moves[np.argsort(amounts[moves], kind="stable")]
     states, done = np.argsort(worst, kind="stable"), 0
-    new = worst[states][1:] != worst[states][:-1]
-    cuts = [0, *(np.flatnonzero(new) + 1).tolist(), graph.states]
+    ordered = worst[states]  # dead ends are infinite: no differences are taken
+    cuts = [0, *(np.flatnonzero(ordered[1:] != ordered[:-1]) + 1).tolist(), graph.states]
     for start, end in pairwise(cuts):
         group = states[start:end]
         if not np.isfinite(level := max(0.0, worst[group[0]])):

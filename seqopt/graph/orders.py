@@ -24,8 +24,9 @@ from seqopt.network.build import build_network
 from seqopt.problem.problem import LARGEST, Measure, Orders
 from seqopt.responses._blocks import Shipment, engine_of, pack
 from seqopt.scene.scene import Order, Scene
-from seqopt.sequence._rule_space import node_numbers, sort_entries
-from seqopt.sequence.rules import Ending
+from seqopt.sequence._robot_kinds import node_numbers
+from seqopt.sequence._rule_space import sort_entries
+from seqopt.sequence.rules import Direction, Ending, FreeRules
 
 
 @dataclass(frozen=True, repr=False)
@@ -41,10 +42,14 @@ class AllOrders(Shown):
 
     states: States
     among: Orders = Orders.TIED
+    down: FreeRules | None = None  # of a take-down, whose build in reverse has its order searched
     stands: Order = field(init=False)  # names of the bricks with which builds begin
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "among", Orders.of(self.among))
+        if self.states.free_rules.takes_down:
+            object.__setattr__(self, "down", self.states.free_rules)
+            object.__setattr__(self, "states", _built(self.states))
         first, last = self.states.free_rules.span(self.scene)
         if last < len(self.scene.bricks):
             raise ProblemError(
@@ -111,10 +116,34 @@ class AllOrders(Shown):
         goals = self.states.goals[:1]
         return replace(self.at(order), goals=goals, budgets=(), resources=alone)
 
+    def planned(self, order: Order) -> States:
+        """Return the free schedule of one order that is asked for: the take-down of it, if any."""
+        found = self.at(order)
+        return found if self.down is None else replace(found, rules=self.down)
+
     def at(self, order: Order) -> States:
         """Return the free schedule of one order."""
         engine, *others = (_anew(e, order) for e in (self.states.engine, *self.states.scenarios))
         return replace(self.states, engine=engine, scenarios=tuple(others))
+
+
+def _built(states: States) -> States:
+    """Return the build that passes, in reverse, the states of a take-down, which begins free."""
+    rules, scene = states.free_rules, states.network.scene
+    if rules.begin != replace(rules, begin=None).begun(scene).begin or rules.finish is not None:
+        raise ProblemError(
+            "orders of a take-down from or to a part: which bricks those are is not said; give an "
+            "order, or take all down from where nobody holds"
+        )
+    first = states.goals[0]
+    plain = first.measure is Measure.PEAK and not first.of_margins and rules.regrips is None
+    if not plain or states.budgets or states.totals:
+        raise ProblemError(
+            f"orders of a take-down are searched for its worst state, not for {first} or "
+            "within budgets and regrips; give an order, or put minmax first"
+        )
+    up = replace(rules, direction=Direction.BUILD, begin=None, ending=Ending.ONE_BY_ONE)
+    return replace(states, rules=up, spares=True)
 
 
 def _anew(engine: Engine, order: Order) -> Engine:
@@ -173,7 +202,7 @@ def whole_bound(problem: AllOrders) -> float:
     sets = _sets(every, fewest, free.space.robots, len(numbers))
     if len(sets):
         least = float(_values(free, sets).min())
-    if free.free_rules.how_it_ends is not Ending.HELD:
+    if free.free_rules.how_it_ends is not Ending.HELD and not free.spares:
         least = max(least, float(_values(free, np.zeros((1, free.space.robots), int))[0]))
     return least
 

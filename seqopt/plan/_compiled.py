@@ -25,7 +25,7 @@ from seqopt.graph.states.states import States
 from seqopt.plan.calling.formulation import Formulation, as_formulation
 from seqopt.plan.solving import graph_of, natural, usual
 from seqopt.problem.problem import Aim, Measure, Problem, RobustAim
-from seqopt.sequence._rule_space import node_numbers
+from seqopt.sequence._robot_kinds import node_numbers
 
 
 def compile_instance(

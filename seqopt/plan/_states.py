@@ -129,7 +129,7 @@ def _planned(name: str, problem: AllOrders, selection: OrderSelection, *, proof:
     """Return the best plan of an order, which must be worth what is claimed."""
     _require_allowed(name, problem, selection.order)
     plan = solve_states(
-        problem.at(selection.order), find_formulation("schedule_search"), Run(proof=proof)
+        problem.planned(selection.order), find_formulation("schedule_search"), Run(proof=proof)
     )
     assert isinstance(plan.selection, StatePath)
     _require_worth(name, plan.selection.objective[0], selection)
@@ -152,7 +152,7 @@ def _selected_order(
             raise SolverError(
                 f"formulation {found.name} says that no order has a plan, and some have"
             ) from None
-        if some is False:
+        if some is False and problem.down is None:  # whose whole may be beyond limits
             raise
         raise InfeasibleError(f"claimed by {found.name}, and not proven: {error}") from None
     return _with_numbers(found.name, said)

@@ -10,8 +10,7 @@ from seqopt.errors import StepError
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
-from seqopt.sequence._reassign import reassigned_steps
-from seqopt.sequence._timing import step_times
+from seqopt.sequence._timing import reassigned_steps, step_times
 from seqopt.sequence.schedule import Hold
 from seqopt.sequence.steps import Step, idle_robots
 

@@ -193,6 +193,8 @@ def _posed(problem: Problem, rounding: Mapping[str, float] | None) -> FrontProbl
     """Return the states whose paths are plans, in one build order or in all."""
     found = graph_of(problem)
     if isinstance(found, AllOrders):
+        if found.down is not None:
+            raise ProblemError("a Pareto set of take-downs is of one order; give an order")
         return OrderFront(found, rounding)
     return StateFront(states_of(problem), rounding)
 

@@ -24,7 +24,7 @@ from seqopt.graph.states.states import States
 from seqopt.plan.judge._policy import check_policy
 from seqopt.plan.solving import states_of
 from seqopt.problem.problem import Problem
-from seqopt.sequence._rule_space import node_numbers
+from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import StepKind
 
@@ -47,7 +47,7 @@ class Advice(NamedTuple):
     values : mapping of str to float
         The least that every goal takes of the rest of the build, this move included.
     brick : int
-        The brick that is placed; zero where none is.
+        The brick that is placed, or removed; zero where none is.
     """
 
     kind: StepKind | None
@@ -63,6 +63,8 @@ class Advice(NamedTuple):
             return "the build has ended"
         if self.kind is StepKind.RELEASE:
             return f"{who} {'lets' if len(self.robots) == 1 else 'let'} go of node {what}"
+        if self.kind is StepKind.REMOVE:
+            return f"{who} takes brick {self.brick} away, which it holds at node {what}"
         if self.kind is StepKind.PLACE:
             return f"{who} places brick {self.brick} and holds it at node {what}"
         return f"{who} takes hold of node {what}"
@@ -154,9 +156,11 @@ class Policy(FrozenValue):
         kept = tuple(s if g is None else None for s, g in zip(stays, grips, strict=True))
         then = Site(bricks, tuple(grips), kept, regrips, site.step + 1)
         kind_of = StepKind.PLACE if bricks > site.bricks else StepKind.REPOSITION
+        let_go = StepKind.REMOVE if bricks < site.bricks else StepKind.RELEASE
         names, nodes = tuple(self.robots[r] for r, _ in moved), tuple(node for _, node in moved)
-        brick = int(self.order[bricks - 1]) if bricks > site.bricks else 0
-        return Advice(kind_of if taken else StepKind.RELEASE, names, nodes, then, values, brick)
+        changed = bricks != site.bricks
+        brick = int(self.order[max(bricks, site.bricks) - 1]) if changed else 0
+        return Advice(kind_of if taken else let_go, names, nodes, then, values, brick)
 
     def _taker(
         self, kind: tuple[int, ...], now: tuple[list[Any], list[Any]], left: list[int]
@@ -297,7 +301,8 @@ def find_policy(
     if not proof:
         return policy
     tell("proving that no move is better")
-    table = policy.bricks, policy.held, policy.values[:, 0], policy.following
+    levels = np.concatenate([np.full(len(rows), level) for level, _, rows in visited.states])
+    table = levels, policy.held, policy.values[:, 0], policy.following
     return replace(policy, checked=check_policy(states, *table))
 
 
@@ -321,14 +326,14 @@ def _of_graph(states: States, visited: Visited) -> Policy:
     graph, space = visited.graph, states.space
     left = to_go(graph)
     after = np.where(left.move < 0, -1, graph.target[left.move])
-    levels = [np.full(len(rows), level) for level, _, rows in visited.states]
+    bricks = [np.full(len(rows), space.bricks_at(level)) for level, _, rows in visited.states]
     return Policy(
         states.names,
         tuple(robot.name for robot in states.network.scene.robots),
         tuple(kind.robots for kind in space.kinds),
         np.array(states.network.scene.build_order),
         np.array(node_numbers(states.network)),
-        np.concatenate(levels).astype(np.int16),
+        np.concatenate(bricks).astype(np.int16),
         np.concatenate([rows for *_, rows in visited.states]),
         left.values,
         after.astype(np.int32),

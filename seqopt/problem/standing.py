@@ -151,10 +151,14 @@ class StandingSets:
 
     def recalled(self, bricks: int, held: Ints, payload: Floats) -> Ints:
         """Return which are known to stand, 1, or to fall, -1, by what others prove; see `stand`."""
+        if not bricks:
+            return np.full(len(held), STANDS)
         found = [screen.recalled(bricks, held, payload) for screen in self._screens]
         return np.asarray(np.min(found, axis=0))
 
     def _verdicts(self, bricks: int, held: Ints, payload: Floats) -> Floats:
+        if not bricks:  # the empty site, where a take-down ends
+            return np.full(len(held), float(STANDS))
         codes = self._codes(held, payload)
 
         def verdicts(rows: Ints) -> Floats:

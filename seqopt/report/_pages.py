@@ -148,12 +148,13 @@ def plan_page(  # a plan, what there is to say about it, and what is beside it
     builds = _builds(scene, tables, LinearRange(engine).of_builds(tables), verdicts)
     first = builds[0]
     robots = int(sum(table[f"{robot.name}_node"].notna().any() for robot in scene.robots))
-    does = "1 robot builds" if robots == 1 else f"{robots} robots build"
+    verb = "take down" if (table["type"] == "remove").any() else "build"
+    does = "1 robot builds" if robots == 1 else f"{robots} robots {verb}"
     how = ""
     if over := first.overloads(scene):
         steps = {number for excess in over for number in excess.steps}
         worst = max(over, key=lambda excess: excess.largest / excess.limit.bound)
-        does = f"{robots} robot{'s' * (robots != 1)} cannot build"
+        does = f"{robots} robot{'s' * (robots != 1)} cannot {verb}"
         how = (
             f" like this: in {len(steps):,} of {len(table):,} a robot would hold more than its "
             f"payload, up to {worst.largest:,.0f} N where {worst.robot} can hold "

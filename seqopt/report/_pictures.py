@@ -222,8 +222,10 @@ def _cell(engine: Engine, steps: Sequence[Step], given: Arms | None, *, forces: 
 
 def _frame(axes: Axes, scene: Scene, step: Step, count: int, box: tuple[Floats, Floats]) -> None:
     """Say above a picture which of how many steps it shows, and give it the size of all."""
-    newest = scene.placed[step.bricks - 1].name
+    removes = step.kind is StepKind.REMOVE
+    newest = scene.placed[step.bricks - (not removes)].name
     what = {
+        StepKind.REMOVE: f"brick {newest} is removed",
         StepKind.PLACE: f"brick {newest} is placed",
         StepKind.RELEASE: "a robot lets go",
         StepKind.REPOSITION: "a robot takes a grip",
@@ -234,8 +236,12 @@ def _frame(axes: Axes, scene: Scene, step: Step, count: int, box: tuple[Floats, 
 
 
 def spread_steps(steps: Sequence[Step], most: int) -> tuple[int, ...]:
-    """Return numbers of steps spread over a build, ascending: some that place, and the last one."""
-    placing = [step.number for step in steps if step.kind is StepKind.PLACE]
+    """Return numbers of steps spread over a build, ascending: some that place, and the last one.
+
+    Of a take-down some that remove.
+    """
+    kinds = (StepKind.PLACE, StepKind.REMOVE)
+    placing = [step.number for step in steps if step.kind in kinds]
     parts = range(1, most if placing else 1)
     picked = {placing[round(k * (len(placing) - 1) / most)] for k in parts}
     return tuple(sorted({*picked, steps[-1].number}))

@@ -31,7 +31,7 @@ from seqopt.network.network import Network
 from seqopt.responses.table import _grips_of, response_table, step_named
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Step, check_sequence, require_steps
+from seqopt.sequence.steps import Step, StepKind, check_sequence, require_steps
 
 
 class Placing(Enum):
@@ -105,6 +105,11 @@ def staged_fields(
         raise StepError(
             f"steps from {steps[0].number} on: what was locked in before them is not known; give "
             "the whole build, or --placing free"
+        )
+    if any(step.kind is StepKind.REMOVE for step in steps):
+        raise StepError(
+            "a take-down: what was locked in while it was built is not known; analyze it without "
+            "--placing"
         )
     check_sequence(network.scene, steps)
     try:

@@ -186,6 +186,8 @@ def misfits(engine: Engine, bricks: int, grips: Ints, allowed: Allowed = ROBOTS_
     ``grips`` (S, r): numbers, as of `seqopt.Scene.grip_numbers`.
     """
     held, payload = grips.shape[1], _payloads(engine.network, grips)
+    if not bricks:  # the empty site: nobody holds
+        return np.zeros(len(grips))
     out = np.where(_tied(engine, bricks, grips), NO_TOLERANCE, 0.0)
     rows = np.flatnonzero(out == 0) if held else np.arange(0)
     step = max(1, _AT_ONCE // (3 * held + 1))

@@ -19,7 +19,7 @@ from seqopt.contact.mortar import EPOXY
 from seqopt.engines._auto import AutoEngine
 from seqopt.engines.discrete._equilibrium_path import FAR
 from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.interface import Engine, Fields, Want
+from seqopt.engines.interface import Engine, Fields, Want, _empty_site
 from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.network import Network
 from seqopt.responses._props import prop_cells
@@ -162,6 +162,8 @@ class LinearRange:
         pairs = zip(table["bricks"].astype(int).tolist(), nodes, strict=True)
         keys = [(b, scene.grip_numbers([_node(n) for n in row], b)) for b, row in pairs]
         for key in keys:  # in order: engines grow with the build
+            if not key[0]:
+                self._known[key] = np.array([0.0, 0.0, -np.inf, 0.0])
             if key not in self._known:
                 asked = np.array([key[1]], dtype=np.int64).reshape(1, -1)
                 found = self._engine.solve(key[0], asked, _MEASURED)
@@ -274,6 +276,8 @@ def support_columns(scene: Scene) -> list[tuple[str, str]]:
 
 def step_fields(engine: Engine, step: Step, want: Want = Want.RESPONSES) -> Fields:
     """Return the full fields of one step, of one grip set; errors of the engine name the step."""
+    if not step.bricks:  # where a take-down ends
+        return _empty_site(engine.network)
     with step_named(step):
         return engine.solve(step.bricks, _grips_of(engine.network.scene, step), want)
 
@@ -332,8 +336,10 @@ def _row(network: Network, step: Step, fields: Fields) -> dict[str, object]:
     for robot, node in zip(scene.robots, step.grips, strict=True):
         row[force_column(robot)] = np.nan if node is None else next(forces)
     for response in RESPONSES.values():
-        values = require_finite(response.name, response.of(network, fields), step.bricks)
-        row[response.column] = values[0] * response.scale
+        row[response.column] = 0.0
+        if step.bricks:
+            values = require_finite(response.name, response.of(network, fields), step.bricks)
+            row[response.column] = values[0] * response.scale
     row |= prop_cells(scene, step, fields.grip_force[0, len(step.held) :])
     acts = network.springs.since[network.springs.support] <= step.bricks
     carried = np.array([support_forces(network, fields)[0], support_moments(fields)[0]])

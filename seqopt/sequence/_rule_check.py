@@ -39,7 +39,7 @@ class RuleBook:
     @property
     def start(self) -> tuple[int, Grips, int]:
         """Bricks, grips, and regrips since the last brick, where the build begins."""
-        site = self.rules.begin
+        site = self.rules.begun(self.network.scene).begin
         if site is None:
             return 0, (None,) * len(self.network.scene.robots), 0
         return site.bricks, site.holds(self.network.scene), site.regrips
@@ -77,6 +77,8 @@ class RuleBook:
 
     def fault(self, bricks: int, grips: Grips) -> str:
         """Return which rule a state breaks, in a few words, the ending aside; empty if none."""
+        if not bricks:
+            return ""
         scene = self.network.scene
         stand = {brick.name for brick in scene.placed[:bricks]}
         if len(stand) == len(scene.placed) and all(node is None for node in grips):
@@ -99,13 +101,17 @@ class RuleBook:
         """Yield every step that is possible from a state; regrips count since the last brick."""
         first, last = self.span
         keeps = bricks > 0 and not self.fault(bricks, grips)
-        begins = self.rules.begin is not None and 0 < bricks == first
+        told = self.rules.begin is not None or self.rules.takes_down
+        begins = told and 0 < bricks == first
         able = keeps or begins  # what stands at first need not keep rules, and may be held
         if able and (self.rules.regrips is None or regrips < self.rules.regrips):
             for after in self._held(bricks, grips):
                 yield StepKind.REPOSITION, bricks, after, regrips + 1
         for after in self._released(bricks, grips):
             yield StepKind.RELEASE, bricks, after, regrips
+        if bricks > last and keeps and self.rules.takes_down:
+            for after in self._removed(bricks, grips):
+                yield StepKind.REMOVE, bricks - 1, after, 0
         if bricks < last and (keeps or not bricks):
             for after in self._placed(bricks + 1, grips):
                 yield StepKind.PLACE, bricks + 1, after, 0
@@ -139,9 +145,23 @@ class RuleBook:
                 if not self.fault(bricks, after):
                     yield after
 
+    def _removed(self, bricks: int, grips: Grips) -> Iterator[Grips]:
+        """Yield the grips after the newest brick is taken away by who alone holds it."""
+        scene = self.network.scene
+        newest = scene.placed[bricks - 1]
+        holders = [robot for robot, node in enumerate(grips) if node in newest.nodes]
+        if len(holders) != 1:
+            return
+        robot = holders[0]
+        able = not self.rules.placers or scene.robots[robot].name in self.rules.placers
+        after = _with(grips, robot, None)
+        allowed = able and grips[robot] in self.newest_nodes[robot, bricks]
+        if allowed and not self.fault(bricks - 1, after):
+            yield after
+
     def ends(self, bricks: int, grips: Grips) -> bool:
         """Return whether a state ends the build."""
-        if bricks < self.span[1]:
+        if bricks != self.span[1]:
             return False
         if self.rules.how_it_ends is not Ending.HELD:
             return all(node is None for node in grips)

@@ -11,23 +11,21 @@ the node that it held last, -n.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain, pairwise
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arms._permits import Permits, permits, within_reach
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse, frozen
+from seqopt.arms._permits import Permits, permits
+from seqopt.arrays import Bools, Floats, Ints, Terse, frozen
 from seqopt.errors import StepError
 from seqopt.network.network import Network
-from seqopt.scene.parts import Robot
-from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload
+from seqopt.sequence._robot_kinds import RobotKind, node_numbers, sort_robots
+from seqopt.sequence.rules import Ending, FreeRules, Newest
 from seqopt.sequence.schedule import islands
 from seqopt.sequence.site import Site
-from seqopt.sequence.two_robots import placing_node
 
 
 class Moves(NamedTuple):
@@ -48,60 +46,6 @@ def _join_moves(parts: Sequence[Moves], states: Ints) -> Moves:
     """Return several moves as one, from states (n, c)."""
     none = Moves(np.zeros(0, dtype=np.int64), states[:0], np.zeros(0))
     return Moves(*map(np.concatenate, zip(none, *parts, strict=True)))
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class RobotKind(FrozenValue):
-    """Robots that reach the same nodes, may carry as much, and may place or not."""
-
-    robots: tuple[int, ...]  # indices of the scene's robots
-    reach: Bools  # (2B,); nodes that they may hold, as in ``network.inner.ravel()``
-    newest: Bools  # (2B,); at which they hold a brick when they place it, and as the newest
-    places: bool  # whether they may place
-    cap: float  # largest force of a grip, N
-
-
-def sort_robots(
-    network: Network,
-    rules: FreeRules,
-    caps: Mapping[str, float] | None = None,
-    *,
-    timed: bool = False,
-) -> tuple[RobotKind, ...]:
-    """Return the robots that take part, by kind, in the order of their first robots.
-
-    ``caps``: largest force of a robot's grip beside its payload, by its name, N; ``timed``: whether
-    those of a kind must take as long.
-    """
-    scene = network.scene
-    alike: dict[tuple[object, ...], RobotKind] = {}
-    for i in rules.team(scene):
-        robot = scene.robots[i]
-        own = {*chain.from_iterable(within_reach(scene, robot))}
-        reach = np.array([node in own for node in node_numbers(network)])
-        newest = reach if rules.newest is not Newest.PLACING else _placing(network, robot, reach)
-        places = not rules.placers or robot.name in rules.placers
-        cap = robot.payload if rules.payload is Payload.KEPT else np.inf
-        cap = min(cap, (caps or {}).get(robot.name, np.inf))
-        alone = (robot.arm and robot.name, scene.grip_kinds.of_robot[i], timed and robot.durations)
-        key = (reach.tobytes(), newest.tobytes(), places, cap, *alone)
-        first = alike.setdefault(key, RobotKind((), reach, newest, places, cap))
-        alike[key] = replace(first, robots=(*first.robots, i))
-    return tuple(alike.values())
-
-
-def node_numbers(network: Network) -> list[int]:
-    """Return the scene's numbers of all inner nodes (2B,), brick by brick in build order."""
-    return [node for brick in network.scene.placed for node in brick.nodes]
-
-
-def _placing(network: Network, robot: Robot, reach: Bools) -> Bools:
-    """Return at which node a robot places every brick."""
-    out = np.zeros_like(reach)
-    for k, brick in enumerate(network.scene.placed):
-        with suppress(StepError):  # it reaches none
-            out[2 * k + brick.nodes.index(placing_node(network, robot, brick))] = True
-    return out
 
 
 _PAIRS = 4_000_000  # of states and nodes that are looked at together
@@ -250,7 +194,7 @@ class FreeSpace(StateRows):
 
     def may_place(self, bricks: int, states: Ints) -> Bools:
         """Return in which states (n, c) a brick may be placed: the first may break rules, (n,)."""
-        if self.rules.begin is None or bricks != self.first or not bricks:
+        if self.rules.begin is None or bricks != self._span[0] or not bricks:
             return np.ones(len(states), dtype=bool)
         return self.lawful(bricks, states)
 
@@ -263,7 +207,7 @@ class FreeSpace(StateRows):
 
     def holds(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which a free robot takes a grip on a brick that stands."""
-        begins = self.rules.begin is not None and bricks == self.first
+        begins = self.rules.begin is not None and bricks == self._span[0]
         able = np.ones(len(states), dtype=bool) if begins else self.lawful(bricks, states)
         if self.rules.regrips is not None:
             able &= states[:, -1] < self.rules.regrips
@@ -285,9 +229,9 @@ class FreeSpace(StateRows):
                 parts.append(Moves(rows, new, np.zeros(len(rows))))
         moves = _join_moves(parts, states)
         ending = self.rules.how_it_ends
-        if bricks < self.levels or ending is not Ending.ONE_BY_ONE:
+        if bricks != self._span[1] or ending is not Ending.ONE_BY_ONE:
             moves = self._lawful_only(bricks, moves)
-        if bricks < self.levels or ending is Ending.HELD:
+        if bricks != self._span[1] or ending is Ending.HELD:
             return moves
         return self._let_go(states, moves)
 
@@ -329,7 +273,7 @@ class FreeSpace(StateRows):
         if self.rules.how_it_ends is not Ending.HELD:
             return np.asarray(self.grips(states) == 0)
         if self.rules.finish is None or self.rules.finish.grips is None:
-            return self.lawful(self.levels, states)
+            return self.lawful(self._span[1], states)
         held = states[:, : self.robots].clip(min=0)
         for first, end in self.slots if self.parks else ():
             sort_entries(held, first, end)
@@ -362,7 +306,7 @@ class FreeSpace(StateRows):
     def _loose(self) -> tuple[list[list[int]], ...]:
         """By brick count the parts that no joint ties to the ground: places in build order."""
         at = {brick.name: i for i, brick in enumerate(self.network.scene.placed)}
-        parts = ((), *(islands(self.network, count + 1) for count in range(self.levels)))
+        parts = ((), *(islands(self.network, count + 1) for count in range(max(self._span))))
         return tuple([[at[name] for name in part] for part in level] for level in parts)
 
     def _takes(self, states: Ints, nodes_of: Sequence[Ints]) -> Moves:
@@ -401,6 +345,59 @@ class FreeSpace(StateRows):
         return Moves(moves.source[ok], moves.states[ok], moves.way[ok])
 
 
+@dataclass(frozen=True, repr=False)
+class _TakeDownSpace(FreeSpace):
+    """The states of a take-down: those of building, and moves that take bricks away."""
+
+    first = 1  # level 0 is the empty site of builds, before which there is nothing to do
+
+    @property
+    def levels(self) -> int:
+        """The level on which it ends: every brick that is removed leads to the next."""
+        return 1 + self._span[0] - self._span[1]
+
+    def bricks_at(self, level: int) -> int:
+        """Return how many bricks stand on a level."""
+        return 1 + self._span[0] - level
+
+    @property
+    def fewest_steps(self) -> int:
+        """How many steps it has at least: who removes a brick took hold of it, or did at first."""
+        removed = self.levels - 1
+        return removed + max(0, removed - self.held_first)
+
+    def within(
+        self, level: int, states: Ints, *, regrips: bool = True
+    ) -> tuple[tuple[Moves, bool], ...]:
+        """Return the moves that remove no brick: robots must take grips to remove any."""
+        bricks = self.bricks_at(level)
+        return super().within(bricks, states) if bricks else ()
+
+    def onward(self, level: int, states: Ints) -> tuple[tuple[Moves, bool], ...]:
+        """Return the moves that remove the newest brick: none of them is a regrip."""
+        return ((self.removes(self.bricks_at(level), states), False),)
+
+    def may_place(self, level: int, states: Ints) -> Bools:
+        """Return in which states (n, c) a brick may be removed: the first may break rules, (n,)."""
+        return super().may_place(self.bricks_at(level), states)
+
+    def removes(self, bricks: int, states: Ints) -> Moves:
+        """Return the moves in which the one robot that holds the newest brick takes it away."""
+        on = (states[:, : self.robots].astype(np.int64) + 1) // 2 == bricks
+        alone, parts = on.sum(axis=1) == 1, [Moves(np.zeros(0, np.int64), states[:0], np.zeros(0))]
+        for kind, (first, end) in zip(self.kinds, self.slots, strict=True):
+            for slot in range(first, end) if kind.places else ():
+                rows = np.flatnonzero(alone & on[:, slot])
+                rows = rows[kind.newest[states[rows, slot].astype(np.int64) - 1]]
+                new = states[rows]
+                new[:, slot] = -new[:, slot] if self.parks else 0
+                new[:, self.robots :] = 0
+                sort_entries(new, first, end)
+                parts.append(Moves(rows, new, np.zeros(len(rows))))
+        moves = _join_moves(parts, states)
+        return self._lawful_only(bricks - 1, moves) if bricks > 1 else moves
+
+
 def free_space(
     network: Network,
     rules: FreeRules,
@@ -423,7 +420,8 @@ def free_space(
     >>> space.places(0, space.start()).states.tolist()  # node 0 of its first brick is blocked
     [[2, 0, 0], [0, 2, 0], [0, 0, 2]]
     """
-    space = FreeSpace(network, rules, sort_robots(network, rules, caps, timed=timed), parks)
+    kinds, rules = sort_robots(network, rules, caps, timed=timed), rules.begun(network.scene)
+    space = (_TakeDownSpace if rules.takes_down else FreeSpace)(network, rules, kinds, parks)
     base = 1 + (2 if parks else 1) * 2 * len(network.inner)
     if base**space.robots * (1 + (rules.regrips or 0)) >= 2**62:
         raise StepError(

@@ -17,7 +17,8 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import StepError
 from seqopt.network.network import Network
-from seqopt.sequence._rule_space import Moves, RobotKind, StateRows, node_numbers
+from seqopt.sequence._robot_kinds import RobotKind, node_numbers
+from seqopt.sequence._rule_space import Moves, StateRows
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.site import _begin_step
 from seqopt.sequence.steps import Step, StepKind, check_sequence

@@ -12,20 +12,25 @@ last (0 at first), and :math:`p`, :math:`a` what it takes to prepare and to act,
    e_i = \max \{ e_{i-1}, \, r + p \} + a .
 
 Letting go needs no preparation. Where several let go at once, the slowest counts.
+
+Given steps may also be shared out anew among robots, exactly, by labels over the steps: grips,
+their order and their nodes stay. A label is who has the grips that are held, when the last step
+ended, and since when every other robot is free.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, TypeVar
 
 from seqopt.errors import ProblemError, StepError
 from seqopt.scene.holders._durations import EXAMPLE, Durations
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.schedule import Schedule
-from seqopt.sequence.steps import AnyStep, StepKind
+from seqopt.sequence.schedule import Hold, Schedule, holds
+from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
 
 
 @dataclass(frozen=True)
@@ -122,3 +127,116 @@ def require_for_makespan(scene: Scene, moves: FreeRules | Schedule) -> None:
         require_durations(scene, team)
     except StepError as error:
         raise ProblemError(f"makespan: {error}") from None
+
+
+_NOTHING = -1  # in the place of the number of a grip
+_Part = TypeVar("_Part")
+May = Callable[[int, Hold], bool]
+
+
+class _Label(NamedTuple):
+    """What one choice of robots comes to.
+
+    ``end``: of the last step, s; ``since``: since when robots are free, s; of those who hold zero;
+    ``has``: number of the grip of every robot; ``last``: node that each held last; ``chosen``: the
+    robots of all grips by then, the last one first.
+    """
+
+    end: float
+    since: tuple[float, ...]
+    has: tuple[int, ...]
+    last: tuple[int | None, ...]
+    chosen: tuple[int, Any] | None  # a robot, and what was chosen before it
+
+
+def reassigned_steps(
+    scene: Scene, steps: Sequence[Step], may: May, team: Sequence[int] | None = None
+) -> tuple[Step, ...]:
+    """Return the same grips in the same order by those robots with which the build takes least.
+
+    ``may``: whether a robot, by its index, may have a grip; ``team``: the robots that take part, by
+    default all. A `StepError` says that there is no such choice.
+    """
+    team = range(len(scene.robots)) if team is None else team
+    own = dict(zip(team, require_durations(scene, team), strict=True))
+    every = sorted(holds(scene, steps), key=lambda hold: (hold.first, hold.robot))
+    count = len(scene.robots)
+    moves = any(durations.speed for durations in own.values())
+    labels = [_Label(0.0, (0.0,) * count, (_NOTHING,) * count, (None,) * count, None)]
+    for step in steps:
+        ended = [i for i, hold in enumerate(every) if hold.last == step.number - 1]
+        begun = [i for i, hold in enumerate(every) if hold.first == step.number]
+        found = list[_Label]()
+        for label in labels:
+            if ended:
+                found.append(_let_go(label, [label.has.index(i) for i in ended], own))
+                continue
+            for i in begun:
+                able = [r for r in team if label.has[r] == _NOTHING and may(r, every[i])]
+                found += [_take(scene, label, (r, i, every[i]), own[r]) for r in able]
+        labels = _undominated(found, moves=moves)
+    if not labels:
+        raise StepError("no robot may have a grip of the steps; nobody can be reassigned")
+    chosen, link = list[int](), min(labels, key=lambda label: label.end).chosen
+    while link is not None:
+        chosen.append(link[0])
+        link = link[1]
+    order = [i for step in steps for i, hold in enumerate(every) if hold.first == step.number]
+    return _with_robots(scene, steps, every, dict(zip(order, chosen[::-1], strict=True)))
+
+
+def _take(scene: Scene, label: _Label, which: tuple[int, int, Hold], own: Durations) -> _Label:
+    """Return what follows where a robot takes a grip."""
+    robot, number, hold = which
+    placing = hold.places is not None
+    ready = label.since[robot] + (own.fetch if placing else own.approach)
+    ready += way_seconds(scene, own, label.last[robot], hold.node)
+    end = max(label.end, ready) + (own.place if placing else own.grip)
+    return _Label(
+        end,
+        _put(label.since, robot, 0.0),
+        _put(label.has, robot, number),
+        _put(label.last, robot, hold.node),
+        (robot, label.chosen),
+    )
+
+
+def _let_go(label: _Label, robots: Sequence[int], own: Mapping[int, Durations]) -> _Label:
+    """Return what follows where robots let go, all at once."""
+    end = label.end + max(own[r].release for r in robots)
+    since, has = label.since, label.has
+    for r in robots:
+        since, has = _put(since, r, end), _put(has, r, _NOTHING)
+    return label._replace(end=end, since=since, has=has)
+
+
+def _put(values: tuple[_Part, ...], place: int, value: _Part) -> tuple[_Part, ...]:
+    return (*values[:place], value, *values[place + 1 :])
+
+
+def _undominated(labels: Sequence[_Label], *, moves: bool) -> list[_Label]:
+    """Return the labels that no other one of the same grips is nowhere above."""
+    kept: dict[object, list[_Label]] = {}
+    for label in sorted(labels, key=lambda each: (each.end, each.since)):
+        own = kept.setdefault((label.has, label.last if moves else None), [])
+        if not any(_nowhere_above(other, label) for other in own):
+            own.append(label)
+    return [label for own in kept.values() for label in own]
+
+
+def _nowhere_above(first: _Label, second: _Label) -> bool:
+    return all(a <= b for a, b in zip(first.since, second.since, strict=True))
+
+
+def _with_robots(
+    scene: Scene, steps: Sequence[Step], every: Sequence[Hold], chosen: dict[int, int]
+) -> tuple[Step, ...]:
+    """Return steps with the grips of chosen robots."""
+    out = []
+    for step in steps:
+        grips: list[int | None] = [None] * len(scene.robots)
+        for i, hold in enumerate(every):
+            if hold.first <= step.number <= hold.last:
+                grips[chosen[i]] = hold.node
+        out.append(replace(step, grips=tuple(grips)))
+    return check_sequence(scene, out)

@@ -34,6 +34,13 @@ class Payload(Enum):
     IGNORED = "ignored"
 
 
+class Direction(Enum):
+    """Whether bricks are placed, or taken away, the newest first."""
+
+    BUILD = "build"
+    TAKE_DOWN = "take-down"
+
+
 class Ending(Enum):
     """How the build ends."""
 
@@ -71,6 +78,10 @@ class FreeRules:
     finish : Site or None
         Where it ends: with so many bricks, and grips, or as ``ending`` says; by default with all
         bricks. Robots of one kind may have changed places.
+    direction : Direction or str
+        Whether bricks are placed, or taken away, the newest first, each by the one robot that holds
+        it, at a node of the rule ``newest``. A take-down begins by default with all bricks, which
+        nobody holds, and ends with the empty site; states keep the same rules.
 
     Raises
     ------
@@ -93,9 +104,10 @@ class FreeRules:
     candidates: str = ""
     begin: Site | None = None
     finish: Site | None = None
+    direction: Direction = Direction.BUILD
 
     def __post_init__(self) -> None:
-        for name, kind in (("newest", Newest), ("payload", Payload), ("ending", Ending)):
+        for name, kind in _CHOICES:
             object.__setattr__(self, name, _choice(name, kind, getattr(self, name)))
         for name in ("robots", "placers"):
             object.__setattr__(self, name, _names(name, getattr(self, name)))
@@ -111,6 +123,8 @@ class FreeRules:
     def span(self, scene: Scene) -> tuple[int, int]:
         """Return how many bricks stand where the build begins, and where it ends."""
         first, last = 0, len(scene.placed)
+        if self.takes_down:
+            first, last = last, first
         if self.begin is not None:
             held, first = self.begin.holds(scene), self.begin.bricks
             for i, node in enumerate(held):
@@ -122,13 +136,29 @@ class FreeRules:
         if self.finish is not None:
             self.finish.holds(scene)
             last = self.finish.bricks
-        if not max(first, 1) <= last:
+        if self.takes_down and last >= first:
+            raise StepError(f"a take-down from {first} bricks cannot end with {last}; give fewer")
+        if not self.takes_down and not max(first, 1) <= last:
             raise StepError(f"a build from {first} bricks cannot end with {last}; give more")
         return first, last
 
     @property
+    def takes_down(self) -> bool:
+        """Whether bricks are taken away."""
+        return self.direction is Direction.TAKE_DOWN
+
+    def begun(self, scene: Scene) -> FreeRules:
+        """Return the rules with where a take-down begins: at least with who holds nothing there."""
+        if not self.takes_down or self.begin is not None:
+            return self
+        bare = Site(len(scene.placed), (None,) * len(scene.robots), step=0)
+        return replace(self, begin=bare)
+
+    @property
     def how_it_ends(self) -> Ending:
         """How the build ends, where grips at its end are given too."""
+        if self.takes_down and (self.finish is None or not self.finish.bricks):
+            return Ending.ONE_BY_ONE  # who removes the last brick lets go by that
         if self.finish is None or self.finish.grips is None:
             return self.ending
         bare = self.ending if self.ending is not Ending.HELD else Ending.RELEASED
@@ -181,6 +211,7 @@ class FreeRules:
             "regrips": "any" if self.regrips is None else self.regrips,
             "ending": self.ending.value,
             "candidates": self.candidates or "all",
+            **({"direction": self.direction.value} if self.takes_down else {}),
             **{
                 name: site.described(scene)
                 for name, site in (("begin", self.begin), ("finish", self.finish))
@@ -203,6 +234,13 @@ class FreeRules:
             if getattr(self, name) != value:
                 yield f"{name}={said}", replace(self, **{name: value})  # type: ignore[arg-type]
 
+
+_CHOICES = (
+    ("newest", Newest),
+    ("payload", Payload),
+    ("ending", Ending),
+    ("direction", Direction),
+)  # rules of which one of a few is chosen
 
 _LOOSEST = (
     ("candidates", "", "all"),

@@ -17,7 +17,14 @@ from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule, ScheduledGrips
-from seqopt.sequence.steps import Step, StepKind, _check_part, check_sequence, check_step
+from seqopt.sequence.steps import (
+    Step,
+    StepKind,
+    _check_part,
+    _turned_round,
+    check_sequence,
+    check_step,
+)
 from seqopt.sequence.three_robots import SCHEDULES, make_schedule, open_schedule, robot_loop
 
 _Row = dict[str, str]
@@ -66,14 +73,17 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
 
     The text is CSV with the columns ``step``, ``type``, ``bricks`` and, for every robot,
     ``NAME_node`` and, if present, ``NAME_brick``; an empty cell means that the robot does not grip.
-    Other columns are ignored.
+    Other columns are ignored. A take-down may begin with any bricks; the table of a build in
+    reverse, from its last step to 1, is the take-down that passes the same states.
     """
-    steps = []
+    steps: list[Step] = []
     for line, row in _read_rows(scene, text, f"plan {source}"):
         where = f"plan {source}, line {line}"
         cells = _read_cells(row, where)
         grips = tuple(_read_grip(scene, robot, row, where) for robot in scene.robots)
         steps.append(Step(*cells, grips))
+    turned = len(steps) > 1 and steps[0].number == len(steps) and steps[-1].number == 1
+    steps = steps[::-1] if turned else steps
     first = 1
     if steps and (steps[0].kind, steps[0].bricks) != (StepKind.PLACE, 1):  # a part of a plan
         first = max(1, steps[0].number)
@@ -82,7 +92,10 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
             raise StepError(
                 f"plan {source}: step {step.number} should be {expected}; number steps from 1"
             )
-    return check_sequence(scene, steps) if first == 1 else _check_part(scene, steps)
+    if first > 1 or any(step.kind is StepKind.REMOVE for step in steps):
+        return _check_part(scene, steps)
+    checked = check_sequence(scene, steps)
+    return _turned_round(scene, checked) if turned else checked
 
 
 def _read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, _Row]]:

@@ -61,8 +61,11 @@ class Site:
         lasts: dict[int, int] = {r: n for s in done for r, n in enumerate(s.grips) if n is not None}
         regrips = 0
         for step in done:
-            regrips = 0 if step.kind is StepKind.PLACE else regrips
+            regrips = 0 if step.kind in (StepKind.PLACE, StepKind.REMOVE) else regrips
             regrips += step.kind is StepKind.REPOSITION
+        if not done and any(step.kind is StepKind.REMOVE for step in steps):
+            bricks = steps[0].bricks + (steps[0].kind is StepKind.REMOVE)
+            return cls(bricks, (None,) * len(steps[0].grips), step=0)
         if not done:
             return cls(0)
         free = (lasts.get(r) if node is None else None for r, node in enumerate(done[-1].grips))

@@ -21,6 +21,7 @@ class StepKind(Enum):
     PLACE = "place"  # one more brick, held by the robot that places it
     RELEASE = "release"  # one grip fewer, or several; same bricks
     REPOSITION = "reposition"  # one grip more; same bricks
+    REMOVE = "remove"  # one brick fewer, taken away by the only robot that holds it
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,8 @@ def _check_state(scene: Scene, step: AnyStep, where: str) -> None:
         raise StepError(
             f"{where}: {len(step.grips)} grips for {len(scene.robots)} robots; give one each"
         )
-    if not 1 <= step.bricks <= len(scene.bricks):
+    least = step.kind is not StepKind.REMOVE
+    if not least <= step.bricks <= len(scene.bricks):
         raise StepError(f"{where}: {step.bricks} bricks; the scene has 1 to {len(scene.bricks)}")
     holder: dict[int, str] = {}
     for robot, grip in zip(scene.robots, step.grips, strict=True):
@@ -163,7 +165,8 @@ def _check_grip(scene: Scene, step: AnyStep, robot: Robot, node: int, where: str
 def _check_change(scene: Scene, before: AnyStep, step: AnyStep) -> None:
     """Require that a step does what its kind says, and nothing else."""
     where = f"step {step.number} ({step.kind.value})"
-    expected = before.bricks + (step.kind is StepKind.PLACE)
+    removes = step.kind is StepKind.REMOVE
+    expected = before.bricks + (step.kind is StepKind.PLACE) - removes
     if step.bricks != expected:
         raise StepError(
             f"{where}: {step.bricks} bricks after {before.bricks}; give {expected} or another kind"
@@ -177,6 +180,9 @@ def _check_change(scene: Scene, before: AnyStep, step: AnyStep) -> None:
             )
         if old != new:
             (dropped if new is None else taken).append(old if new is None else new)
+    if removes:
+        _check_removal(scene, step, (taken, dropped), where)
+        return
     releases = step.kind is StepKind.RELEASE
     if (len(taken), bool(dropped)) != ((0, True) if releases else (1, False)):
         given, left = (", ".join(map(str, grips)) for grips in (taken, dropped))
@@ -191,3 +197,44 @@ def _check_change(scene: Scene, before: AnyStep, step: AnyStep) -> None:
             f"{where}: its new grip is on node {taken[0]}; "
             f"hold brick {brick.name} at one of {list(brick.nodes)}"
         )
+
+
+def _check_removal(
+    scene: Scene, step: AnyStep, changed: tuple[list[object], list[object]], where: str
+) -> None:
+    """Require that one robot takes the newest brick away, and that nobody else moves."""
+    (taken, dropped), brick = changed, scene.placed[step.bricks]
+    fit = [node in brick.nodes for node in dropped if isinstance(node, Integral)]
+    if taken or len(dropped) != 1 or not all(fit):
+        given, left = (", ".join(map(str, grips)) for grips in changed)
+        raise StepError(
+            f"{where}: it takes grips [{given}] and drops [{left}]; one robot alone holds brick "
+            f"{brick.name}, at one of {list(brick.nodes)}, and takes it away"
+        )
+
+
+def _turned_round(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
+    """Return the take-down that passes the states of a build in reverse, from 1.
+
+    It begins where the build ends; robots that let go together take hold one after the other.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> scene = seqopt.load_scene("arch25")
+    >>> steps = _turned_round(scene, seqopt.sequential(seqopt.build_network(scene)))
+    >>> steps[0].bricks, steps[-1].kind.value, steps[-1].bricks
+    (25, 'remove', 0)
+    """
+    out: list[Step] = []
+    before = [Step(0, StepKind.RELEASE, 0, (None,) * len(scene.robots)), *steps]
+    for now, then in zip(before[::-1], before[-2::-1], strict=False):
+        if now.kind is StepKind.PLACE:
+            out.append(Step(len(out) + 1, StepKind.REMOVE, then.bricks, then.grips))
+            continue
+        kind = StepKind.REPOSITION if now.kind is StepKind.RELEASE else StepKind.RELEASE
+        grips = list(now.grips)
+        for robot in (r for r, node in enumerate(then.grips) if node != grips[r]):
+            grips[robot] = then.grips[robot]
+            out.append(Step(len(out) + 1, kind, then.bricks, tuple(grips)))
+    return _check_part(scene, out)

@@ -166,6 +166,9 @@ def _screened(network: Network, _: Sequence[Step], mortar: Mortar, tell: _Told) 
     payload = np.array([robot.payload for robot in scene.robots])
     for bricks, same in groupby(tell(), attrgetter("bricks")):
         part = [*same]
+        if not bricks:
+            yield from _one_by_one(network, part, mortar)
+            continue
         held = np.array([[place[n] if n is not None else 0 for n in s.grips] for s in part])
         found = screen.stands(bricks, held, payload)
         for step, each in zip(part, found.tolist(), strict=True):

@@ -49,12 +49,14 @@ def each_verdict(
     follow, so steps of a build are asked best in their order. ``compiled``: makes the programs of
     the steps for which that proves nothing.
     """
-    most = max((step.bricks for step in steps), default=1)
+    most = max((step.bricks for step in steps), default=1) or 1
     parts = PartialAssemblies(built, most) if isinstance(built, Network) else built
     prove = VerdictChain(parts, lambda assembly: bonded(assembly, mortar), compiled)
     found: dict[tuple[int, Grips], Stability] = {}
     for step in steps:
         key = step.bricks, step.grips
+        if not step.bricks:
+            found[key] = _NOTHING
         if key not in found:
             assembly, proven, way = prove(*key)
             found[key] = _without_margins(assembly, proven, way.value)
@@ -82,6 +84,23 @@ def _without_margins(assembly: Assembly, proven: Proven, proof: str) -> Stabilit
         claims={},
         unproven=int(verdict is Verdict.UNDECIDED),
     )
+
+
+_NOTHING = Stability(
+    verdict=Verdict.STANDS,
+    proof="nothing stands",
+    bond=0.0,
+    friction=0.0,
+    pull=np.full(DIRECTIONS, np.inf),
+    tilt=np.pi / 2,
+    grip=0.0,
+    motion=np.zeros((0, 6)),
+    first_block="",
+    first_contact="",
+    jammed=None,
+    claims={},
+    unproven=0,
+)  # of the empty site, where a take-down ends
 
 
 def step_verdicts(network: Network, steps: Sequence[Step], mortar: Mortar) -> tuple[Verdict, ...]:
@@ -124,7 +143,7 @@ def each_stability(
     """
     numbers = {step.number for step in steps} if at is None else at
     whole = _Portion(tuple(steps), mortar, margins, numbers if margins else ())
-    most = max((step.bricks for step in steps), default=1)
+    most = max((step.bricks for step in steps), default=1) or 1
     with hire(*shared, beside=True) as crew:
         if crew is None:
             yield from _each(PartialAssemblies(network, most), whole)
@@ -209,7 +228,7 @@ def _each(parts: PartialAssemblies, portion: _Portion) -> Iterator[Stability]:
     up = parts.network.scene.up
     full = partial(assess, mortar=portion.mortar, up=up, margins=portion.margins)
     for step, found in zip(portion.steps, verdicts, strict=True):
-        if step.number not in portion.at:
+        if step.number not in portion.at or not step.bricks:
             yield found
             continue
         margins = full(parts(step.bricks, step.grips))

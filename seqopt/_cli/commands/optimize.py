@@ -69,6 +69,7 @@ from seqopt.problem.requirements import OWN
 from seqopt.responses._tolerance import value_text
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.steps import StepKind
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.study.published import paper_models
@@ -236,11 +237,13 @@ def _from_empty(whole: Problem | None, plan: Plan, choose: Callable[[Problem], P
     if whole is None or plan.certificate is None:
         return ""
     begin = plan.steps[0].number - 1
+    down = any(step.kind is StepKind.REMOVE for step in plan.steps)
+    site = "the whole structure" if down else "an empty site"
     done = f"what is left after step {begin}: {_values(plan)}"
     try:
-        return f"{done}; from an empty site the best is {_values(choose(whole))}"
+        return f"{done}; from {site} the best is {_values(choose(whole))}"
     except InfeasibleError:
-        return f"{done}; from an empty site there is no plan"
+        return f"{done}; from {site} there is no plan"
 
 
 def _values(plan: Plan) -> str:

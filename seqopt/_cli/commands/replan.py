@@ -130,6 +130,9 @@ def _as_optimize(options: argparse.Namespace, scene_file: Path) -> argparse.Name
     base.robots = options.robots or ""
     setattr(base, "from", f"{options.plan}:{options.at}")
     base.change = partial(_changed, options)
+    base.direction = told.get("direction")
+    if base.direction and options.missing:
+        raise StepError("--missing: bricks are missing in a build; a take-down removes them anyway")
     return base
 
 
@@ -145,6 +148,7 @@ def _told(folder: Path) -> dict[str, Any]:
     names = ("least_grips", "newest", "payload", "regrips", "ending", "candidates")
     limits = told.get("limits", {})
     return {
+        "direction": rules.get("direction"),
         "aim": ",".join(told.get("aims", ())),
         "criteria": told["criterion"] if told.get("criterion") in CRITERIA else None,
         "rule": [f"{name}={rules[name]}" for name in names if name in rules],

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from seqopt._files import read_text
-from seqopt.errors import StepError
-from seqopt.scene.scene import Scene
-from seqopt.sequence._parts import read_site, what_is_left
+from seqopt.errors import SeqoptError, StepError
+from seqopt.scene.scene import Scene, _parse_order
+from seqopt.sequence._parts import _standing, read_site, what_is_left
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import read_plan
@@ -39,6 +39,27 @@ def asked_place(options: argparse.Namespace, name: str, scene: Scene) -> tuple[S
         return read_place(scene, text, bare=name == "from")
     except StepError as error:
         raise StepError(f"--{name} {text}: {error}") from None
+
+
+def _kept_place(
+    options: argparse.Namespace, scene: Scene, begin: Place
+) -> tuple[Scene, Place, Place]:
+    """Return where a take-down begins, and where it ends: with the bricks that are to be kept.
+
+    The scene is returned in an order that begins with these.
+    """
+    where = f"--keep {options.keep}"
+    if getattr(options, "to", None) is not None:
+        raise StepError(f"{where}: --to {options.to} says already what stays; leave one out")
+    try:
+        names = [*_parse_order(scene, options.keep)]
+    except SeqoptError as error:
+        raise StepError(f"{where}: {error}") from None
+    found, count = _standing(scene, names, where)
+    stands = len(scene.placed) if begin.site is None else begin.site.bricks
+    if {*found.build_order[:stands]} != {*scene.build_order[:stands]}:
+        raise StepError(f"{where}: not all of these stand where it begins; keep what stands")
+    return found, begin, Place(Site(count))
 
 
 def read_place(scene: Scene, text: str, *, bare: bool = True) -> tuple[Scene, Place]:

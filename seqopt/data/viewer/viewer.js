@@ -9,7 +9,7 @@
     "D_max_1e-3mm": "largest displacement, 1e-3 mm", "D_avg_1e-3mm": "mean displacement, 1e-3 mm", "D_std_1e-3mm": "spread of displacements, 1e-3 mm",
     props: "props that hold", F_prop_N: "largest force of a prop, N", prop_excess_N: "more than props may bear, N",
   };
-  const KINDS = { place: "place", release: "release", reposition: "reposition" };
+  const KINDS = { place: "place", release: "release", reposition: "reposition", remove: "remove" };
   const CLAY = 0xcc8560, PROP = 0x8a8478, NEW = 0xe8b04a, TENSION = 0xc8102e, COMPRESSION = 0x1f5fa8, LARGEST = 32767;
 
   // fields come as whole numbers, compressed
@@ -332,8 +332,8 @@
   function table(build, at) {
     const s = Math.min(at, build.steps.length - 1), step = build.steps[s], out = document.createElement("div");
     out.append(text("h2", `${build.name}, step ${step.number} of ${build.steps.length}`));
-    const newest = structure.bricks.find((_, i) => rank(build, i) === step.bricks - 1);
-    const what = step.kind === "place" ? `Brick ${newest.name} is placed` : step.kind === "release" ? "A robot lets go" : "A robot takes a new grip";
+    const newest = structure.bricks.find((_, i) => rank(build, i) === step.bricks - (step.kind === "remove" ? 0 : 1));
+    const what = step.kind === "place" ? `Brick ${newest.name} is placed` : step.kind === "remove" ? `Brick ${newest.name} is taken away` : step.kind === "release" ? "A robot lets go" : "A robot takes a new grip";
     out.append(text("p", `${what}; ${step.bricks} of ${structure.bricks.length} bricks stand.` + (build.stands[s] ? ` It ${build.stands[s]}.` : "") + (build.off[s] ? ` ${build.off[s]}` : "")));
     if (build.marks[s]) out.append(text("p", build.marks[s], "over"));
     const grips = document.createElement("table"), rows = document.createElement("table");

@@ -14,7 +14,8 @@ from seqopt.graph.graph import Graph
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import Measure
 from seqopt.sequence import _rule_space as free_space
-from seqopt.sequence._rule_space import FreeSpace, node_numbers
+from seqopt.sequence._robot_kinds import node_numbers
+from seqopt.sequence._rule_space import FreeSpace
 from seqopt.sequence._schedule_space import ScheduleSpace
 from seqopt.sequence.rules import Ending
 from seqopt.sequence.site import Site, _begin_step
@@ -35,16 +36,18 @@ def steps_of(space: FreeSpace | ScheduleSpace, states: Sequence[Sequence[int]]) 
     grips: list[int | None] = [*begin.grips]
     stays = _stays(space)  # where a robot was last, as a place from 1
     before, out = begin.bricks, list[Step]()
-    for bricks, *entries in states:
+    for level, *entries in states:
         if len(entries) < space.robots or not all(abs(n) < len(numbers) for n in entries):
-            raise SolverError(f"the state {[bricks, *entries]} is none of this free schedule")
+            raise SolverError(f"the state {[level, *entries]} is none of this free schedule")
+        bricks = space.bricks_at(level)
         took = False
         for kind, (first, end) in zip(space.kinds, space.slots, strict=True):
             took |= _follow(kind.robots, entries[first:end], grips, stays, numbers)
         stays = stays if space.parks else {}
         step = StepKind.PLACE if bricks > before else StepKind.REPOSITION
         number = begin.number + len(out) + 1
-        out.append(Step(number, step if took else StepKind.RELEASE, bricks, tuple(grips)))
+        other = StepKind.REMOVE if bricks < before else StepKind.RELEASE
+        out.append(Step(number, step if took else other, bricks, tuple(grips)))
         before = bricks
     return check_sequence(space.network.scene, out, begin)
 
@@ -138,7 +141,8 @@ def steps_with(problem: States, regrips: Floats, held: Ints) -> Floats:
     released = problem.free_rules.how_it_ends is not Ending.HELD
     begin, space = problem.free_rules.begin, problem.space
     at_first = 0 if begin is None else begin.held
-    return np.asarray(2 * (space.levels - space.first) + at_first + 2 * regrips - held + released)
+    placed = 0 if problem.free_rules.takes_down else space.levels - space.first
+    return np.asarray(2 * placed + at_first + 2 * regrips - held + released)
 
 
 def with_held(problem: States, graph: Graph, held: Bools) -> Graph:

@@ -14,8 +14,8 @@ from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
 from seqopt.graph.scenarios import engine_for, require_alike
+from seqopt.graph.states._checks import checked_limits, of_states
 from seqopt.network.network import Network
-from seqopt.problem.criteria import RankSum
 from seqopt.problem.problem import (
     LARGEST,
     STATE_RESPONSES,
@@ -26,14 +26,7 @@ from seqopt.problem.problem import (
     RobustAim,
     _goals,
 )
-from seqopt.problem.requirements import (
-    LIMIT_TOLERANCE,
-    Criterion,
-    Limit,
-    SceneFacts,
-    as_limits,
-    state_costs,
-)
+from seqopt.problem.requirements import LIMIT_TOLERANCE, Criterion, Limit, state_costs
 from seqopt.problem.standing import Standing, StandingSets
 from seqopt.responses._grip_sets import GripSets, _near
 from seqopt.responses._tolerance import is_tolerance
@@ -67,7 +60,7 @@ class States(Shown):
     ``over``: what is made of their totals, if the goal is a sum; ``weights``: by scenario, of its
     sum in that goal, in place of the largest.
     ``resources``: who solves grip sets, and where answers are kept; the proof believes none of
-    these.
+    these; ``spares``: whether the whole that nobody holds costs nothing.
     """
 
     engine: Engine
@@ -82,6 +75,7 @@ class States(Shown):
     over: RobustAim = WORST_PEAK
     weights: tuple[float, ...] = ()
     resources: Resources = HERE
+    spares: bool = False
 
     def __repr__(self) -> str:
         caps = zip(self.names[len(self.aims) :], self.budgets, strict=True)
@@ -264,15 +258,19 @@ class States(Shown):
         if self.each:
             asked = [partial(p.values, level, rough=rough) for p in self.each]
             return self._worst(asked, states, most)
-        found, within = self.responses(level, states, rough=rough)
         bricks = self.space.bricks_at(level)
         out = np.zeros((len(states), len(self.goals)))
+        if not bricks:  # the empty site, where a take-down ends
+            return out, np.ones(len(states), dtype=bool)
+        found, within = self.responses(level, states, rough=rough)
         for column, goal in enumerate(self.goals):
             if goal.of_states and not goal.of_margins:
                 if goal.response:
                     out[:, column] = found[goal.response]
                 else:
                     out[:, column] = state_costs(self.criterion, found, bricks, within)
+        if self.spares and bricks == len(self.network.inner):
+            out[(states[:, : self.space.robots] <= 0).all(axis=1)] = 0.0
         within &= np.isfinite(out).all(axis=1)
         out[~within] = np.inf
         return out, within
@@ -293,12 +291,11 @@ class States(Shown):
         if self.demands:
             rows = np.flatnonzero(within)
             within[rows] = self.stand(level, states[rows])
-        for column, goal in enumerate(self.goals):
-            if goal.of_margins:
-                rows = np.flatnonzero(within)
-                bricks, grips = self.space.bricks_at(level), self._grips(states[rows], stand=True)
-                ends = self.stability.margins(goal.response, bricks, *grips)
-                out[rows, column] = ends[:, 1]
+        if bricks := self.space.bricks_at(level):
+            for column in (c for c, goal in enumerate(self.goals) if goal.of_margins):
+                name, rows = self.goals[column].response, np.flatnonzero(within)
+                grips = self._grips(states[rows], stand=True)
+                out[rows, column] = self.stability.margins(name, bricks, *grips)[:, 1]
         within &= np.isfinite(out).all(axis=1)
         return out, within
 
@@ -432,9 +429,10 @@ def build_states(
     States('arch25', minmax, steps, 0 limits)
     """
     named = _goals(goals, least=1)
-    limits = _checked(limits, engine.network)
+    rules = rules.begun(engine.network.scene) if isinstance(rules, FreeRules) else rules
+    limits = checked_limits(limits, engine.network)
     if any(goal.of_states and not goal.response for goal in named):
-        criterion = _of_states(engine, criterion)
+        criterion = of_states(engine, criterion)
     standing = stands if isinstance(stands, Standing | None) else Standing(find_mortar(stands))
     return _asked(States(engine, rules, criterion, named, limits, standing))
 
@@ -501,30 +499,3 @@ def _asked(problem: States) -> States:
     if problem.is_timed:
         require_for_makespan(problem.network.scene, problem.rules)
     return problem
-
-
-def _checked(limits: Sequence[Limit], network: Network) -> tuple[Limit, ...]:
-    """Return limits that are all on what a state has."""
-    limits = as_limits(limits)
-    robots = {robot_response(robot.name) for robot in network.scene.robots}
-    for limit in limits:
-        _require(limit.response, {*STATE_RESPONSES, PROP_EXCESS, *robots}, "limit")
-    return limits
-
-
-def _of_states(engine: Engine, criterion: Criterion) -> Criterion:
-    """Return a criterion posed for a scene, if it is about states alone."""
-    if isinstance(criterion, RankSum):
-        raise ProblemError(
-            f"criterion {criterion.name}: it ranks the choices of a move, and states of a "
-            "schedule are none; take worst-ratio, weighted or another one of responses"
-        )
-    for name in criterion.wanted(1):
-        _require(name, {*STATE_RESPONSES}, f"criterion {criterion.name}")
-    return criterion.for_scene(SceneFacts(engine))
-
-
-def _require(name: str, known: set[str], where: str) -> None:
-    if name not in known and not is_tolerance(name):
-        listed = ", ".join(sorted(known))
-        raise ProblemError(f"{where}: a state of a free schedule has no {name}; give {listed}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from seqopt.problem.problem import LARGEST, Goal
 from seqopt.problem.requirements import state_costs
 from seqopt.responses._blocks import Block
 from seqopt.responses._grip_sets import solve_sets
+from seqopt.sequence._rule_check import RuleBook
 
 
 class Answers(NamedTuple):
@@ -65,6 +67,8 @@ def _asked(problem: States, bricks: int, grips: Ints, *, rough: bool) -> Answers
     for limit in problem.limits:
         fit &= ~limit.exceeded(found.get(limit.response, np.zeros(len(grips))))
     worth = np.column_stack([_costs(problem, goal, found, bricks, fit) for goal in problem.goals])
+    if problem.spares and bricks == len(problem.network.inner) and not grips.shape[1]:
+        worth[:] = 0.0  # the whole that nobody holds, where a take-down begins
     return Answers(worth, forces, fit & np.isfinite(worth).all(axis=1))
 
 
@@ -76,3 +80,21 @@ def _costs(
     if goal.of_states and not goal.of_margins:
         return state_costs(problem.criterion, found, bricks, fit)
     return np.zeros(len(fit))
+
+
+def alike(
+    book: RuleBook, most: Mapping[int, float], *, timed: bool = False
+) -> list[tuple[int, ...]]:
+    """Return the robots that could change places, group by group; ``timed``: also in time."""
+    scene, last = book.network.scene, len(book.network.inner)
+    groups: dict[object, list[int]] = {}
+    for r in book.team:
+        may = not book.rules.placers or scene.robots[r].name in book.rules.placers
+        nodes = [book.newest_nodes[r, b] for b in range(1, last + 1)]
+        own = scene.robots[r]
+        gives = (own.stiffness, own.rotational_stiffness, own.payload)  # tolerances are of these
+        arm = own.arm and r  # no other robot is where it is
+        takes = own.durations if timed else None
+        key = (book.reached[r, last], tuple(nodes), may, most[r], gives, arm, takes)
+        groups.setdefault(key, []).append(r)
+    return [tuple(group) for group in groups.values() if len(group) > 1]

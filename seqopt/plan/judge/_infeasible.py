@@ -164,6 +164,9 @@ def _where(problem: States, look: Look) -> str:
     stops = look(replace(problem, goals=STEPS)).reached
     if isinstance(problem.rules, Schedule):
         return f"step {stops + 1} of {problem.space.levels} has no state that is allowed"
+    if problem.rules.takes_down and stops < problem.space.levels:
+        stands = problem.space.bricks_at(stops)
+        return f"brick {placed[stands - 1].name} ({stands} of {len(placed)}) is never removed"
     last = problem.space.levels
     if stops < last:
         return f"brick {placed[stops].name} ({stops + 1} of {len(placed)}) is never placed"

@@ -28,8 +28,8 @@ from seqopt.plan.judge._rule_moves import Follows, RuleTables
 from seqopt.problem.problem import Measure
 from seqopt.problem.standing import slack
 from seqopt.scene.scene import Order
+from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence._rule_check import RuleBook
-from seqopt.sequence._rule_space import node_numbers
 from seqopt.sequence.rules import Ending
 
 Key = tuple[frozenset[int], int]  # bricks that stand, and the newest

@@ -21,8 +21,8 @@ from seqopt.graph.graph import Graph
 from seqopt.graph.paths import lexicographic, reached, tied
 from seqopt.graph.states._visits import move_amounts
 from seqopt.graph.states.states import States
-from seqopt.plan.judge._answers import ask
-from seqopt.plan.judge._rule_moves import Follows, RuleTables, ScheduleTables, _alike
+from seqopt.plan.judge._answers import alike, ask
+from seqopt.plan.judge._rule_moves import Follows, RuleTables, ScheduleTables
 from seqopt.plan.judge._standing_proof import StandingProof
 from seqopt.plan.judge._timed_goals import Claim, GoalProofs, TimedStates
 from seqopt.problem.criteria import WorstRatio
@@ -95,8 +95,8 @@ class Passable:
         """
         goals, tables = self.problem.goals, self.tables
         end, counted = tables.only_end(), float(tables.least_steps())
-        last = np.full((1, len(goals)), -np.inf)
-        if end is not None:
+        last = np.full((1, len(goals)), -np.inf if end is None else 0.0)
+        if end is not None and tables.bricks_at(tables.last):
             asked = Asked(exact=True)
             last = self._answers(tables.bricks_at(tables.last), end, asked, np.inf)[0]
         known = {Measure.PEAK: last[0], Measure.STEPS: np.full(len(goals), counted)}
@@ -137,7 +137,7 @@ class Passable:
         ``states`` (n, c). Results: ``values`` (n, g); ``ok`` (n,).
         """
         goals = self.problem.goals
-        if not level:
+        if not self.tables.bricks_at(level):
             return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
         held, payload = self._held(states, self._most, self._beyond)
         most, margins, _ = asked
@@ -237,7 +237,7 @@ def _tables(problem: States, most: Mapping[int, float]) -> Tables:
     if isinstance(problem.rules, Schedule):
         return ScheduleTables(problem.rules, problem.network, parks=problem.parks)
     book = RuleBook(problem.network, problem.rules)
-    return RuleTables(book, _alike(book, most, timed=problem.is_timed), parks=problem.parks)
+    return RuleTables(book, alike(book, most, timed=problem.is_timed), parks=problem.parks)
 
 
 def _loads(problem: States, *, stand: bool) -> dict[int, float]:

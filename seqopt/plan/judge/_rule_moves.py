@@ -8,19 +8,18 @@ with a minus; then how many grips were taken since the last brick where that cou
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.plan.judge._posture_rules import PostureRules
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.rules import Ending, Newest
-from seqopt.sequence.schedule import Hold, OpenGrip, Schedule, holds, islands
-from seqopt.sequence.steps import Step, StepKind
+from seqopt.sequence.schedule import Hold, Schedule, holds, islands
+from seqopt.sequence.steps import StepKind
 
 PAIRS = 1_000_000  # of states and places that are looked at together
 
@@ -59,8 +58,13 @@ class RuleTables:
     def __init__(
         self, book: RuleBook, groups: Sequence[tuple[int, ...]], *, parks: bool = False
     ) -> None:
-        self._rules, placed = book.rules, book.network.scene.placed
+        scene = book.network.scene
+        self._rules, placed = book.rules.begun(scene), scene.placed
         (self.first, self.last), self._parks = book.span, parks
+        self._top = 0  # of a take-down: one more than the bricks at its begin, which is level 1
+        if self._rules.takes_down:
+            self._top = self.first + 1
+            self.first, self.last = 1, self._top - self.last
         at = [brick.node_position(node) for brick in placed for node in brick.nodes]
         self._at = np.array([[np.nan] * 3, *at])
         self.nodes = np.array([-1, *(node for brick in placed for node in brick.nodes)])
@@ -128,13 +132,13 @@ class RuleTables:
 
     def bricks_at(self, level: int) -> int:
         """Return how many bricks stand on a level."""
-        return level
+        return self._top - level if self._top else level
 
-    def follow(self, bricks: int, states: Ints) -> Iterator[Follows]:
+    def follow(self, level: int, states: Ints) -> Iterator[Follows]:
         """Yield what follows from states (n, c) by one step each, of those that the rules allow."""
-        rows = np.arange(len(states))
+        rows, bricks = np.arange(len(states)), self.bricks_at(level)
         keeps = rows[self.keep(bricks, states)] if bricks else rows
-        begins = self._rules.begin is not None and bricks == self.first
+        begins = self._rules.begin is not None and level == self.first
         able = rows if begins else keeps
         if bricks and self._rules.regrips is not None:
             able = able[states[able, -1] < self._rules.regrips]
@@ -143,11 +147,14 @@ class RuleTables:
             after[:, self.robots :] += 1
             ok = self._postures.allow(bricks, after)
             held = self.in_order(after[ok])
-            yield Follows(bricks, source[ok], held, regrip=True, way=way[ok])
-        for source, after in self._released(bricks, states):
+            yield Follows(level, source[ok], held, regrip=True, way=way[ok])
+        for source, after in self._released(level, states):
             none = np.zeros(len(source))
-            yield Follows(bricks, source, self.in_order(after), regrip=False, way=none)
-        if bricks == self.last:
+            yield Follows(level, source, self.in_order(after), regrip=False, way=none)
+        if level == self.last:
+            return
+        if self._top:
+            yield from self._removed(level, states, keeps)
             return
         for robot in self._takers():
             if self._able[robot]:
@@ -157,6 +164,25 @@ class RuleTables:
                 ok = self.keep(bricks + 1, after) & self._postures.allow(bricks + 1, after)
                 placed = self.in_order(after[ok])
                 yield Follows(bricks + 1, source[ok], placed, regrip=False, way=way[ok])
+
+    def _removed(self, level: int, states: Ints, rows: Ints) -> Iterator[Follows]:
+        """Yield what follows where a robot takes the newest brick away that it alone holds."""
+        bricks = self.bricks_at(level)
+        brick = (2 * bricks - 1, 2 * bricks)  # places of its nodes
+        holders = np.isin(states[rows, : self.robots], brick).sum(axis=1)
+        rows = rows[holders == 1]
+        for robot in range(self.robots):
+            if not self._able[robot]:
+                continue
+            source = rows[np.isin(states[rows, robot], self._of(bricks).newest[robot])]
+            after = states[source]
+            after[:, robot] = -after[:, robot] if self._parks else 0
+            after[:, self.robots :] = 0
+            if bricks > 1:
+                ok = self.keep(bricks - 1, after) & self._postures.allow(bricks - 1, after)
+                source, after = source[ok], after[ok]
+            none = np.zeros(len(source))
+            yield Follows(level + 1, source, self.in_order(after), regrip=False, way=none)
 
     def _taken(
         self, states: Ints, rows: Ints, robot: int, places: Sequence[int]
@@ -184,18 +210,19 @@ class RuleTables:
         first = {robot for group in self._groups for robot in group[:-1] if not self._parks}
         yield from (robot for robot in range(self.robots) if robot not in first)
 
-    def _released(self, bricks: int, states: Ints) -> Iterator[tuple[Ints, Ints]]:
+    def _released(self, level: int, states: Ints) -> Iterator[tuple[Ints, Ints]]:
         """Yield the states after one robot let go, or at the end all, and those before."""
+        bricks = self.bricks_at(level)
         ending = self._rules.how_it_ends
         for robot in range(self.robots):
             source = np.flatnonzero(states[:, robot] > 0)
             after = states[source]
             after[:, robot] = -after[:, robot] if self._parks else 0
-            if not (bricks == self.last and ending is Ending.ONE_BY_ONE):
+            if not (level == self.last and ending is Ending.ONE_BY_ONE):
                 ok = self.keep(bricks, after)
                 source, after = source[ok], after[ok]
             yield source, after
-        if bricks == self.last and ending is Ending.RELEASED:
+        if level == self.last and ending is Ending.RELEASED:
             source = np.flatnonzero((states[:, : self.robots] > 0).any(axis=1))
             after = states[source]
             after[:, : self.robots] = 0
@@ -211,9 +238,12 @@ class RuleTables:
 
         Each brick is placed by a robot that is free, so that others let go before, one in a step,
         of all that it is not holding at the end: there they let go together, one by one or never.
+        Each brick is removed by a robot that took hold of it in a step, or holds it at first.
         """
         ending, placed = self._rules.how_it_ends, self.last - self.first
         held = int(np.count_nonzero(self.start()[:, : self.robots] > 0))
+        if self._top:
+            return max(placed, 2 * placed - held)
         kept = min(self.robots, placed + held) if ending is not Ending.ONE_BY_ONE else 0
         return 2 * placed + held - kept + (ending is Ending.RELEASED)
 
@@ -239,16 +269,16 @@ class RuleTables:
                 ok &= part[grips].any(axis=1)
         return ok
 
-    def ends(self, bricks: int, states: Ints) -> Bools:
+    def ends(self, level: int, states: Ints) -> Bools:
         """Return which states (n, c) end the build."""
-        if bricks < self.last:
+        if level < self.last:
             return np.zeros(len(states), dtype=bool)
         grips = states[:, : self.robots].clip(min=0)
         if self._rules.how_it_ends is not Ending.HELD:
             return np.asarray(~grips.any(axis=1))
         site = self._rules.finish
         if site is None or site.grips is None:
-            return self.keep(bricks, states)
+            return self.keep(self.bricks_at(level), states)
         wanted = [0 if site.grips[r] is None else self._place[site.grips[r]] for r in self.team]
         both = self.in_order(np.concatenate([grips, [wanted]]))
         return np.asarray((both[:-1] == both[-1]).all(axis=1))
@@ -375,42 +405,3 @@ class ScheduleTables:
     def in_order(self, states: Ints) -> Ints:
         """Return states as they are: no two robots could change places."""
         return states
-
-
-def check_scheduled(schedule: Schedule, steps: Sequence[Step]) -> None:
-    """Raise a `StepError` unless a sequence is the schedule, each open grip at one candidate."""
-    if len(steps) != len(schedule.steps):
-        raise StepError(f"{len(steps)} steps; schedule {schedule.method} has {len(schedule.steps)}")
-    chosen: dict[int, object] = {}
-    for step, planned in zip(steps, schedule.steps, strict=True):
-        same = (step.number, step.kind, step.bricks) == (
-            planned.number,
-            planned.kind,
-            planned.bricks,
-        )
-        for node, grip in zip(step.grips, planned.grips, strict=True):
-            if isinstance(grip, OpenGrip):
-                found = chosen.setdefault(grip.move, node)
-                same &= found == node and node in schedule.moves[grip.move].candidates
-            else:
-                same &= node == grip
-        if not same:
-            raise StepError(f"step {step.number} is none of schedule {schedule.method}")
-
-
-def _alike(
-    book: RuleBook, most: Mapping[int, float], *, timed: bool = False
-) -> list[tuple[int, ...]]:
-    """Return the robots that could change places, group by group; ``timed``: also in time."""
-    scene, last = book.network.scene, len(book.network.inner)
-    groups: dict[object, list[int]] = {}
-    for r in book.team:
-        may = not book.rules.placers or scene.robots[r].name in book.rules.placers
-        nodes = [book.newest_nodes[r, b] for b in range(1, last + 1)]
-        own = scene.robots[r]
-        gives = (own.stiffness, own.rotational_stiffness, own.payload)  # tolerances are of these
-        arm = own.arm and r  # no other robot is where it is
-        takes = own.durations if timed else None
-        key = (book.reached[r, last], tuple(nodes), may, most[r], gives, arm, takes)
-        groups.setdefault(key, []).append(r)
-    return [tuple(group) for group in groups.values() if len(group) > 1]

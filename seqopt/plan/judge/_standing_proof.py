@@ -46,7 +46,7 @@ class StandingProof:
         (S,).
         """
         out = np.ones(len(held), dtype=bool)
-        for demand in self.asked(margins):
+        for demand in self.asked(margins) if bricks else ():  # an empty site stands
             for known in self._known(demand):
                 out[out] = known.may_stand(bricks, held[out], payload[out])
         return out
@@ -56,6 +56,8 @@ class StandingProof:
     ) -> Ints:
         """Return -1 where the same is known without asking, else 0 or 1."""
         known = [one for demand in self.asked(margins) for one in self._known(demand)]
+        if not bricks:
+            return np.ones(len(held), dtype=np.int64)
         return np.asarray(np.min([one.recalled(bricks, held, payload) for one in known], axis=0))
 
     def _known(self, asked: Standing) -> tuple[StandingSets, ...]:

@@ -16,13 +16,12 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
-from seqopt.errors import SolverError
+from seqopt.errors import SolverError, StepError
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.judge._posture_rules import check_postures
 from seqopt.plan.judge._proof import BELOW, Hint, Proof
 from seqopt.plan.judge._prop_rules import check_props
-from seqopt.plan.judge._rule_moves import check_scheduled
 from seqopt.plan.judge._standing_proof import proven_margins, require_margin
 from seqopt.plan.judge._time_proof import makespan
 from seqopt.plan.judge._timed_goals import Claim
@@ -34,7 +33,7 @@ from seqopt.responses._tolerance import is_tolerance, misfits_along, with_tolera
 from seqopt.responses.quantities import CHOSEN_BY, PROP_EXCESS
 from seqopt.responses.table import analyze, force_column
 from seqopt.sequence._rule_check import check_free
-from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind
 
 TOLERANCE = 1e-6  # over the size of a value: how far a claim may be from what the engine says
@@ -105,7 +104,7 @@ def _gap(goals: Sequence[Goal], values: Sequence[float], bounds: Sequence[float]
 def _as_claimed(problem: States, selection: StatePath, steps: Sequence[Step]) -> tuple[float, ...]:
     """Return the values of steps that keep the rules, if they are those that are claimed."""
     if isinstance(problem.rules, Schedule):
-        check_scheduled(problem.rules, steps)
+        _check_scheduled(problem.rules, steps)
     else:
         check_free(problem.network, problem.rules, steps)
     check_postures(problem.network.scene, steps)
@@ -114,6 +113,27 @@ def _as_claimed(problem: States, selection: StatePath, steps: Sequence[Step]) ->
         if not abs(value - claimed) <= TOLERANCE * max(abs(value), abs(claimed)):
             raise SolverError(f"{goal} is {value:.9g}, not {claimed:.9g} as claimed")
     return values
+
+
+def _check_scheduled(schedule: Schedule, steps: Sequence[Step]) -> None:
+    """Raise a `StepError` unless a sequence is the schedule, each open grip at one candidate."""
+    if len(steps) != len(schedule.steps):
+        raise StepError(f"{len(steps)} steps; schedule {schedule.method} has {len(schedule.steps)}")
+    chosen: dict[int, object] = {}
+    for step, planned in zip(steps, schedule.steps, strict=True):
+        same = (step.number, step.kind, step.bricks) == (
+            planned.number,
+            planned.kind,
+            planned.bricks,
+        )
+        for node, grip in zip(step.grips, planned.grips, strict=True):
+            if isinstance(grip, OpenGrip):
+                found = chosen.setdefault(grip.move, node)
+                same &= found == node and node in schedule.moves[grip.move].candidates
+            else:
+                same &= node == grip
+        if not same:
+            raise StepError(f"step {step.number} is none of schedule {schedule.method}")
 
 
 def _bounds(problem: States, proof: Proof, values: tuple[float, ...]) -> tuple[float, ...]:

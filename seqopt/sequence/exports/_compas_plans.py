@@ -28,7 +28,7 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.exports._compas_values import Document, compas_frame, mesh_data, typed
 from seqopt.sequence.exports._grip_frames import Frame, Held, brick_frame, hold
 from seqopt.sequence.exports._tables import StepStates, step_states
-from seqopt.sequence.steps import Step
+from seqopt.sequence.steps import Step, StepKind
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,8 @@ def _told(row: StepStates, names: Mapping[int, str], before: _Holds) -> Iterator
             yield f"{robot} {does} {names[brick]}"
     for robot, (_, brick) in before.items():
         if robot not in row.holds:
-            yield f"{robot} lets go of {names[brick]}"
+            does = "removes" if row.step.kind is StepKind.REMOVE else "lets go of"
+            yield f"{robot} {does} {names[brick]}"
 
 
 def _text(robot: str, said: str, held: Held) -> Document:

@@ -16,7 +16,7 @@ from enum import Enum
 
 from seqopt._files import harmless
 from seqopt.scene.scene import Scene
-from seqopt.sequence.steps import Step
+from seqopt.sequence.steps import Step, StepKind
 
 
 class BlockState(Enum):
@@ -49,7 +49,8 @@ def step_states(scene: Scene, steps: Sequence[Step]) -> Iterator[StepStates]:
     >>> second.new, [second.states[name].value for name in (1, 2, 3)]
     ((2,), ['held', 'held', 'absent'])
     """
-    before = 0
+    begins = any(step.kind is StepKind.REMOVE for step in steps)
+    before = steps[0].bricks if begins else 0  # of a take-down nothing is placed
     names = [brick.name for brick in scene.placed]
     for step in steps:
         holds = {

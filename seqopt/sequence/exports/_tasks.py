@@ -1,7 +1,8 @@
 """What each robot does in every step, for those who program robots: frames of blocks and tools.
 
 In a step of placing, a robot picks a block from where the yard has it and places it; in one of
-repositioning it takes a standing block; in one of releasing it lets go. All others hold on.
+repositioning it takes a standing block; in one of releasing it lets go; in one of removing it takes
+a block that it holds out of the structure and stores it. All others hold on.
 """
 
 from __future__ import annotations
@@ -39,6 +40,8 @@ class Action(Enum):
     REPOSITION = "reposition"  # it takes hold of a block that stands
     HOLD = "hold"  # it goes on holding
     RELEASE = "release"  # it lets go
+    REMOVE = "remove"  # it takes the block that it holds out of the structure
+    STORE = "store"  # it puts this away, wherever it is kept
 
 
 @dataclass(frozen=True)
@@ -46,8 +49,9 @@ class Task:
     """What one robot does in one step; frames are of the scene, m.
 
     ``grip`` is the frame of the tool, with its tip at the node and its third axis into the block,
-    and ``grip_in_block`` the same from the block. A block is picked where the reader keeps it, so
-    a task of picking has no other frame. ``built``: how many blocks stand once the step is done.
+    and ``grip_in_block`` the same from the block. A block is picked and stored where the reader
+    keeps it, so tasks of this have no other frame. ``built``: how many blocks stand once the step
+    is done.
     """
 
     step: int
@@ -140,16 +144,19 @@ def _actions(step: Step, old: int | None, new: int | None) -> tuple[Action, ...]
     if old == new:
         return (Action.HOLD,)
     if new is None:
-        return (Action.RELEASE,)
+        away = (Action.REMOVE, Action.STORE)
+        return away if step.kind is StepKind.REMOVE else (Action.RELEASE,)
     return (Action.PICK, Action.PLACE) if step.kind is StepKind.PLACE else (Action.REPOSITION,)
 
 
 def _task(step: Step, action: Action, grip: _Grip) -> Task:
     """Return what a robot does, with the frames that this has."""
-    held, there = grip.held, action is not Action.PICK
+    held, there = grip.held, action not in (Action.PICK, Action.STORE)
     block, tool = held.block, held.grip
     back = tool.moved(-tool.axes[2], grip.far)
-    approach = {Action.PLACE: tool.moved(np.array(held.away), grip.far), Action.REPOSITION: back}
+    away = tool.moved(np.array(held.away), grip.far)
+    approach = {Action.PLACE: away, Action.REPOSITION: back}
+    retreat = {Action.RELEASE: back, Action.REMOVE: away}
     return Task(
         step=step.number,
         kind=step.kind,
@@ -163,7 +170,7 @@ def _task(step: Step, action: Action, grip: _Grip) -> Task:
         block_frame=block if there else None,
         grip=tool if there else None,
         approach=approach.get(action),
-        retreat=back if action is Action.RELEASE else None,
+        retreat=retreat.get(action),
         posture=grip.posture if there else None,
     )
 

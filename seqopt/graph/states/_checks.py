@@ -1,0 +1,41 @@
+"""What a state of a free schedule has: limits and criteria on anything else are refused."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from seqopt.engines.interface import Engine
+from seqopt.errors import ProblemError
+from seqopt.network.network import Network
+from seqopt.problem.criteria import RankSum
+from seqopt.problem.problem import STATE_RESPONSES
+from seqopt.problem.requirements import Criterion, Limit, SceneFacts, as_limits
+from seqopt.responses._tolerance import is_tolerance
+from seqopt.responses.quantities import PROP_EXCESS, robot_response
+
+
+def checked_limits(limits: Sequence[Limit], network: Network) -> tuple[Limit, ...]:
+    """Return limits that are all on what a state has."""
+    limits = as_limits(limits)
+    robots = {robot_response(robot.name) for robot in network.scene.robots}
+    for limit in limits:
+        _require(limit.response, {*STATE_RESPONSES, PROP_EXCESS, *robots}, "limit")
+    return limits
+
+
+def of_states(engine: Engine, criterion: Criterion) -> Criterion:
+    """Return a criterion posed for a scene, if it is about states alone."""
+    if isinstance(criterion, RankSum):
+        raise ProblemError(
+            f"criterion {criterion.name}: it ranks the choices of a move, and states of a "
+            "schedule are none; take worst-ratio, weighted or another one of responses"
+        )
+    for name in criterion.wanted(1):
+        _require(name, {*STATE_RESPONSES}, f"criterion {criterion.name}")
+    return criterion.for_scene(SceneFacts(engine))
+
+
+def _require(name: str, known: set[str], where: str) -> None:
+    if name not in known and not is_tolerance(name):
+        listed = ", ".join(sorted(known))
+        raise ProblemError(f"{where}: a state of a free schedule has no {name}; give {listed}")

@@ -1,0 +1,74 @@
+"""Take-downs on the command line."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from seqopt._cli.main import main
+from seqopt.scene.scene_file import save_scene
+from tests.builders import small_arch
+
+
+@pytest.fixture
+def arch(tmp_path):
+    path = tmp_path / "arch.json"
+    save_scene(small_arch(5), path)
+    return str(path)
+
+
+def run(capsys, *arguments):
+    try:
+        status = main([*arguments])
+    except SystemExit as stop:
+        status = int(stop.code or 0)
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+DOWN = ("--schedule", "free", "--direction", "take-down")
+
+
+@pytest.mark.slow
+def test_a_take_down_is_written_and_read_everywhere(capsys, tmp_path, arch):
+    out = tmp_path / "down"
+    aim = ("--aim", "minmax,steps", "--policy")
+    status, said, _ = run(capsys, "optimize", arch, *DOWN, *aim, "--out", str(out))
+    assert (status, "optimal" in said) == (0, True)
+    assert json.loads((out / "summary.json").read_text())["rules"]["direction"] == "take-down"
+    plan = ("--plan", str(out / "plan.csv"))
+    assert run(capsys, "analyze", arch, *plan)[0] == 0
+    status, said, _ = run(capsys, "assess", arch, *plan, "--mortar", "epoxy")
+    assert (status, "nothing stands" in said) == (0, True)
+    status, said, _ = run(capsys, "next", f"{out}:1", "--policy", str(out))
+    assert (status, "moves prove" in said) == (0, True)
+    status, said, _ = run(capsys, "replan", str(out), "--at", "3")
+    assert (status, "the new plan is the old one" in said) == (0, True)
+
+
+def test_a_part_is_kept(capsys, tmp_path, arch):
+    out = tmp_path / "part"
+    status, *_ = run(capsys, "optimize", arch, *DOWN, "--keep", "1..2", "--out", str(out))
+    assert status == 0
+    assert (out / "plan.csv").read_text().splitlines()[-1].split(",")[2] == "2"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--direction", "take-down"), "it goes with --schedule free"),
+        (("--schedule", "free", "--keep", "1..2"), "it goes with --direction take-down"),
+        (("--schedule", "free", "--direction", "takedown"), "did you mean take-down?"),
+        ((*DOWN, "--keep", "1..9"), "more bricks than the scene has"),
+        ((*DOWN, "--keep", "1..2", "--to", "1"), "leave one out"),
+        ((*DOWN, "--from", "3", "--keep", "4,5"), "keep what stands"),
+        ((*DOWN, "--to", "5"), "cannot end with 5; give fewer"),
+        ((*DOWN, "--order", "search", "--aim", "steps"), "put minmax first"),
+    ],
+)
+def test_wrong_words_get_a_line(capsys, tmp_path, arch, words, said):
+    status, _, error = run(capsys, "optimize", arch, *words, "--out", str(tmp_path / "x"))
+    assert status == 2
+    assert said in error
+    assert error.count("\n") == 1

@@ -1,0 +1,335 @@
+"""Take-downs: rules in plain words against an enumeration of one's own, plans, files, refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise, permutations
+
+import networkx as nx
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt.errors import ProblemError, SolverError, StepError
+from seqopt.graph.orders import AllOrders
+from seqopt.graph.states._visits import explore
+from seqopt.graph.states.states import build_states
+from seqopt.plan._status import Status
+from seqopt.plan.front import find_front
+from seqopt.plan.judge.schedules import judge_schedule
+from seqopt.plan.policy import find_policy
+from seqopt.responses import analyze_staged
+from seqopt.sequence._rule_check import RuleBook, check_free
+from seqopt.sequence.exports import Action, plan_tasks
+from seqopt.sequence.exports.formats import plan_csv
+from seqopt.sequence.schedule_file import parse_plan
+from seqopt.sequence.site import Site
+from seqopt.sequence.steps import Step, StepKind, _turned_round, check_sequence
+from tests.brute_force import ONES, allowed
+
+ARCH = seqopt.ArchShape(pitch=(1.2, 0.4, -0.4, -1.2), pattern="V")
+DOWN = seqopt.FreeRules(direction="take-down")
+
+
+def arch():
+    return seqopt.make_engine("compliance", seqopt.arch_scene(ARCH))
+
+
+def small_wall():
+    scene = seqopt.load_scene("wall:columns=2,courses=2")
+    return seqopt.make_engine("compliance", scene)
+
+
+def lawful(scene, rules, bricks, grips):
+    held = {n for n in grips if n is not None}
+    enough = len(held) >= (rules.least_grips if bricks > 1 else 0)
+    return bricks == 0 or (enough and bool(held & {*scene.placed[bricks - 1].nodes}))
+
+
+def taken(scene, rules, bricks, grips):
+    """What follows where a free robot takes hold."""
+    if lawful(scene, rules, bricks, grips) or bricks == len(scene.placed):
+        nodes = [n for brick in scene.placed[:bricks] for n in brick.nodes]
+        for node in {*nodes} - {*grips} - {*scene.blocked_nodes}:
+            for r in (r for r, held in enumerate(grips) if held is None):
+                yield bricks, (*grips[:r], node, *grips[r + 1 :])
+
+
+def dropped(scene, rules, bricks, grips):
+    """What follows where a robot lets go, or takes the newest brick away that it alone holds."""
+    newest = [n for n in grips if n in scene.placed[bricks - 1].nodes]
+    for r in (r for r, held in enumerate(grips) if held is not None):
+        free = (*grips[:r], None, *grips[r + 1 :])
+        if lawful(scene, rules, bricks, free):
+            yield bricks, free
+        alone = newest == [grips[r]] and lawful(scene, rules, bricks, grips)
+        if alone and lawful(scene, rules, bricks - 1, free):
+            yield bricks - 1, free
+
+
+def enumerated(engine, rules):
+    """Every state of a take-down, by its words alone, and what it costs."""
+    scene = engine.network.scene
+    start, end = ((count, (None,) * len(scene.robots)) for count in (len(scene.placed), 0))
+    graph, work = nx.DiGraph(), [start]
+    known = {start: np.zeros(4), end: np.zeros(4)}
+    while work:
+        state = work.pop()
+        for new in (*taken(scene, rules, *state), *dropped(scene, rules, *state)):
+            if new not in known:
+                known[new] = allowed(engine, rules, *new)
+                work += [new] if known[new] is not None else []
+            if known[new] is not None:
+                graph.add_edge(state, new)
+    scales = np.array([scale for _, scale in ONES.limits])
+    costs = {s: float((worst / scales).max()) for s, worst in known.items() if worst is not None}
+    return graph, costs, start, end
+
+
+def by_hand(engine, rules, aim):
+    """The least of an aim of all take-downs."""
+    graph, costs, start, end = enumerated(engine, rules)
+    if aim == "steps":
+        return float(nx.shortest_path_length(graph, start, end))
+    if aim == "sum":
+        return nx.shortest_path_length(graph, start, end, weight=lambda _, b, __: costs[b])
+    for value in sorted(costs.values()):
+        kept = graph.subgraph([s for s, cost in costs.items() if cost <= value])
+        if start in kept and end in kept and nx.has_path(kept, start, end):
+            return value
+    return None
+
+
+def posed(engine, aims, rules=DOWN):
+    return seqopt.pose(engine, rules, ONES, aims)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("aim", ["minmax", "sum", "steps"])
+@pytest.mark.parametrize("made", [arch, small_wall])
+@pytest.mark.parametrize("least", [1, 2])
+def test_best_take_down_is_that_of_all(made, aim, least):
+    engine, rules = made(), replace(DOWN, least_grips=least)
+    plan = seqopt.solve(posed(engine, aim, rules))
+    assert plan.status == "optimal"
+    assert plan.selection.objective[0] == pytest.approx(by_hand(engine, rules, aim), rel=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["arch25", "wall:columns=3,courses=3", "dome:courses=2,around=6"])
+def test_take_downs_are_proven(name):
+    engine = seqopt.make_engine("compliance", seqopt.load_scene(name))
+    plan = seqopt.solve(seqopt.pose(engine, DOWN, seqopt.CRITERIA["worst-ratio"], "minmax,steps"))
+    assert plan.status == "optimal"
+    assert plan.certificate.bound == pytest.approx(plan.selection.objective[0], rel=1e-9)
+    assert [s.bricks for s in plan.steps if s.kind is StepKind.REMOVE] == [
+        *range(len(engine.network.scene.bricks))[::-1]
+    ]
+
+
+@pytest.mark.parametrize("made", [arch, small_wall])
+def test_take_down_is_worth_what_its_build_is_in_reverse(made):
+    """With one robot after the other at the finished structure, both pass the same states."""
+    engine = made()
+    one = seqopt.FreeRules(ending="one-by-one")
+    build, down = (seqopt.solve(posed(engine, "minmax,steps", rules)) for rules in (one, DOWN))
+    bare = peak_of(engine, [build.steps[-1]])  # counts in builds: it is where take-downs begin
+    reverse = _turned_round(engine.network.scene, build.steps)
+    check_free(engine.network, DOWN, reverse)
+    assert down.selection.objective[0] == pytest.approx(peak_of(engine, down.steps))
+    assert max(bare, down.selection.objective[0]) == pytest.approx(build.selection.objective[0])
+    assert len(down.steps) == len(build.steps) == len(reverse)
+
+
+def peak_of(engine, steps):
+    """The worst step, each solved alone."""
+    scales = np.array([scale for _, scale in ONES.limits])
+    worst = [allowed(engine, DOWN, s.bricks, s.grips) for s in steps if s.bricks]
+    return float((np.array(worst) / scales).max())
+
+
+def test_a_part_is_taken_down():
+    engine = arch()
+    for ending, held in (("held", True), ("released", False), ("one-by-one", False)):
+        rules = replace(DOWN, finish=Site(2), ending=ending)
+        plan = seqopt.solve(posed(engine, "minmax,steps", rules))
+        assert plan.status == "optimal"
+        assert plan.steps[-1].bricks == 2
+        assert bool(plan.steps[-1].held) is held
+
+
+def test_it_begins_anywhere():
+    engine = arch()
+    whole = seqopt.solve(posed(engine, "minmax,steps"))
+    rules = replace(DOWN, begin=Site.after(whole.steps, 3))
+    rest = seqopt.solve(posed(engine, "minmax,steps", rules))
+    assert rest.selection.objective[0] <= whole.selection.objective[0] * (1 + 1e-9)
+    assert len(rest.steps) <= len(whole.steps) - 3
+    assert rest.steps[0].number == 4
+    assert Site.after(whole.steps, 0) == Site(4, (None,) * 3, step=0)
+
+
+def test_every_aim_and_regrips_that_count():
+    engine = arch()
+    plan = seqopt.solve(posed(engine, "regrips,travel,minmax", replace(DOWN, regrips=3)))
+    assert plan.status == "optimal"
+    assert plan.regrips == plan.selection.objective[0] == 4  # one for every brick
+    front = find_front(posed(engine, "minmax,steps"))
+    assert front.complete
+    best = seqopt.solve(posed(engine, "minmax,steps")).selection.objective
+    assert np.isclose(front.table.iloc[:, :2].to_numpy(float), best).all(axis=1).any()
+
+
+def test_states_stand_until_nothing_does():
+    engine = arch()
+    problem = seqopt.pose(engine, DOWN, ONES, "minmax", stands="epoxy")
+    plan = seqopt.solve(problem)
+    assert plan.status == "optimal"
+    assert {v.value for v in plan.verdicts("epoxy")} == {"stands"}
+
+
+@pytest.mark.slow
+def test_margins_are_aims_of_a_take_down():
+    plan = seqopt.solve(posed(small_wall(), "tilt"))
+    tilts = plan.stability("dry")["tilt_survived_deg"]
+    assert tilts.iloc[-1] == 90  # of the empty site
+    lost = np.pi / 2 - np.radians(tilts.min())
+    assert plan.selection.objective[0] == pytest.approx(lost, rel=0.02)
+
+
+def test_best_order_is_that_of_all():
+    engine = small_wall()
+    scene, criterion = engine.network.scene, seqopt.CRITERIA["worst-ratio"]
+    found = seqopt.solve(seqopt.pose(engine, DOWN, criterion, "minmax", orders="tied"))
+    among = AllOrders(build_states(engine, DOWN, found.problem.criterion, "minmax"))
+    orders = [*filter(among.allows, permutations(scene.build_order))]
+    values = [seqopt.solve(among.planned(order)).objective["minmax"] for order in orders]
+    assert len(orders) > 1
+    assert found.objective["minmax"] == pytest.approx(min(values), rel=1e-9)
+    assert found.order.status == found.status == Status.OPTIMAL
+    assert found.steps[-1].bricks == 0
+    assert max(values) > min(values) * 1.01  # orders differ
+
+
+def test_policy_leads_to_the_optimum():
+    engine = arch()
+    problem = posed(engine, "minmax,steps")
+    policy, best = find_policy(problem), seqopt.solve(problem)
+    site, count = Site.after(best.steps, 0), 0
+    while (advice := policy.best(site)).kind is not None:
+        site, count = advice.site, count + 1
+    assert policy.checked
+    assert (site.bricks, count) == (0, len(best.steps))
+    last = policy.best(Site.after(best.steps, len(best.steps) - 1))
+    assert (last.kind, last.brick) == (StepKind.REMOVE, 1)
+    assert "takes brick 1 away" in str(last)
+
+
+def test_judge_refuses_what_is_no_take_down():
+    engine = arch()
+    problem = build_states(engine, DOWN, ONES, "minmax")
+    plan = seqopt.solve(posed(engine, "minmax"))
+    claimed = plan.selection
+    judge_schedule(problem, claimed, plan.steps)
+    better = replace(claimed, objective=(0.9 * claimed.objective[0],), bound=(0.0,))
+    with pytest.raises(SolverError, match="as claimed"):
+        judge_schedule(problem, better, plan.steps)
+    short = plan.steps[:-1]
+    with pytest.raises(StepError, match="does not end there"):
+        check_free(engine.network, DOWN, short)
+    wrong = Step(2, StepKind.RELEASE, 4, (None,) * 3)
+    with pytest.raises(StepError, match="step 2"):
+        check_free(engine.network, DOWN, [plan.steps[0], wrong])
+
+
+def test_judge_finds_a_better_take_down():
+    """A plan that is worse than the best is not accepted as the least, whatever was visited."""
+    engine = arch()
+    problem = build_states(engine, DOWN, ONES, "minmax")
+    build = seqopt.solve(posed(engine, "steps", seqopt.FreeRules(ending="one-by-one")))
+    steps = _turned_round(engine.network.scene, build.steps)
+    worst, least = peak_of(engine, steps), seqopt.solve(posed(engine, "minmax")).selection
+    assert worst > least.objective[0] * (1 + 1e-6)
+    told = replace(least, objective=(worst,), bound=(worst,), visited=())
+    with pytest.raises(SolverError, match="a plan has less"):
+        judge_schedule(problem, told, steps)
+
+
+def test_searched_states_follow_by_the_book():
+    """Every move of the search is one of the rules in plain words."""
+    engine = small_wall()
+    states = build_states(engine, DOWN, ONES, "minmax")
+    found, book = explore(states), RuleBook(engine.network, states.rules)
+    graph, rows = found.graph()
+    space, numbers = (
+        states.space,
+        [None, *(n for b in engine.network.scene.placed for n in b.nodes)],
+    )
+    flat = [(space.bricks_at(level), row) for level, _, part in rows for row in part.tolist()]
+    seen = 0
+    for source, target in zip(
+        graph.source.tolist()[::50], graph.target.tolist()[::50], strict=True
+    ):
+        (b, row), (after, new) = flat[source], flat[target]
+        grips = tuple(numbers[n] for n in row)
+        wanted = (after, {numbers[n] for n in new})
+        assert wanted in [(to, {*held}) for _, to, held, _ in book.follow(b, grips, 0)]
+        seen += after < b
+    assert seen
+
+
+@pytest.mark.parametrize(
+    ("who", "match"),
+    [((0, 1), r"\(remove\): .* one robot alone holds brick 4"), ((0,), "brick 4 is not placed")],
+)
+def test_removal_is_by_who_alone_holds(who, match):
+    scene = arch().network.scene
+    newest, first = scene.placed[-1].nodes, scene.placed[0].nodes
+    free = [n for n in (*newest, *first) if n not in scene.blocked_nodes]
+    before = Step(1, StepKind.REPOSITION, 4, (free[0], free[-1], None))
+    check_sequence(scene, [Step(2, StepKind.REMOVE, 3, (None, free[-1], None))], before)
+    two = Step(1, StepKind.REPOSITION, 4, (newest[0], newest[1], None))
+    held = tuple(None if r in who else n for r, n in enumerate(two.grips))
+    with pytest.raises(StepError, match=match):
+        check_sequence(scene, [Step(2, StepKind.REMOVE, 3, held)], two)
+
+
+def test_plans_are_read_back_and_a_build_turned_round():
+    scene = seqopt.load_scene("arch25")
+    build = seqopt.sequential(seqopt.build_network(scene))
+    down = _turned_round(scene, build)
+    assert parse_plan(scene, plan_csv(scene, down), "down") == down
+    head, *rows = plan_csv(scene, build).splitlines()
+    assert parse_plan(scene, "\n".join([head, *rows[::-1]]), "turned") == down
+    passed = [(s.bricks, {*s.grips}) for s in build]
+    assert [(s.bricks, {*s.grips}) for s in down][-len(build) :][:-1] == passed[:-1][::-1]
+    table = seqopt.analyze(seqopt.make_engine("auto", scene), down)
+    assert table["bricks"].iloc[-1] == 0
+    assert not table[["F_max_N", "D_max_1e-3mm"]].iloc[-1].any()
+
+
+def test_robots_put_away_what_they_remove():
+    engine = arch()
+    plan = seqopt.solve(posed(engine, "steps"))
+    tasks = [*plan_tasks(engine.network.scene, plan.steps)]
+    kinds = [task.action for task in tasks if task.kind is StepKind.REMOVE]
+    assert kinds.count(Action.REMOVE) == kinds.count(Action.STORE) == 4
+    out = next(task for task in tasks if task.action is Action.REMOVE)
+    assert out.grip is not None
+    assert out.retreat is not None
+    assert [a.number for a, b in pairwise(plan.steps) if b.bricks > a.bricks] == []
+
+
+def test_what_a_take_down_has_not():
+    engine = arch()
+    with pytest.raises(ProblemError, match="orders of a take-down are searched for its worst"):
+        AllOrders(build_states(engine, DOWN, ONES, "steps"))
+    with pytest.raises(ProblemError, match="orders of a take-down from or to a part"):
+        AllOrders(build_states(engine, replace(DOWN, finish=Site(2)), ONES, "minmax"))
+    with pytest.raises(StepError, match="cannot end with 4; give fewer"):
+        replace(DOWN, finish=Site(4)).span(engine.network.scene)
+    with pytest.raises(StepError, match="did you mean take-down"):
+        seqopt.FreeRules(direction="takedown")
+    plan = seqopt.solve(posed(engine, "steps"))
+    with pytest.raises(StepError, match="a take-down: what was locked in"):
+        analyze_staged(engine.network, plan.steps)
