@@ -93,7 +93,7 @@ class Instance(FrozenValue, Shown):
         for name in ("source", "target"):
             rows = np.ascontiguousarray(getattr(self, name), dtype=np.int32)
             if len(rows) and not (rows.min() >= 0 and rows.max() < self.nodes):
-                raise ProblemError(f"instance {self.name}: an arc names a node that is none")
+                raise ProblemError(f"instance {self.name}: an arc names a node that does not exist")
             object.__setattr__(self, name, rows)
         codes = self.source.astype(np.int64) * self.nodes + self.target
         if (np.diff(codes) < 0).any():

@@ -210,7 +210,7 @@ def _peak(
 def _left(graph: Graph, column: int, inside: Ints) -> float:
     """Return the least amount of what leaves a cut; a `SolverError` says if it is none."""
     if len(inside) and not (inside.min() >= 0 and inside.max() < graph.states):
-        raise SolverError(f"cut: it names a node that is none of 0 to {graph.states - 1}")
+        raise SolverError(f"cut: it names a node outside 0 to {graph.states - 1}")
     within = np.zeros(graph.states, dtype=bool)
     within[inside] = True
     if not within[0] or graph.ends[within].any():

@@ -31,7 +31,7 @@ class Answer(NamedTuple):
 
 
 def as_answer(instance: Instance, solution: Any, bounds: Any) -> Answer:
-    """Return a solution with its bounds; a `ProblemError` names an entry that is none."""
+    """Return a solution with its bounds; a `ProblemError` names an entry that cannot be read."""
     found, where = _loaded(solution)
     if isinstance(found, Mapping):
         if unknown := {*found} - {*WHAT, "values", "bounds", "instance"}:
