@@ -57,11 +57,17 @@ def experiment(options: Options) -> Finding:
             print(*rows[-1].values(), flush=True)
             _keep(best, row)
     if not options.quick:
-        KNOWN.write_text(json.dumps(best, indent=1) + "\n", "utf-8")
+        KNOWN.write_text(_lines(best), "utf-8")
     table = pd.DataFrame(rows)
     library = pd.DataFrame([_listed(name, each) for name, each in best.items()])
     found = {"instance_contest": table, "instance_library": library}
     return on_this_run(holds=holds(table, library), **found)
+
+
+def _lines(best: dict[str, dict]) -> str:
+    """Return what is known as JSON, a line for every instance."""
+    rows = [f"{json.dumps(name)}: {json.dumps(best[name])}" for name in MADE if name in best]
+    return "{" + ",\n".join(rows) + "}\n"
 
 
 COLUMNS = ("instance", "solver", "value", "bound", "proven", "end", "seconds")
