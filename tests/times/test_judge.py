@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import seqopt
-from formulations.times._stages import in_time
+from formulations.times._in_time import in_time
 from seqopt.errors import SolverError
 from seqopt.graph._timed import LabelProof
 from seqopt.plan._status import Status
