@@ -30,6 +30,7 @@ EXAMPLES = (
     "seqopt instance arch25 --budget travel=0.8 --out arch25.mps",
     "seqopt instance chain:bricks=7 --schedule free --aim minmax,steps --out chain7",
 )
+SAID = ("--quiet", "--json")
 OUT = (
     "file to write: .npz (the instance), .mps, .lp or .pbtxt (a program, the last for CP-SAT); "
     "without an end a folder with all of them"
@@ -76,12 +77,12 @@ def run(options: argparse.Namespace) -> Answer:
 
 
 def _made_by(words: Sequence[str]) -> str:
-    """Return the command without where it writes, which says nothing of what is written."""
+    """Return the command without where it writes and what it prints."""
     kept = list[str]()
     left = iter(words)
     for word in left:
         if word == "--out":
             next(left, None)
-        elif not word.startswith("--out="):
+        elif word not in SAID and not word.startswith("--out="):
             kept.append(word)
     return shlex.join(["seqopt", *kept])

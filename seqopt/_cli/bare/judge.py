@@ -7,7 +7,7 @@ from math import isfinite
 from pathlib import Path
 
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.options import declare
+from seqopt._cli.options import declare, form_options
 from seqopt.errors import SolverError
 from seqopt.graph.instances._files import read_instance
 from seqopt.graph.instances.instance import Instance
@@ -27,8 +27,9 @@ EXAMPLES = (
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``judge``."""
-    command.add_argument("instance", metavar="INSTANCE", type=Path, help="file of seqopt instance")
-    command.add_argument(
+    takes = command.add_argument_group("what is judged")
+    takes.add_argument("instance", metavar="INSTANCE", type=Path, help="file of seqopt instance")
+    takes.add_argument(
         "solution",
         metavar="SOLUTION",
         type=Path,
@@ -39,7 +40,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--bound FILE": "JSON file with a bound for every goal and what proves it: potentials, a "
         "cut, prices, weights, shares, labels (default: the judge looks for a proof itself)"
     }
-    declare(command, about)
+    declare(takes, about)
+    form_options(command)
 
 
 def run(options: argparse.Namespace) -> Answer:
