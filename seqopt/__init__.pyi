@@ -3,11 +3,15 @@ from seqopt.contact.mortar import EPOXY as EPOXY
 from seqopt.engines.interface import Engine as Engine
 from seqopt.engines.registry import make_engine as make_engine
 from seqopt.errors import SeqoptError as SeqoptError
+from seqopt.graph.instances._files import read_instance as read_instance
+from seqopt.graph.instances._files import save_instance as save_instance
 from seqopt.network.build import build_network as build_network
 from seqopt.network.network import Network as Network
+from seqopt.plan._compiled import compile_instance as compile_instance
 from seqopt.plan.build import GivenSequence as GivenSequence
 from seqopt.plan.calling.formulation import Formulation as Formulation
 from seqopt.plan.calling.formulation import formulations as formulations
+from seqopt.plan.judge.bare._judging import judge_instance as judge_instance
 from seqopt.plan.judge.certificate import Certificate as Certificate
 from seqopt.plan.plan import Plan as Plan
 from seqopt.plan.solving import pose as pose

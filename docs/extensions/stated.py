@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from experiments.harness.results import markdown, stored, two
+from experiments.instances.parts.tables import instance_tables
 from seqopt.plan.calling.formulation import On, formulations
 
 UNNEEDED = "not needed without budgets"
@@ -91,6 +92,7 @@ def stated() -> dict[str, str]:
         | {"vault_loads_table": _vault_loads(stored("vault_loads"))}
         | {f"{name}_table": _on_graphs(stored(name)) for name in GRAPHS}
         | {"classical_table": _classical(stored("classical"))}
+        | instance_tables(stored("instance_library"), stored("instance_contest"))
     )
 
 

@@ -12,10 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from formulations.states._bare import path_of_instance
 from formulations.states._search import after_margins, best_order, best_total, chosen, watched
 from seqopt.arrays import Terse
 from seqopt.errors import ProblemError
 from seqopt.graph.graph import Graph
+from seqopt.graph.instances.instance import Instance
 from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
@@ -45,7 +47,7 @@ class _OnGraph(Terse):
 
     def __call__(
         self,
-        problem: States | AllOrders,
+        problem: States | AllOrders | Instance,
         *,
         seconds: float = np.inf,
         max_memory: float = np.inf,
@@ -57,6 +59,8 @@ class _OnGraph(Terse):
         Raises a `ProblemError` if there are budgets.
         """
         watch, told = Watch(seconds), resources.progress or progress
+        if isinstance(problem, Instance):
+            return self._of_instance(problem, watch)
         states = problem.states if isinstance(problem, AllOrders) else problem
         if states.budgets:
             able = "schedule_search or path_beam" if problem is states else "order_search"
@@ -67,6 +71,11 @@ class _OnGraph(Terse):
         if problem.totals:
             return best_total(problem, self.choose, watch, tell)
         return after_margins(problem, lambda rest: chosen(rest, self.choose, watch, tell), tell)
+
+    def _of_instance(self, instance: Instance, watch: Watch) -> StatePath:
+        if instance.caps:
+            raise ProblemError(f"formulation {self.name}: it takes no caps; take schedule_search")
+        return path_of_instance(instance, self.choose, watch)
 
 
 def on_graph(
@@ -82,4 +91,4 @@ def on_graph(
     of a first plan, by a narrow search.
     """
     solve = _OnGraph(name, choose)
-    return Formulation(name, summary, kind, None, solve, on=On.STATES, also=(On.ORDERS,))
+    return Formulation(name, summary, kind, None, solve, on=On.STATES, also=(On.ORDERS, On.GRAPHS))

@@ -41,6 +41,7 @@ from operator import itemgetter, le
 
 import numpy as np
 
+from formulations.states._bare import path_of_instance
 from formulations.states._search import (
     WIDTH,
     StopError,
@@ -56,7 +57,8 @@ from formulations.states._search import (
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph._budgets import is_beyond
 from seqopt.graph._explore import Explorer
-from seqopt.graph.paths import distances, tied
+from seqopt.graph.instances.instance import Instance
+from seqopt.graph.paths import distances, lexicographic, tied
 from seqopt.graph.states._visits import FreeStates, floors_of_goals
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
@@ -70,7 +72,7 @@ WIDER = 4  # how many times as wide that one is
 
 
 def solve(
-    problem: States,
+    problem: States | Instance,
     *,
     width: int = 50,
     growth: float = 1.1,
@@ -91,6 +93,8 @@ def solve(
             f"options width={width}, growth={growth:g}: give a whole number from 1 on, and a "
             "number above 1"
         )
+    if isinstance(problem, Instance):
+        return path_of_instance(problem, lambda g, _: (*lexicographic(g), False), Watch(seconds))
     tell = watched(problem, Watch(seconds), max_memory, progress)
     if problem.totals:
         return best_total(problem, shortest, Watch(seconds), tell)
@@ -224,5 +228,6 @@ FORMULATION = Formulation(
     None,
     solve,
     on=On.STATES,
+    also=(On.GRAPHS,),
     takes_budgets=True,
 )

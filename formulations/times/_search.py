@@ -17,10 +17,13 @@ from formulations.states._search import (
     watched,
 )
 from formulations.times._curing import Waits, require_cured
+from formulations.times._instances import of_instance
 from formulations.times._stages import ALMOST, Choose, StageFound, Stages
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
+from seqopt.graph._timed import timed_graph
+from seqopt.graph.instances.instance import Instance
 from seqopt.graph.paths import tied
 from seqopt.graph.states._visits import FreeStates
 from seqopt.graph.states.states import States
@@ -40,15 +43,17 @@ class _InTime(Terse):
 
     def __call__(
         self,
-        problem: States,
+        problem: States | Instance,
         *,
         seconds: float = np.inf,
         max_memory: float = np.inf,
         progress: Tell = lambda _: None,
     ) -> StatePath:
         """Return the plan of the chosen path; where time or memory ends early, the best so far."""
-        require_cured(problem, self.name, cures=self.cures)
         watch = Watch(seconds)
+        if isinstance(problem, Instance):
+            return of_instance(problem, self.choose, watch)
+        require_cured(problem, self.name, cures=self.cures)
         tell = watched(problem, watch, max_memory, progress)
         return after_margins(
             problem, lambda rest: _searched(rest, self.choose, watch, tell, progress), tell
@@ -70,7 +75,8 @@ def _searched(
             wide.refine()
             progress("makespan")
             visited = wide.graph()
-            stages = Stages(problem, visited, choose, watch, waits.cuts)
+            timed = timed_graph(problem, visited, waits.cuts)
+            stages = Stages(problem, visited, choose, watch, timed)
             found = stages.run()
             if _fell(problem, wide, visited, found.path):
                 continue
@@ -174,4 +180,5 @@ def in_time(
     ``cures``: whether it knows mortar that cures.
     """
     solve = _InTime(choose, name, cures)
-    return Formulation(name, summary, kind, None, solve, on=On.TIMES, takes_budgets=True)
+    also = (On.GRAPHS,)
+    return Formulation(name, summary, kind, None, solve, on=On.TIMES, also=also, takes_budgets=True)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -20,13 +20,11 @@ from formulations.times._prices import Prices, best_prices
 from seqopt.arrays import Bools
 from seqopt.errors import InfeasibleError
 from seqopt.graph._explore import Visited
-from seqopt.graph._timed import LabelProof, TimedGraph, timed_graph
+from seqopt.graph._timed import LabelProof, TimedGraph
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, keep_best, reached, tied
-from seqopt.graph.states.states import States
 from seqopt.plan.calling.formulation import Watch
-from seqopt.problem.problem import Measure
-from seqopt.stability._aging.cuts import FallCuts
+from seqopt.problem.problem import Goal, Measure
 
 BEAMS = (100, 1000, 5000)  # widths of the searches for a first path
 ALMOST = 1e-9  # over a value: a path must be better by more than this to be better
@@ -104,27 +102,37 @@ def beams(
     return best
 
 
+class _Goals(Protocol):
+    """What is asked: by goals, of which the last ones are capped."""
+
+    @property
+    def goals(self) -> tuple[Goal, ...]: ...
+
+    @property
+    def aims(self) -> tuple[Goal, ...]: ...
+
+    @property
+    def budgets(self) -> tuple[float, ...]: ...
+
+
 class Stages:
     """Goals of a problem one after the other, on a graph in time."""
 
     def __init__(
-        self,
-        problem: States,
-        visited: Visited,
-        choose: Choose,
-        watch: Watch,
-        cuts: FallCuts | None = None,
+        self, problem: _Goals, visited: Visited, choose: Choose, watch: Watch, timed: TimedGraph
     ) -> None:
         self._problem, self._choose, self._watch = problem, choose, watch
         self._visited = visited
-        self._timed = timed_graph(problem, visited, cuts)
+        self._timed = timed
         graph = self._timed.graph
         budgets = dict(enumerate(problem.budgets, start=len(problem.aims)))
         is_time = {k: problem.goals[k].measure is Measure.MAKESPAN for k in budgets}
         time = min((tied(cap) for k, cap in budgets.items() if is_time[k]), default=np.inf)
         sums = tuple((k, tied(cap)) for k, cap in budgets.items() if not is_time[k])
         kept = _on_paths(graph, np.ones(len(graph.source), dtype=bool))
-        self._stage = StageFound(kept, Caps(time, sums), filtered=not budgets and cuts is None)
+        self._stage = StageFound(
+            kept, Caps(time, sums), filtered=not budgets and timed.curing is None
+        )
 
     def run(self) -> StageFound:
         """Return what is found; raise an `InfeasibleError` if no path is within all caps."""

@@ -106,6 +106,8 @@ COMMANDS = {
         "make a scene of an assembly of COMPAS, a mesh or a table", "commands.importing"
     ),
     "export": _Command("write a plan in a format of others", "commands.exporting"),
+    "instance": _Command("write the graph of a problem, for any solver", "bare.instance"),
+    "judge": _Command("check a bare solution of an instance, and a bound", "bare.judge"),
     "completion": _Command("let the shell complete words of seqopt", "commands.completion"),
 }
 

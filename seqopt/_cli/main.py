@@ -54,6 +54,7 @@ def _run(words: Sequence[str]) -> int:
         return int(stop.code or 0)
     from seqopt._cli.watcher import Watcher  # noqa: PLC0415  # of which help needs nothing
 
+    options.words = (*words,)  # an instance says which ones made it
     with quiet_numbers(quiet=options.quiet), Watcher(shows=not options.quiet) as options.tell:
         answer: Answer = COMMANDS[options.command].load().run(options)
     return print_answer(answer, options)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
+from typing import Any
 
 from seqopt.arrays import Terse
 from seqopt.graph.orders import AllOrders, OrderSelection
@@ -25,6 +26,29 @@ class Status(StrEnum):
     CLAIMED = "claimed optimal"  # the formulation says so; less is proven
     FEASIBLE = "feasible"  # it ended early, is a heuristic, or its bound leaves something open
     UNPROVEN = "unproven"  # no proof was asked for
+
+
+def bare_summary(plan: Any) -> dict[str, object]:
+    """Return the summary of a plan of an instance, or of costs alone: a path without steps."""
+    proof = plan.certificate
+    known: dict[str, object] = getattr(plan.problem, "facts_of", dict)()
+    bounds = () if proof is None else proof.bounds
+    names = [name for name in plan.goals if name in plan.objective]
+    return {
+        "formulation": plan.formulation.name,
+        "kind": plan.formulation.kind.value,
+        **known,
+        "status": str(plan.status),
+        "ended": plan.ended.value,
+        "stopped": plan.stopped,
+        "objective": plan.objective,
+        "bound": {n: b if isfinite(b) else None for n, b in zip(names, bounds, strict=False)},
+        "gap": plan.gap,
+        "claimed_gap": None if proof is None or plan.gap is None else proof.claimed_gap,
+        "budgets": {} if proof is None else dict(proof.spent),
+        "nodes_of_path": [*plan.nodes],
+        "seconds": dict(plan.seconds),
+    }
 
 
 @dataclass(frozen=True, repr=False)

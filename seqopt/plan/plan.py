@@ -13,12 +13,13 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError
-from seqopt.graph.layers.interface import PlacementProblem
+from seqopt.graph.instances.instance import Instance
+from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.graph.states.states import States
-from seqopt.plan._status import ENDS, FoundOrder, KeptPostures, Status
+from seqopt.plan._status import ENDS, FoundOrder, KeptPostures, Status, bare_summary
 from seqopt.plan._tables import (
     Objectives,
     alternatives,
@@ -61,7 +62,7 @@ class Plan(ShownBuild):
     ----------
     problem : Problem or PlacementProblem
         What was asked; or the graph of choices, where that was given.
-    graph : Layers, ScenarioLayers, States or PlacementProblem
+    graph : Layers, ScenarioLayers, States, Instance or PlacementProblem
         What was chosen from.
     formulation : Formulation
         The formulation that solved it.
@@ -92,8 +93,8 @@ class Plan(ShownBuild):
     (<Status.OPTIMAL: 'optimal'>, 0)
     """
 
-    problem: Problem | PlacementProblem | States | AllOrders
-    graph: PlacementProblem | States
+    problem: Problem | PlacementProblem | States | AllOrders | Instance
+    graph: PlacementProblem | States | Instance
     formulation: Formulation
     selection: Selection | StatePath
     certificate: Certificate | None
@@ -106,7 +107,8 @@ class Plan(ShownBuild):
 
     def __repr__(self) -> str:
         what = f"{self.scene_name!r}, {self.method!r}, " if self.steps else ""
-        return f"Plan({what}by {self.formulation.name}: {len(self.steps)} steps, {self.result})"
+        count = f"{len(self.steps)} steps" if self.steps else f"{len(self.nodes)} nodes"
+        return f"Plan({what}by {self.formulation.name}: {count}, {self.result})"
 
     @property
     def layers(self) -> Layers:
@@ -163,6 +165,8 @@ class Plan(ShownBuild):
         """The names of what was made small, the most important first, then of what has budgets."""
         if isinstance(self.graph, States):
             return self.graph.names
+        if isinstance(self.problem, Instance):
+            return tuple(goal.name for goal in self.problem.goals)
         if isinstance(self.graph, ScenarioLayers):
             return (str(self.graph.aim),)
         return ("minmax" if self.formulation.aim is Aim.PEAK else "sum",)
@@ -237,13 +241,14 @@ class Plan(ShownBuild):
     @property
     def result(self) -> str:
         """The value of the plan, and what is proven about it, in words."""
-        if isinstance(self.graph, States):
+        if isinstance(self.graph, States | Instance):
             values = ", ".join(
                 f"{name} {value_text(name, v)}" for name, v in self.objective.items()
             )
             left = 0.0 if self.certificate is None else self.certificate.gap
             within = f" within {left:.2g}" if TOLERANCE < left < inf else ""
-            among = f" among candidates {self.among}" if self.among else ""
+            among = getattr(self.graph, "among", "")
+            among = f" among candidates {among}" if among else ""
             return f"{values}, {self.status}{within}{among}"
         if self.certificate is None:
             return "not compared with the optimum"
@@ -260,9 +265,11 @@ class Plan(ShownBuild):
 
     @property
     def nodes(self) -> tuple[int, ...]:
-        """The node chosen for every move."""
+        """The node chosen for every move, or the nodes of a path through an instance."""
+        if isinstance(self.selection, StatePath) and isinstance(self.graph, Instance):
+            return tuple(state[0] for state in self.selection.states)
         choice = self.choice
-        assert not isinstance(self.graph, States)  # it has no choice
+        assert not isinstance(self.graph, States | Instance)  # they have no choice
         return self.graph.nodes(choice)
 
     @property
@@ -387,7 +394,8 @@ class Plan(ShownBuild):
         ``order_bound`` (on the first aim, of any order), ``order_bound_proven``,
         ``order_evaluated`` and ``order_stopped``; the ``engine`` and ``versions``.
         """
-        return _summarized(self)
+        bare = isinstance(self.graph, CostProblem | Instance)
+        return bare_summary(self) if bare else _summarized(self)
 
 
 def _summarized(plan: Plan) -> dict[str, object]:
@@ -478,6 +486,7 @@ def _spent(plan: Plan) -> dict[str, dict[str, float | None]]:
             name: {"bound": cap, "spent": plan.objective[name], "price": None}
             for name, cap in capped
         }
+    assert not isinstance(plan.graph, Instance)  # of which there is another summary
     for budget in plan.graph.budgets:
         bound = budget.bound if isfinite(budget.bound) else None
         price = chosen.prices.get(budget.name) if isinstance(chosen, Selection) else None

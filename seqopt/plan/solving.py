@@ -10,11 +10,13 @@ from typing import Any
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError
+from seqopt.graph.instances.instance import Instance
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.scenarios import ScenarioLayers, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
+from seqopt.plan._instances import solve_instance
 from seqopt.plan._kept import with_postures
 from seqopt.plan._layers import solve_layers, with_budgets
 from seqopt.plan._states import solve_orders, solve_states
@@ -282,7 +284,7 @@ SOLVE: dict[On, Callable[[Any, Formulation, Run], Plan]] = {
 
 
 def solve(
-    problem: Problem | PlacementProblem | States | AllOrders,
+    problem: Problem | PlacementProblem | States | AllOrders | Instance,
     formulation: Formulation | str | None = None,
     *,
     proof: bool = True,
@@ -295,8 +297,9 @@ def solve(
 
     Parameters
     ----------
-    problem : Problem or PlacementProblem
-        From `seqopt.pose`; or a graph of choices, as a `seqopt.graph.layers.interface.CostProblem`.
+    problem : Problem, Instance or PlacementProblem
+        From `seqopt.pose` or `seqopt.read_instance`; or a graph of choices, as a
+        `seqopt.graph.layers.interface.CostProblem`.
     formulation : Formulation or str, optional
         Or a name in `seqopt.formulations`; by default the fastest exact one that there is for it.
     proof : bool, optional
@@ -332,6 +335,8 @@ def solve(
 
 def _solved(problem: Any, formulation: Formulation | str | None, run: Run) -> Plan:
     """Return the plan of a problem, or of a graph of choices that is given."""
+    if isinstance(problem, Instance):
+        return solve_instance(problem, formulation, run)
     if not isinstance(problem, Problem):
         found = _of_graph(problem, formulation)
         on = On.ORDERS if isinstance(problem, AllOrders) else found.on

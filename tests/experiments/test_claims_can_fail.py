@@ -25,6 +25,7 @@ from experiments.engines import (
 from experiments.exchange import four_arms, outside_assemblies
 from experiments.harness.claim import claims
 from experiments.harness.results import stored
+from experiments.instances import instance_contest
 from experiments.peers import peers
 from experiments.placement import (
     composing,
@@ -147,6 +148,11 @@ CHECKS = {
         lambda table: soft_grips.holds(table, 1.0),
         ("soft_grips",),
         *("D_max", 200.0, {"build": "cantilever", "stiffness": 1e6}),
+    ),
+    "instance_contest": Check(
+        instance_contest.holds,
+        ("instance_contest", "instance_library"),
+        *("value", 50.0, {"instance": "chain-12", "solver": "overlap_dp"}),
     ),
     "makespan": Check(
         makespan.holds,

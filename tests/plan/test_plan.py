@@ -109,7 +109,8 @@ def test_a_plan_of_costs_alone_has_a_choice_and_no_steps():
     assert plan.nodes == plan.selection.choice == (1,)
     assert plan.steps == ()
     assert plan.certificate.gap == 0.0
-    for ask in (plan.table, plan.responses, plan.alternatives, plan.summary):
+    assert plan.summary()["objective"] == {"sum": 1.0}
+    for ask in (plan.table, plan.responses, plan.alternatives):
         with pytest.raises(ProblemError, match="chosen from costs alone"):
             ask()
     with pytest.raises(ProblemError, match="ask for the proof"):

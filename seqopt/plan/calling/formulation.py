@@ -160,6 +160,7 @@ class On(Enum):
     ORDERS = "the states of all orders"
     TIMES = "the states of a build in time"
     FRONTS = "Pareto sets"
+    GRAPHS = "instances"
 
 
 class FormulationKind(Enum):

@@ -303,7 +303,7 @@ class Closed:
         sums = values[:, 1 + columns : 1 + columns + self._amounts.shape[1]]
         bounds = np.column_stack([ends, sums + self._sums[state]])
         most = np.array([self._limits.time, *self._limits.sums])
-        slack = 1e-12 * np.abs(most)
+        slack = np.where(np.isfinite(most), 1e-12 * np.abs(most), 0.0)
         beyond = np.where(self._limits.strict, bounds >= most - slack, bounds > most)
         return np.asarray(~beyond.any(axis=1))
 

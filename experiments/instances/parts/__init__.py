@@ -1,0 +1,1 @@
+"""What the claims about instances rest on: how they are made, and runs. None is run on its own."""

@@ -1,0 +1,129 @@
+"""The library of instances: the command that makes each, and what is known of it.
+
+Command: ``python -m experiments.instances.parts.library [NAME ...]`` makes all of them anew, or
+those that are named, and says which files change. Large ones are made only where they are named:
+their files are not stored, their checksums are (`LARGE`).
+"""
+
+import hashlib
+import json
+import shlex
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from seqopt import read_instance
+from seqopt._cli.main import main
+from seqopt.graph.instances.instance import Instance
+
+HOME = Path(__file__).resolve().parent.parent / "library"
+KNOWN = HOME.parent / "known.json"  # best known paths, values and bounds, and who found them
+FREE = "--schedule free"
+TIMES = "--durations fetch=30,place=10,approach=10,grip=5,release=5"
+SLOWER = f"{TIMES} --durations rob3:fetch=75,approach=25"
+SLOWEST = f"{TIMES} --durations rob4:fetch=75,approach=25"
+CHAIN = "chain:bricks="
+MADE = {
+    # open grips of a fixed schedule: a level for every move
+    "chain-8": f"{CHAIN}8",
+    "chain-12": f"{CHAIN}12",
+    "chain-17": f"{CHAIN}17",
+    "chain-25": "arch25",
+    "chain-40": f"{CHAIN}40",
+    "chain-12-peak": f"{CHAIN}12 --formulation minimax --criteria worst-ratio",
+    "chain-25-peak": "arch25 --formulation minimax --criteria worst-ratio",
+    "chain-40-peak": f"{CHAIN}40 --formulation minimax --criteria worst-ratio",
+    "chain-25-weighted": "arch25 --criteria weighted",
+    "pair-25": "arch25 --schedule two-robot",
+    "pair-25-peak": "arch25 --schedule two-robot --formulation minimax --criteria worst-ratio",
+    # the same within budgets
+    "chain-12-way": f"{CHAIN}12 --budget travel=0.8",
+    "chain-17-way": f"{CHAIN}17 --budget travel=0.7",
+    "chain-25-way-80": "arch25 --budget travel=0.8",
+    "chain-25-way-50": "arch25 --budget travel=0.5",
+    "chain-25-two": "arch25 --budget travel=0.8 --budget steps_over:M_sup=20:30",
+    "chain-25-weighted-way": "arch25 --criteria weighted --budget travel=0.5",
+    "chain-40-way": f"{CHAIN}40 --budget travel=0.6",
+    # over scenarios
+    "chain-12-cvar": f"{CHAIN}12 --criteria weighted --robust cvar=0.75 --scenarios 8",
+    "chain-12-total": f"{CHAIN}12 --criteria weighted --robust worst-total --scenarios 8",
+    "chain-25-robust": "arch25 --criteria worst-ratio --robust worst-peak --scenarios 8",
+    "free-7-robust": f"{CHAIN}7 {FREE} --aim minmax,steps --robust worst-peak --scenarios 4",
+    "free-7-total": f"{CHAIN}7 {FREE} --aim sum --robust worst-total --scenarios 4",
+    # free schedules: who releases, holds or places next
+    "free-7": f"{CHAIN}7 {FREE} --aim minmax,steps",
+    "free-7-way": f"{CHAIN}7 {FREE} --aim minmax,travel",
+    "free-7-sum": f"{CHAIN}7 {FREE} --aim sum(T_max)",
+    "free-7-sum-regrips": f"{CHAIN}7 {FREE} --aim sum(T_max),steps --budget regrips=1",
+    "free-7-four": f"{CHAIN}7 {FREE} --robots 4 --aim minmax,steps",
+    "free-7-five": f"{CHAIN}7 {FREE} --robots 5 --aim minmax,steps",
+    "free-9-sum": f"{CHAIN}9 {FREE} --aim sum(M_sup),steps",
+    "free-9-sum-way": f"{CHAIN}9 {FREE} --aim sum(T_max) --budget travel=2.5m --budget regrips=4",
+    "free-12": f"{CHAIN}12 {FREE} --aim minmax,steps",
+    "free-12-regrips": f"{CHAIN}12 {FREE} --aim sum(F_largest) --budget regrips=3",
+    "wall-6": f"wall:columns=3,courses=2 {FREE} --aim minmax,steps",
+    "wall-12": f"wall:columns=4,courses=3 {FREE} --aim minmax,steps",
+    # orders of the bricks
+    "order-7": f"{CHAIN}7 {FREE} --order search --aim minmax,steps",
+    "order-7-sum": f"{CHAIN}7 {FREE} --order search --aim sum(T_max)",
+    "order-wall-6": f"wall:columns=3,courses=2 {FREE} --order search --aim minmax,steps",
+    # how long a build takes
+    "time-7": f"{CHAIN}7 {FREE} --aim makespan {TIMES}",
+    "time-7-unequal": f"{CHAIN}7 {FREE} --aim makespan {SLOWER}",
+    "time-7-peak": f"{CHAIN}7 {FREE} --aim minmax,makespan,regrips {SLOWER}",
+    "time-7-four": f"{CHAIN}7 {FREE} --robots 4 --aim makespan {SLOWEST}",
+    "time-8-regrips": f"{CHAIN}8 {FREE} --aim makespan --budget regrips=1 {SLOWER}",
+    "time-9-unequal": f"{CHAIN}9 {FREE} --aim minmax,makespan {SLOWER}",
+    "time-9-travel": f"{CHAIN}9 {FREE} --aim makespan,regrips {TIMES},speed=0.05",
+    # states that must stand
+    "stand-7": f"{CHAIN}7 {FREE} --stands bond=1e5 --aim minmax,steps",
+    "stand-wall-6": f"wall:columns=3,courses=2 {FREE} --stands dry --aim minmax,steps",
+}
+LARGE = {
+    "free-25": f"arch25 {FREE} --aim minmax,steps",
+    "free-25-way": f"arch25 {FREE} --aim minmax,travel --below 1.2",
+    "free-25-sum": f"arch25 {FREE} --aim sum(T_max) --budget regrips=6",
+    "time-11-unequal": f"{CHAIN}11 {FREE} --robots 4 --aim minmax,makespan --below 1.5 {SLOWEST}",
+}
+
+
+def command(name: str) -> str:
+    """Return the command that makes an instance."""
+    return f"seqopt instance {(MADE | LARGE)[name]} --out {name}.npz"
+
+
+def made(name: str, folder: Path) -> bytes:
+    """Return the file of an instance, made anew in a folder by its command."""
+    path = folder / f"{name}.npz"
+    words = shlex.split((MADE | LARGE)[name])
+    status = main(["instance", *words, "--quiet", "--out", str(path)])
+    if status:
+        raise RuntimeError(f"{name}: seqopt ends with status {status}")
+    return path.read_bytes()
+
+
+def instance(name: str) -> Instance:
+    """Return a stored instance."""
+    return read_instance(HOME / f"{name}.npz")
+
+
+def known() -> dict[str, dict]:
+    """Return what is known of instances, by name."""
+    return json.loads(KNOWN.read_text("utf-8")) if KNOWN.exists() else {}
+
+
+def run(names: list[str]) -> None:
+    HOME.mkdir(exist_ok=True)
+    for name in names or MADE:
+        with TemporaryDirectory() as folder:
+            content = made(name, Path(folder))
+        path = HOME / f"{name}.npz"
+        checksum = hashlib.sha256(content).hexdigest()
+        same = path.exists() and path.read_bytes() == content
+        print(f"{name}: {len(content)} bytes, {'as it was' if same else 'new'}, sha256 {checksum}")
+        if name in MADE or name in names:
+            path.write_bytes(content)
+
+
+if __name__ == "__main__":
+    run(sys.argv[1:])

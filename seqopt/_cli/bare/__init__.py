@@ -1,0 +1,1 @@
+"""Commands of whoever never sees a scene: instances, and the judge of their solutions."""

@@ -1,0 +1,88 @@
+"""The command ``judge``: check a bare solution of an instance, and a bound."""
+
+from __future__ import annotations
+
+import argparse
+from math import isfinite
+from pathlib import Path
+
+from seqopt._cli.answer import Answer, Status
+from seqopt._cli.options import declare, form_options
+from seqopt.errors import SolverError
+from seqopt.graph.instances._files import read_instance
+from seqopt.graph.instances.instance import Instance
+from seqopt.plan.judge.bare._judging import judge_instance
+from seqopt.plan.judge.certificate import TOLERANCE, Certificate
+
+DESCRIPTION = (
+    "Check a path through an instance, and bounds on all others, with arithmetic alone. No scene "
+    "is needed. What is claimed without proof is called claimed. The exit status is 1 if "
+    "something does not hold."
+)
+EXAMPLES = (
+    "seqopt judge arch25.npz mine.txt",
+    "seqopt judge arch25.npz mine.json --bound potentials.json",
+)
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``judge``."""
+    takes = command.add_argument_group("what is judged")
+    takes.add_argument("instance", metavar="INSTANCE", type=Path, help="file of seqopt instance")
+    takes.add_argument(
+        "solution",
+        metavar="SOLUTION",
+        type=Path,
+        help="file with the nodes of a path, or after the word arcs its arcs, after acts its acts: "
+        "text, CSV or JSON",
+    )
+    about = {
+        "--bound FILE": "JSON file with a bound for every goal and what proves it: potentials, a "
+        "cut, prices, weights, shares, labels (default: the judge looks for a proof itself)"
+    }
+    declare(takes, about)
+    form_options(command)
+
+
+def run(options: argparse.Namespace) -> Answer:
+    """Check a solution, and say what is proven of it."""
+    instance = read_instance(options.instance)
+    bounds = () if options.bound is None else Path(options.bound)
+    try:
+        proof = judge_instance(instance, options.solution, bounds)
+    except SolverError as error:
+        facts = {**instance.facts_of(), "holds": False, "why": str(error)}
+        failed = f"seqopt: {options.solution}: {error}"
+        return Answer(
+            facts=facts, text="it does not hold", failures=(failed,), status=Status.DOES_NOT_HOLD
+        )
+    names = [goal.name for goal in instance.goals]
+    facts = {
+        **instance.facts_of(),
+        "holds": True,
+        "values": dict(zip(names, proof.values, strict=True)),
+        "bounds": dict(zip(names, proof.bounds, strict=True)),
+        "gap": proof.gap,
+        "claimed_gap": proof.claimed_gap,
+        "spent": dict(proof.spent),
+    }
+    return Answer(facts=facts, text="\n".join(_said(instance, proof)))
+
+
+def _said(instance: Instance, proof: Certificate) -> list[str]:
+    """Return what is proven, goal by goal."""
+    lines = [f"{instance.name}: the path leads from node 0 to an end"]
+    lines[0] += " within all caps" if instance.caps else ""
+    caps = {cap.name: cap.most for cap in instance.caps}
+    lines += [f"  {name}: {v:.9g} of {caps[name]:.9g}" for name, v in proof.spent.items()]
+    for goal, value, bound in zip(instance.goals, proof.values, proof.bounds, strict=True):
+        left = (value - bound) / (abs(value) or 1.0)
+        what = "no path takes less" if left <= TOLERANCE else f"gap {100 * left:.3g} %"
+        if not isfinite(bound):
+            said = "nothing is proven"
+        else:
+            said = f"proven: {what}" if left <= TOLERANCE else f"proven {bound:.9g}, {what}"
+        lines.append(f"  {goal.name}: {value:.9g}; {said}")
+    if proof.claimed_gap < proof.gap - TOLERANCE:
+        lines.append(f"  claimed without proof: gap {100 * proof.claimed_gap:.3g} %")
+    return lines

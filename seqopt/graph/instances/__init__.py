@@ -1,0 +1,1 @@
+"""Compiled graphs that stand alone: read without a scene, written for any solver."""

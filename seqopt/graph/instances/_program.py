@@ -1,0 +1,261 @@
+r"""An instance as one mixed-integer program, for whatever solver: what its files write down.
+
+With :math:`x_a \in \{0, 1\}` for every arc (of times: for every act), one unit flows from node 0 to
+an end. A sum is :math:`\sum c_a x_a`. A peak is :math:`t` with :math:`t \ge \sum c_a x_a` over the
+arcs of every level where all paths have one arc on each, else over the arcs to every node. A tail
+is :math:`\eta + m \sum_s u_s` with :math:`u_s \ge \sum_a c_{s a} x_a - \eta`, where :math:`m` is
+the largest weight. Of times, :math:`T_v` is when the act that leads to a node ends, and
+:math:`\rho_{v r}` since when robot :math:`r` is free there; what an act demands of these is said
+where it is taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.graph._timed import HELD, NOW, TimedGraph
+from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _Target
+from seqopt.graph.paths import distances
+
+NEVER = -1  # of a row: it holds whatever is taken
+
+
+class Program(NamedTuple):
+    """Minimize ``cost @ x`` with rows between limits, some only where a 0-1 variable is 1.
+
+    ``names`` (v), ``cost`` (v,), ``upper`` (v,), from 0; ``whole`` (v,) bool; ``matrix`` (r, v),
+    ``low``, ``high`` (r,); ``where`` (r,): the variable that switches a row on, or `NEVER`;
+    ``slack`` (r,): by how much it may be off where it is not; ``later`` (k, v): further goals;
+    ``rows`` (r): names.
+    """
+
+    names: list[str]
+    cost: Floats
+    upper: Floats
+    whole: Bools
+    matrix: sparse.csr_array
+    low: Floats
+    high: Floats
+    where: Ints
+    slack: Floats
+    later: sparse.csr_array
+    rows: list[str]
+
+
+@dataclass
+class _Draft:
+    """Rows as they are written."""
+
+    count: int
+    at: list[tuple[Ints, Ints, Floats]] = field(default_factory=list)
+    low: list[Floats] = field(default_factory=list)
+    high: list[Floats] = field(default_factory=list)
+    where: list[Ints] = field(default_factory=list)
+    slack: list[Floats] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+    total: int = 0
+
+    def add(
+        self,
+        name: str,
+        parts: tuple[Ints, Ints, Floats],
+        limits: tuple[Floats, Floats],
+        switch: tuple[Ints, float] | None = None,
+    ) -> None:
+        """Add rows: places of entries, their limits, and what switches them on."""
+        count = len(limits[0])
+        rows, columns, values = parts
+        self.at.append((rows + self.total, columns, values))
+        self.low.append(limits[0])
+        self.high.append(limits[1])
+        where, slack = (np.full(count, NEVER), 0.0) if switch is None else switch
+        self.where.append(where)
+        self.slack.append(np.full(count, slack))
+        self.names += [name] if count == 1 else [f"{name}_{k}" for k in range(count)]
+        self.total += count
+
+
+def program(instance: Instance) -> Program:
+    """Return the program of the first goal; further goals are rows that nothing limits."""
+    timed = instance.timed if instance.asks_time else None
+    arc = np.arange(instance.arcs) if timed is None else timed.move
+    letter, count = ("x" if timed is None else "y"), len(arc)
+    names = [f"{letter}{k}" for k in range(count)]
+    more = _more(instance, timed)
+    names += more.names
+    draft = _Draft(count)
+    _flow(draft, instance, arc)
+    goals = [_goal(draft, instance, goal, arc, more) for goal in instance.goals]
+    _caps(draft, instance, arc, more)
+    if timed is not None:
+        _times(draft, instance, timed, more)
+    total = len(names)
+    every = (np.concatenate(each) for each in zip(*draft.at, strict=True))
+    rows, columns, values = every
+    matrix = sparse.csr_array((values, (rows, columns)), shape=(draft.total, total))
+    matrix.sum_duplicates()
+    costs = sparse.csr_array(np.array([np.pad(g, (0, total - len(g))) for g in goals]))
+    whole = np.arange(total) < count
+    upper = np.where(whole, 1.0, more.most)
+    limits = np.concatenate(draft.low), np.concatenate(draft.high)
+    switches = np.concatenate(draft.where), np.concatenate(draft.slack)
+    cost = costs[[0]].toarray()[0]
+    return Program(names, cost, upper, whole, matrix, *limits, *switches, costs[1:], draft.names)
+
+
+class _More(NamedTuple):
+    """Variables beside arcs: where they begin, by what they are for."""
+
+    names: list[str]
+    at: dict[str, int]
+    most: float
+
+
+def _more(instance: Instance, timed: TimedGraph | None) -> _More:
+    first = instance.arcs if timed is None else len(timed.move)
+    names, at = list[str](), dict[str, int]()
+    for k, goal in enumerate(instance.goals):
+        if goal.kind == PEAK:
+            at[f"peak {k}"] = first + len(names)
+            names.append(f"t{k}")
+        elif goal.kind == TAIL:
+            at[f"tail {k}"] = first + len(names)
+            names += [f"eta{k}", *(f"u{k}_{s}" for s in range(len(goal.columns)))]
+    if timed is None:
+        return _More(names, at, np.inf)
+    at["end"] = first + len(names)
+    names.append("makespan")  # what LP files call end is their own
+    at["node"] = first + len(names)
+    names += [f"T{v}" for v in range(instance.nodes)]
+    at["since"] = first + len(names)
+    names += [f"r{v}_{c}" for v in range(instance.nodes) for c in range(len(timed.kinds))]
+    return _More(names, at, horizon(timed))
+
+
+def horizon(timed: TimedGraph) -> float:
+    """Return a time by which some build has ended, s: one of least time, all in a row."""
+    graph = timed.graph
+    longest = timed.prepares + timed.acts
+    return float(distances(graph, longest)[graph.ends].min())
+
+
+def _flow(draft: _Draft, instance: Instance, arc: Ints) -> None:
+    """Say that one unit leaves node 0, leaves all nodes but ends, and comes to an end."""
+    source, target = instance.source[arc], instance.target[arc]
+    column, ones = np.arange(len(arc)), np.ones(len(arc))
+    inner = ~instance.ends
+    number = np.cumsum(inner) - 1
+    leaves, comes = inner[source], inner[target]
+    rows = np.concatenate([number[source[leaves]], number[target[comes]]])
+    columns = np.concatenate([column[leaves], column[comes]])
+    values = np.concatenate([ones[leaves], -ones[comes]])
+    right = np.zeros(int(inner.sum()))
+    right[0] = 1.0
+    draft.add("flow", (rows, columns, values), (right, right))
+    last = np.flatnonzero(instance.ends[target])
+    went = np.flatnonzero(instance.ends[source])
+    parts = np.concatenate([last, went])
+    signs = np.concatenate([np.ones(len(last)), -np.ones(len(went))])
+    draft.add("ends", (np.zeros(len(parts), dtype=int), parts, signs), (np.ones(1), np.ones(1)))
+
+
+def _goal(draft: _Draft, instance: Instance, goal: _Target, arc: Ints, more: _More) -> Floats:
+    """Write down what a goal needs, and return its costs of variables."""
+    k = instance.goals.index(goal)
+    if goal.kind == SUM:
+        return np.asarray(instance.amounts[arc, goal.columns[0]])
+    out = np.zeros(draft.count + len(more.names))
+    if goal.kind == TIME:
+        out[more.at["end"]] = 1.0
+    elif goal.kind == PEAK:
+        out[more.at[f"peak {k}"]] = 1.0
+        _peak(draft, instance, goal, arc, more.at[f"peak {k}"])
+    else:
+        first, count = more.at[f"tail {k}"], len(goal.columns)
+        out[first], out[first + 1 : first + 1 + count] = 1.0, goal.most
+        _tail(draft, instance.amounts[np.ix_(arc, np.array(goal.columns))], first)
+    return out
+
+
+def _peak(draft: _Draft, instance: Instance, goal: _Target, arc: Ints, variable: int) -> None:
+    """Say that the peak is no less than what is taken on a level, or to a node."""
+    to = instance.target[arc]
+    groups = instance.levels[to] if instance.is_layered else to
+    own, rows = np.unique(groups, return_inverse=True)
+    count = len(own)
+    at = np.concatenate([rows, np.arange(count)])
+    columns = np.concatenate([np.arange(len(arc)), np.full(count, variable)])
+    values = np.concatenate([-instance.amounts[arc, goal.columns[0]], np.ones(count)])
+    draft.add("peak", (at, columns, values), (np.zeros(count), np.full(count, np.inf)))
+
+
+def _tail(draft: _Draft, amounts: Floats, first: int) -> None:
+    """Say what every total is above the threshold."""
+    for s, own in enumerate(amounts.T):
+        columns = np.concatenate([np.arange(len(own)), [first, first + 1 + s]])
+        values = np.concatenate([-own, [1.0, 1.0]])
+        parts = np.zeros(len(values), dtype=int), columns, values
+        draft.add(f"total_{s}", parts, (np.zeros(1), np.full(1, np.inf)))
+
+
+def _caps(draft: _Draft, instance: Instance, arc: Ints, more: _More) -> None:
+    for k, cap in enumerate(instance.caps):
+        limits = np.full(1, -np.inf), np.full(1, cap.most)
+        if cap.column is None:
+            parts = np.zeros(1, dtype=int), np.array([more.at["end"]]), np.ones(1)
+        else:
+            own = instance.amounts[arc, cap.column]
+            parts = np.zeros(len(arc), dtype=int), np.arange(len(arc)), own
+        draft.add(f"cap_{k}", parts, limits)
+
+
+def _times(draft: _Draft, instance: Instance, timed: TimedGraph, more: _More) -> None:
+    """Say when acts end, since when robots are free, and that nobody does two at once."""
+    move, column, big = timed.move, timed.column, more.most
+    node, since, robots = more.at["node"], more.at["since"], len(timed.kinds)
+    before, after = instance.source[move].astype(int), instance.target[move].astype(int)
+    every = np.arange(len(move))
+    acts, prepares = timed.acts[move], timed.prepares[move]
+    _after(draft, "act", (node + after, node + before), acts, (every, big))
+    own = column >= 0
+    free = since + robots * before + column
+    _after(
+        draft, "own", ((node + after)[own], free[own]), (acts + prepares)[own], (every[own], big)
+    )
+    for c in range(robots):
+        origin = timed.origin[:, c]
+        rows = np.flatnonzero(origin != HELD)
+        from_node = origin[rows] == NOW
+        was = np.where(from_node, node + after[rows], since + robots * before[rows] + origin[rows])
+        is_ = since + robots * after[rows] + c
+        _after(draft, f"ready{c}", (is_, was), np.zeros(len(rows)), (rows, big))
+    ends = np.flatnonzero(instance.ends)
+    none = np.full(len(ends), NEVER)
+    last = np.full(len(ends), more.at["end"])
+    _after(draft, "last", (last, node + ends), np.zeros(len(ends)), (none, 0.0))
+    for k, size in enumerate(timed.sizes.tolist()):
+        parts = np.append(every, more.at["end"])
+        values = np.append(-timed.work[move, k], float(size))
+        at = np.zeros(len(parts), dtype=int), parts, values
+        draft.add(f"share_{k}", at, (np.zeros(1), np.full(1, np.inf)))
+
+
+def _after(
+    draft: _Draft,
+    name: str,
+    variables: tuple[Ints, Ints],
+    least: Floats,
+    switch: tuple[Ints, float],
+) -> None:
+    """Say that one variable is no less than another and some more, row by row."""
+    first, second = variables
+    count = len(first)
+    rows = np.tile(np.arange(count), 2)
+    values = np.concatenate([np.ones(count), -np.ones(count)])
+    parts = rows, np.concatenate([first, second]), values
+    draft.add(name, parts, (least, np.full(count, np.inf)), switch)

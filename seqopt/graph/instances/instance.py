@@ -1,0 +1,177 @@
+"""An instance: the compiled graph of a problem, with all that is asked of paths through it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from seqopt._showing import Shown
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.errors import ProblemError
+from seqopt.graph._timed import TimedGraph
+from seqopt.graph.graph import Graph, Rows
+
+SUM, PEAK, TAIL, TIME = "sum", "peak", "tail", "time"
+KINDS = (SUM, PEAK, TAIL, TIME)
+
+
+class _Target(NamedTuple):
+    """What is to be made small of a path.
+
+    ``kind``: ``sum`` or ``peak`` of one column, ``tail``: the mean of the largest sums of several
+    columns, no one of which weighs more than ``most``, or ``time``: when the last act ends.
+    """
+
+    name: str
+    kind: str
+    columns: tuple[int, ...] = ()
+    most: float = 1.0
+
+
+class _Cap(NamedTuple):
+    """What the sum of a column may be at most; of no column, when the last act may end."""
+
+    name: str
+    column: int | None
+    most: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Instance(FrozenValue, Shown):
+    """A graph, what its arcs take, and which path through it is sought; no scene is needed.
+
+    A path leads from node 0 to one of the ends. Goals are made small one after the other: of the
+    paths that are best in the first, the best in the second, and so on.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    source, target : (m,) int
+        The nodes that every arc leads from and to; arcs are sorted by these.
+    ends : (n,) bool
+        At which nodes a path may end.
+    columns : tuple of str
+        What arcs take, by name.
+    amounts : (m, c) float
+        How much they take, a column for every name.
+    goals, caps : tuple
+        What is to be made small, and which sums are capped.
+    states : (n, s) int
+        What nodes stand for; the first column is the level: no arc leads to a lower one.
+    timed : TimedGraph or None
+        Who may act on every arc and for how long, where times are asked.
+    facts : mapping
+        Where it comes from: the command that made it, and the version.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> seqopt.compile_instance(seqopt.optimize("arch25").problem)
+    <Instance 'arch25': 531 nodes, 9630 arcs, least sum>
+    """
+
+    name: str
+    source: Rows
+    target: Rows
+    ends: Bools
+    columns: tuple[str, ...]
+    amounts: Floats
+    goals: tuple[_Target, ...]
+    caps: tuple[_Cap, ...] = ()
+    states: Ints = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
+    timed: TimedGraph | None = field(default=None, compare=False)
+    facts: Mapping[str, Any] = field(default_factory=dict, compare=False)
+
+    def __post_init__(self) -> None:
+        if not self.goals:
+            raise ProblemError(f"instance {self.name}: nothing is to be made small; name a goal")
+        for name in ("source", "target"):
+            rows = np.ascontiguousarray(getattr(self, name), dtype=np.int32)
+            if len(rows) and not (rows.min() >= 0 and rows.max() < self.nodes):
+                raise ProblemError(f"instance {self.name}: an arc names a node that does not exist")
+            object.__setattr__(self, name, rows)
+        codes = self.source.astype(np.int64) * self.nodes + self.target
+        if (np.diff(codes) < 0).any():
+            raise ProblemError(f"instance {self.name}: sort its arcs by source, then target")
+        if self.asks_time and self.timed is None:
+            raise ProblemError(f"instance {self.name}: a time is asked, and no durations are given")
+        super().__post_init__()
+        _ = self.graph  # says what is wrong with amounts
+
+    def __repr__(self) -> str:
+        asked = ", ".join([goal.name for goal in self.goals])
+        capped = "".join(f", {cap.name} <= {cap.most:g}" for cap in self.caps)
+        return f"<Instance {self.name!r}: {self.nodes} nodes, {self.arcs} arcs, {asked}{capped}>"
+
+    @property
+    def nodes(self) -> int:
+        """How many nodes there are."""
+        return len(self.ends)
+
+    @property
+    def arcs(self) -> int:
+        """How many arcs there are."""
+        return len(self.source)
+
+    @property
+    def levels(self) -> Ints:
+        """The level of every node, (n,): no arc leads to a lower one."""
+        return self.states[:, 0]
+
+    @cached_property
+    def graph(self) -> Graph:
+        """The same as a graph, all columns its amounts."""
+        peaks = {c for goal in self.goals if goal.kind == PEAK for c in goal.columns}
+        kinds = tuple(c in peaks for c in range(len(self.columns)))
+        return Graph(self.source, self.target, self.amounts, kinds, self.ends)
+
+    @property
+    def asks_time(self) -> bool:
+        """Whether it counts when acts end."""
+        kinds = [goal.kind == TIME for goal in self.goals]
+        return any(kinds) or any(cap.column is None for cap in self.caps)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether every goal is a sum or a largest amount, and nothing is capped."""
+        return not self.caps and all(goal.kind in (SUM, PEAK) for goal in self.goals)
+
+    @cached_property
+    def is_layered(self) -> bool:
+        """Whether every path has a node on every level, as where open grips are chosen."""
+        levels, last = self.levels, int(self.levels.max(initial=0))
+        steps = bool((levels[self.target] == levels[self.source] + 1).all())
+        alone = int((levels == 0).sum()) == 1 and last > 0
+        return steps and alone and bool((self.ends == (levels == last)).all())
+
+    def facts_of(self) -> dict[str, object]:
+        """Return what it is, for a summary, ready for JSON."""
+        return {
+            "instance": self.name,
+            "nodes": self.nodes,
+            "arcs": self.arcs,
+            "aims": [goal.name for goal in self.goals],
+            "caps": {cap.name: cap.most for cap in self.caps},
+            "made_by": self.facts.get("made_by", ""),
+        }
+
+
+def _target_sums(goal: _Target, totals: Floats) -> float:
+    """Return what a ``tail`` makes of totals (S,): the mean of the largest, by their weights."""
+    weights = np.clip(1.0 - goal.most * np.arange(len(totals)), 0.0, goal.most)
+    return float(np.sort(totals)[::-1] @ weights / weights.sum())
+
+
+def _by_goal(graph: Graph, asked: tuple[tuple[_Target, ...], tuple[_Cap, ...]]) -> Graph:
+    """Return a graph with one column for every goal and cap, nothing where a time is asked."""
+    goals, caps = asked
+    columns = [g.columns[0] if g.columns else None for g in goals] + [cap.column for cap in caps]
+    none = np.zeros(len(graph.source))
+    taken = np.column_stack([none if c is None else graph.amounts[:, c] for c in columns])
+    peaks = tuple(goal.kind == PEAK for goal in goals) + (False,) * len(caps)
+    return Graph(graph.source, graph.target, taken, peaks, graph.ends)

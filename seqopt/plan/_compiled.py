@@ -1,0 +1,244 @@
+"""The instance of a problem: its whole graph, computed, and what is asked of paths through it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib.metadata import version
+from itertools import accumulate
+from typing import Any
+
+import numpy as np
+
+from seqopt.arrays import Bools, Ints
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph._explore import Explorer, Visited
+from seqopt.graph._timed import TimedGraph, timed_graph
+from seqopt.graph.graph import Graph
+from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _by_goal, _Cap, _Target
+from seqopt.graph.layers.layers import Layers
+from seqopt.graph.orders import MOST_PARTS, AllOrders, OrderStates
+from seqopt.graph.paths import distances, reached
+from seqopt.graph.scenarios import ScenarioLayers
+from seqopt.graph.states._visits import FreeStates, ScenarioSums
+from seqopt.graph.states.states import States
+from seqopt.plan.calling.formulation import Formulation, as_formulation
+from seqopt.plan.solving import graph_of, natural, usual
+from seqopt.problem.problem import Aim, Measure, Problem, RobustAim
+from seqopt.sequence._robot_kinds import node_numbers
+
+
+def compile_instance(
+    problem: Problem,
+    *,
+    name: str = "",
+    aim: Aim | None = None,
+    below: float = np.inf,
+    facts: Mapping[str, Any] | None = None,
+) -> Instance:
+    """Return the instance of a problem: the graph that its formulations search, whole.
+
+    Parameters
+    ----------
+    problem : Problem
+        From `seqopt.pose`.
+    name : str, optional
+        What it is called; by default as its scene.
+    aim : Aim, optional
+        Of candidates of moves: whether the sum of their costs is to be small or the largest; by
+        default as of the formulation that usually solves the problem.
+    below : float, optional
+        Where states are chosen: those of which the first aim takes more are left out. A path that
+        is better than this stays.
+    facts : mapping, optional
+        Where it comes from, to be kept in its file; the version is added.
+
+    Returns
+    -------
+    Instance
+        Only nodes and arcs that are on a path from the start to an end.
+
+    Raises
+    ------
+    InfeasibleError
+        If no path leads to an end.
+    ProblemError
+        If nothing is known of a limit like ``below``, or a cost is negative.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> problem = seqopt.optimize("arch25", "free", aim="minmax,steps").problem
+    >>> seqopt.compile_instance(problem, below=40.0)
+    <Instance 'arch25': 3174 nodes, 6806 arcs, minmax, steps>
+    """
+    name = name or problem.engine.network.scene.name
+    told = {"seqopt": version("seqopt"), **(facts or {})}
+    return replace(_made(problem, name, aim, below), facts=told)
+
+
+def _made(problem: Problem, name: str, aim: Aim | None, below: float) -> Instance:
+    graph = graph_of(problem, natural(problem))
+    if not isinstance(graph, Layers | ScenarioLayers):
+        return _of_states(name, graph, below)
+    if below < np.inf:
+        raise ProblemError("below: it is about states; name aims, or leave it out")
+    return _of_layers(name, graph, aim or _usual_aim(problem))
+
+
+def _usual_aim(problem: Problem) -> Aim | None:
+    found: Formulation = as_formulation(usual(problem))
+    return found.aim
+
+
+def _of_layers(name: str, graph: Layers | ScenarioLayers, aim: Aim | None) -> Instance:
+    """Return the instance of candidates: a level for every move."""
+    if isinstance(graph, ScenarioLayers) and graph.aim.aim is Aim.SUM:
+        columns = [layers.arcs() for layers in graph.layered(Aim.SUM)]
+        goal = _tail(graph.aim, len(columns))
+    else:
+        aim = aim or Aim.SUM
+        costs = aim.costs(graph)
+        pairs = zip(costs.shared, costs.single, strict=True)
+        joined = np.add if aim is Aim.SUM else np.maximum
+        columns = [[joined(shared, single) for shared, single in pairs]]
+        over = f" ({graph.aim})" if isinstance(graph, ScenarioLayers) else ""
+        said, kind = ("minmax", PEAK) if aim is Aim.PEAK else ("least sum", SUM)
+        goal = _Target(f"{said}{over}", kind, (0,))
+    budgets = [budget for budget in graph.budgets if np.isfinite(budget.bound)]
+    caps = [_Cap(b.name, len(columns) + k, float(b.bound)) for k, b in enumerate(budgets)]
+    names = [f"cost {k}" if len(columns) > 1 else "cost" for k in range(len(columns))]
+    columns += [budget.amounts.arcs() for budget in budgets]
+    nominal = graph.nominal if isinstance(graph, ScenarioLayers) else graph
+    moves = nominal.schedule.moves
+    states = [(0, 0)] + [(k, c) for k, move in enumerate(moves, 1) for c in move.candidates]
+    firsts = [0, *accumulate((len(move.candidates) for move in moves), initial=1)]
+    sources, targets, amounts = [], [], []
+    for k in range(len(moves)):
+        every = np.stack([column[k] for column in columns])
+        before, now = np.nonzero(np.isfinite(every).all(axis=0))
+        sources.append(before + firsts[k])
+        targets.append(now + firsts[k + 1])
+        amounts.append(every[:, before, now].T)
+    ends = np.arange(len(states)) >= firsts[len(moves)]
+    flags = tuple(c in goal.columns and goal.kind == PEAK for c in range(len(columns)))
+    source, target = (np.concatenate(each).astype(np.int32) for each in (sources, targets))
+    whole = Graph(source, target, np.concatenate(amounts), flags, ends)
+    found, kept = _useful(whole)
+    names += [budget.name for budget in budgets]
+    rows = np.array(states, dtype=np.int64)[kept]
+    return _instance(name, found, (names, (goal,), tuple(caps)), rows)
+
+
+def _tail(aim: RobustAim, count: int) -> _Target:
+    return _Target(str(aim), TAIL, tuple(range(count)), aim.most(count))
+
+
+def _of_states(name: str, graph: States | AllOrders, below: float) -> Instance:
+    """Return the instance of states: bricks that stand, and nodes that robots hold."""
+    states = graph.states if isinstance(graph, AllOrders) else graph
+    if below < np.inf and (states.totals or states.goals[0].measure is not Measure.PEAK):
+        raise ProblemError("below: the first aim is no worst step; leave it out")
+    found = Explorer(_space(graph, states))
+    found.rise(below)
+    if not found.whole:
+        raise InfeasibleError(f"instance {name}: no plan is allowed")
+    found.refine()
+    visited = found.graph()
+    if states.totals:
+        count = len(visited.graph.peaks)
+        asked: Any = [f"cost {k}" for k in range(count)], (_tail(states.over, count),), ()
+    else:
+        asked = _asked(states)
+    rows, timed = _rows(graph, visited), None
+    whole = visited.graph
+    if states.is_timed:
+        timed = timed_graph(states, visited)
+        every = [k for k, goal in enumerate(states.goals) if goal.measure is not Measure.MAKESPAN]
+        peaks = tuple(whole.peaks[k] for k in every)
+        whole = Graph(whole.source, whole.target, whole.amounts[:, every], peaks, whole.ends)
+    small, kept = _useful(whole)
+    if timed is not None:
+        timed = _cut(timed, whole, kept, _by_goal(small, asked[1:]))
+    return _instance(name, small, asked, rows[kept], timed)
+
+
+def _space(graph: States | AllOrders, states: States) -> Any:
+    """Return states and moves, with all that is demanded of states asked."""
+    if isinstance(graph, AllOrders):
+        return OrderStates(graph, MOST_PARTS, every_goal=not states.totals)
+    asked = bool(states.demands) or any(goal.of_margins for goal in states.goals)
+    return (ScenarioSums if states.totals else FreeStates)(states, standing=asked)
+
+
+def _asked(states: States) -> tuple[list[str], tuple[_Target, ...], tuple[_Cap, ...]]:
+    """Return names of columns, goals and caps."""
+    names, goals, caps = list[str](), list[_Target](), list[_Cap]()
+    bounds = (*[None] * len(states.aims), *states.budgets)
+    for goal, bound in zip(states.goals, bounds, strict=True):
+        is_time = goal.measure is Measure.MAKESPAN
+        column = None if is_time else len(names)
+        if not is_time:
+            names.append(str(goal))
+        if bound is None:
+            kind = TIME if is_time else PEAK if goal.measure is Measure.PEAK else SUM
+            goals.append(_Target(str(goal), kind, () if column is None else (column,)))
+        else:
+            caps.append(_Cap(str(goal), column, bound))
+    return names, tuple(goals), tuple(caps)
+
+
+def _rows(graph: States | AllOrders, visited: Visited) -> Ints:
+    """Return what nodes stand for: the level, and the node that each robot holds, 0 for none.
+
+    Of all orders the brick that was placed last comes second. Robots of one kind stand together.
+    """
+    robots = (graph.states if isinstance(graph, AllOrders) else graph).space.robots
+    parts = []
+    for level, key, states in visited.states:
+        held = states[:, :robots].astype(np.int64)
+        if isinstance(graph, AllOrders):
+            newest = np.full((len(held), 1), key[1])
+            parts.append(np.column_stack([np.full(len(held), level), newest, held]))
+        else:
+            numbers = np.array([0, *node_numbers(graph.network)])
+            named = np.where(held > 0, numbers[held.clip(min=0)], 0)
+            parts.append(np.column_stack([np.full(len(held), level), named]))
+    return np.concatenate(parts)
+
+
+def _useful(graph: Graph) -> tuple[Graph, Ints]:
+    """Return the graph of nodes and arcs on paths from the start to ends, and which nodes."""
+    ahead = np.isfinite(distances(graph, np.ones(len(graph.source)), back=True))
+    on = reached(graph) & ahead
+    if not on[0]:
+        raise InfeasibleError("no path leads to an end")
+    arcs = _arcs_between(graph, on)
+    number = np.cumsum(on) - 1
+    source, target = (number[each[arcs]].astype(np.int32) for each in (graph.source, graph.target))
+    kept = np.flatnonzero(on)
+    return Graph(source, target, graph.amounts[arcs], graph.peaks, graph.ends[on]), kept
+
+
+def _arcs_between(graph: Graph, on: Bools) -> Bools:
+    return np.asarray(on[graph.source] & on[graph.target])
+
+
+def _instance(
+    name: str, graph: Graph, asked: Any, rows: Ints, timed: TimedGraph | None = None
+) -> Instance:
+    """Return the instance of a graph."""
+    names, goals, caps = asked
+    arrays = graph.source, graph.target, graph.ends
+    return Instance(name, *arrays, tuple(names), graph.amounts, goals, caps, rows, timed)
+
+
+def _cut(timed: TimedGraph, whole: Graph, kept: Ints, graph: Graph) -> TimedGraph:
+    """Return a graph in time of those nodes that are kept; what it is without time is given."""
+    on = np.isin(np.arange(whole.states), kept)
+    arcs = _arcs_between(whole, on)
+    acts = arcs[timed.move]
+    own = timed.prepares[arcs], timed.acts[arcs], timed.work[arcs]
+    who = (np.cumsum(arcs) - 1)[timed.move[acts]], timed.column[acts], timed.origin[acts]
+    states = timed.levels[on], timed.free[on], timed.alike[on], timed.kinds
+    return TimedGraph(graph, *states, *who, *own, timed.longest)

@@ -1,0 +1,285 @@
+"""What no path through an instance stays below: claims of others, and what the judge finds itself.
+
+A claim is about one goal, those before it being at their values. A sum is proven by potentials that
+no arc violates, a peak by a cut that no cheaper arc leaves. What is capped, and sums before, may be
+priced: a unit of each costs its price in addition, and all that may be taken is paid back. A tail
+needs the weights of its columns as well, a time the shares of the time of all and of robots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.errors import SolverError
+from seqopt.graph._budgets import _least_sum, _least_worst
+from seqopt.graph.duality import ROUNDING, cut, least_sum
+from seqopt.graph.graph import Graph
+from seqopt.graph.instances.instance import PEAK, SUM, TAIL, Instance, _Target
+from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.interface import CostProblem
+from seqopt.graph.paths import TIED, tied
+from seqopt.plan.judge._budget_proof import least_within
+from seqopt.plan.judge.bare._labels import Labels, labels_prove
+
+ABOVE = 1e-6  # over a value: how far a claim may be above what is proven
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Claim(FrozenValue):
+    """A bound, and what is to prove it; of no value, what follows from the rest.
+
+    ``potentials`` (n,): infinite where nothing is said of a node; ``cut``: nodes, the start among
+    them; ``prices``: by name of a cap or of a sum before; ``weights``: of columns of a tail;
+    ``shares`` (L, 1 + k): of the time of all, then of a robot of every kind; ``labels``: nodes
+    (N,), and (N, 1 + c + q) when the last act ended, since when robots are free, zero where they
+    hold, and sums that are limited.
+    """
+
+    value: float | None = None
+    potentials: Floats | None = None
+    cut: Ints | None = None
+    prices: Mapping[str, float] = field(default_factory=dict)
+    weights: Floats | None = None
+    shares: Floats | None = None
+    labels: Labels | None = None
+
+
+class Stage(NamedTuple):
+    """How far goals are: arcs that are left, and what sums of columns may be at most."""
+
+    graph: Graph
+    limited: tuple[tuple[str, int, float], ...]
+
+
+def first_stage(instance: Instance) -> Stage:
+    """Return all arcs, with the caps."""
+    caps = [(c.name, c.column, c.most) for c in instance.caps if c.column is not None]
+    return Stage(instance.graph, tuple((name, c, tied(most)) for name, c, most in caps))
+
+
+def next_stage(stage: Stage, goal: _Target, value: float) -> Stage:
+    """Return what is left for the goals after one that is at its value."""
+    if goal.kind == PEAK:
+        kept = stage.graph.amounts[:, goal.columns[0]] <= tied(value)
+        return stage._replace(graph=stage.graph.only(kept))
+    if goal.kind == SUM:
+        more = (goal.name, goal.columns[0], tied(value))
+        return stage._replace(limited=(*stage.limited, more))
+    return stage  # what is left out of account makes a bound no higher
+
+
+def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim) -> float:
+    """Return what a claim proves of a goal, or the judge itself where it gives no proof.
+
+    Raises `SolverError` where a potential, a weight or a share breaks what it has to keep.
+    """
+    limited = _priced(stage, claim)
+    if goal.kind == PEAK:
+        return _peak(stage, goal, claim, limited)
+    if goal.kind == SUM:
+        costs = stage.graph.amounts[:, goal.columns[0]]
+        if not claim.prices and claim.potentials is None:
+            return _own_sum(stage, goal)
+    elif goal.kind == TAIL:
+        costs = stage.graph.amounts[:, list(goal.columns)] @ _weights(goal, claim)
+    else:
+        return _time(instance, stage, claim, limited)
+    return _sum(stage, costs, claim, limited)
+
+
+def _priced(stage: Stage, claim: Claim) -> list[tuple[float, int, float]]:
+    """Return prices with their columns and what may be taken of them."""
+    known = {name: (column, most) for name, column, most in stage.limited}
+    for name, price in claim.prices.items():
+        if name not in known:
+            said = ", ".join(known) or "there are none"
+            raise SolverError(f"price of {name!r}: it is no cap or sum before; give {said}")
+        if not price >= 0 or not np.isfinite(price):
+            raise SolverError(f"price of {name!r} is {price:g}; give a number from 0")
+    return [(price, *known[name]) for name, price in claim.prices.items()]
+
+
+def _sum(
+    stage: Stage, costs: Floats, claim: Claim, limited: Sequence[tuple[float, int, float]]
+) -> float:
+    """Return what a sum is at least, by potentials that are given or the judge's own."""
+    back = 0.0
+    for price, column, most in limited:
+        costs = costs + price * stage.graph.amounts[:, column]
+        back += price * most
+    given = claim.potentials
+    least = least_sum(stage.graph, costs) if given is None else _kept(stage.graph, costs, given)
+    return least - back - ROUNDING * stage.graph.states * abs(back)
+
+
+def _kept(graph: Graph, costs: Floats, potentials: Floats) -> float:
+    """Return the least potential of an end; a `SolverError` names an arc that breaks potentials."""
+    if potentials.shape != (graph.states,) or np.isnan(potentials).any():
+        raise SolverError(f"there are {potentials.size} potentials; give {graph.states} numbers")
+    if potentials[0] > 0:
+        raise SolverError(f"the potential of node 0 is {potentials[0]:g}; give 0")
+    first, second = potentials[graph.source], potentials[graph.target]
+    ways = np.isfinite(first)
+    size = np.abs(potentials[np.isfinite(potentials)]).max(initial=0.0)
+    over = np.where(ways, second, -np.inf) - np.where(ways, first, 0.0) - costs
+    worst = int(np.argmax(over)) if len(over) else 0
+    if len(over) and over[worst] > ROUNDING * max(size, 1e-300) * 10:
+        raise SolverError(
+            f"potentials: the arc from node {graph.source[worst]} to {graph.target[worst]} takes "
+            f"{costs[worst]:.9g}, less than the {second[worst] - first[worst]:.9g} between them"
+        )
+    return float(potentials[graph.ends].min(initial=np.inf))
+
+
+def _own_sum(stage: Stage, goal: _Target) -> float:
+    """Return what a sum is at least, by prices that the judge finds."""
+    costs = stage.graph.amounts[:, goal.columns[0]]
+    if not stage.limited:
+        return least_sum(stage.graph, costs)
+    found = _least_sum(stage.graph, costs, [(c, most) for _, c, most in stage.limited])
+    prices = np.maximum(found.prices, 0.0)
+    pairs = zip(prices.tolist(), stage.limited, strict=True)
+    return _sum(stage, costs, Claim(), [(price, c, most) for price, (_, c, most) in pairs])
+
+
+def within_caps(instance: Instance, value: float, prices: Mapping[str, float]) -> float:
+    """Return what the one sum of a layered instance is at least within its caps.
+
+    Partial paths are laid down from the end, as where grips are chosen in layers.
+    """
+    return least_within(as_layers(instance), value, prices, max(abs(value), 1e-300))
+
+
+def as_layers(instance: Instance) -> CostProblem:
+    """Return a layered instance with one goal as the costs of candidates, level by level."""
+    columns = [instance.goals[0].columns[0], *(cap.column for cap in instance.caps)]
+    levels, last = instance.levels, int(instance.levels.max())
+    first = np.searchsorted(levels, np.arange(last + 2))
+    own = levels[instance.target]
+    costs = list[list[Floats]]()
+    for k, column in enumerate(columns):
+        parts = []
+        for level in range(1, last + 1):
+            shape = first[level] - first[level - 1], first[level + 1] - first[level]
+            pair = np.full(shape, 0.0 if k else np.inf)
+            arcs = np.flatnonzero(own == level)
+            rows = instance.source[arcs] - first[level - 1]
+            pair[rows, instance.target[arcs] - first[level]] = instance.amounts[arcs, column]
+            parts.append(pair)
+        costs.append(parts)
+    single = tuple(_nothing(part, costs[0]) for part in costs[0])
+    pairs = zip(instance.caps, costs[1:], strict=True)
+    none = tuple(np.zeros(part.shape[1]) for part in costs[0])
+    caps = tuple(Budget(cap.name, none, tuple(own), cap.most) for cap, own in pairs)
+    return CostProblem(LayeredCosts(single, tuple(costs[0])), caps)
+
+
+def _nothing(part: Floats, parts: Sequence[Floats]) -> Floats:
+    """Return costs of candidates alone that add nothing, and of which none is the largest."""
+    least = min(float(each.min()) for each in parts)
+    return np.full(part.shape[1], min(0.0, least))
+
+
+def _peak(
+    stage: Stage, goal: _Target, claim: Claim, limited: Sequence[tuple[float, int, float]]
+) -> float:
+    """Return what a peak is at least."""
+    graph, column = stage.graph, goal.columns[0]
+    if claim.cut is not None:
+        return _left(graph, column, claim.cut)
+    if limited and claim.value is not None:
+        below = graph.amounts[:, column] < claim.value - TIED * abs(claim.value)
+        part = stage._replace(graph=graph.only(below))
+        nothing = np.zeros(int(below.sum()))
+        return claim.value if _sum(part, nothing, claim, limited) > 0 else -np.inf
+    if stage.limited:
+        asked = [(c, most) for _, c, most in stage.limited]
+        bound, prices, _ = _least_worst(graph, column, asked)
+        pairs = zip(np.maximum(prices, 0.0).tolist(), asked, strict=True)
+        again = [(price, c, most) for price, (c, most) in pairs]
+        least = _peak(stage, goal, Claim(bound), again)
+        return max(least, cut(graph, column, np.inf)[0])
+    return cut(graph, column, np.inf)[0]
+
+
+def _left(graph: Graph, column: int, inside: Ints) -> float:
+    """Return the least amount of what leaves a cut; a `SolverError` says if it is none."""
+    if len(inside) and not (inside.min() >= 0 and inside.max() < graph.states):
+        raise SolverError(f"cut: it names a node outside 0 to {graph.states - 1}")
+    within = np.zeros(graph.states, dtype=bool)
+    within[inside] = True
+    if not within[0] or graph.ends[within].any():
+        raise SolverError("cut: name nodes with node 0 among them, and no end")
+    leaving = within[graph.source] & ~within[graph.target]
+    return float(graph.amounts[leaving, column].min(initial=np.inf))
+
+
+def _weights(goal: _Target, claim: Claim) -> Floats:
+    """Return weights of the columns of a tail that prove a bound, or say why they do not."""
+    count = len(goal.columns)
+    if claim.weights is None:
+        return np.full(count, 1 / count)
+    weights = claim.weights
+    if weights.shape != (count,) or not (weights >= 0).all():
+        raise SolverError(f"weights: give {count} numbers from 0")
+    if weights.sum() > 1 + 1e-9 or weights.max() > goal.most * (1 + 1e-9):
+        raise SolverError(
+            f"weights: they add up to {weights.sum():.9g}, the largest is {weights.max():.9g}; at "
+            f"most 1 in all and {goal.most:.9g} each prove a bound"
+        )
+    return weights
+
+
+def _time(
+    instance: Instance, stage: Stage, claim: Claim, limited: Sequence[tuple[float, int, float]]
+) -> float:
+    """Return when the last act ends at the earliest, by shares of the time of robots."""
+    timed = instance.timed
+    assert timed is not None  # an instance that asks for a time has it
+    kept = np.isin(_codes(instance.graph), _codes(stage.graph))
+    if claim.shares is None and claim.potentials is not None:
+        raise SolverError("potentials of a time: give the shares that they are for as well")
+    shares = _shares(timed.sizes.astype(float), claim.shares)
+    if claim.labels is not None and claim.value is not None:
+        columns = np.array([c for _, c, _ in stage.limited], dtype=np.int64)
+        most = np.array([most for *_, most in stage.limited])
+        _require_labels(instance, claim.labels, len(columns))
+        said = claim.value, claim.labels, shares
+        if labels_prove(timed, (stage.graph, kept), (columns, most), said):
+            return claim.value
+        raise SolverError(f"labels do not prove that no path ends before {claim.value:.9g}")
+    bounds = [_sum(stage, timed.work[kept] @ own, claim, limited) for own in shares]
+    return max(bounds) * (1 - 1e-12)
+
+
+def _require_labels(instance: Instance, labels: Labels, sums: int) -> None:
+    """Raise an error unless labels are of nodes, with as many numbers as there should be."""
+    assert instance.timed is not None  # labels are asked of times alone
+    nodes, values = labels
+    width = 1 + len(instance.timed.kinds) + sums
+    named = len(nodes) == 0 or (nodes.min() >= 0 and nodes.max() < instance.nodes)
+    if values.shape != (len(nodes), width) or not named or not np.isfinite(values).all():
+        raise SolverError(f"labels: give nodes, and for each a row of {width} numbers")
+
+
+def _shares(sizes: Floats, given: Floats | None) -> Floats:
+    """Return shares (L, 1 + k) that prove a bound; those of one kind each if none are given."""
+    if given is None:
+        return np.asarray(np.eye(len(sizes)) / sizes)
+    shares = np.atleast_2d(given)
+    wrong = shares.shape[1] != len(sizes) or not (shares >= 0).all()
+    if wrong or (shares @ sizes > 1 + 1e-9).any():
+        raise SolverError(
+            f"shares: give {len(sizes)} numbers from 0, that of all and one for a robot of every "
+            f"kind; with {', '.join(f'{s:g}' for s in sizes)} of each they add up to 1 at most"
+        )
+    return shares
+
+
+def _codes(graph: Graph) -> Ints:
+    return graph.source.astype(np.int64) * graph.states + graph.target

@@ -1,0 +1,233 @@
+"""The judge of instances: a path recomputed arc by arc, and bounds checked by arithmetic alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from seqopt.arrays import Floats, Ints
+from seqopt.errors import SolverError
+from seqopt.graph._timed import HELD, NOW, TimedGraph
+from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _Target, _target_sums
+from seqopt.plan.judge.bare._claims import (
+    ABOVE,
+    Claim,
+    first_stage,
+    next_stage,
+    proven,
+    within_caps,
+)
+from seqopt.plan.judge.bare._files import Answer, as_answer
+from seqopt.plan.judge.certificate import TOLERANCE, Certificate
+
+BELOW = 1e-9  # by how much a path must be better, over the size of the value
+
+
+def judge_instance(instance: Instance, solution: Any, bounds: Any = ()) -> Certificate:
+    """Check a bare solution of an instance, and bounds with what is to prove them.
+
+    Parameters
+    ----------
+    instance : Instance
+        From `seqopt.read_instance` or `seqopt.compile_instance`.
+    solution : path, str, sequence of int or mapping
+        A file (JSON, CSV or plain text), or what it holds: the nodes of a path, or a mapping with
+        ``nodes``, ``arcs`` or ``acts`` and, if they are to be checked, ``values`` and ``bounds``.
+    bounds : path, sequence or mapping, optional
+        For every goal, the most important first, a mapping: ``value`` and what proves it:
+        ``potentials``, ``cut``, ``prices``, ``weights``, ``shares``, ``labels``.
+
+    Returns
+    -------
+    Certificate
+        Values, and what no path stays below: by what is given; where nothing is, by potentials, a
+        cut or prices that the judge finds itself. A bound without proof counts as claimed.
+
+    Raises
+    ------
+    FileError, ProblemError
+        If a file or an entry cannot be read.
+    SolverError
+        If the path does not lead from node 0 to an end, exceeds a cap or is worth something else
+        than is claimed; or if a bound is higher than what is to prove it.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> instance = seqopt.compile_instance(seqopt.optimize("arch25").problem)
+    >>> plan = seqopt.solve(instance)
+    >>> proof = seqopt.judge_instance(instance, plan.nodes)
+    >>> round(proof.objective, 5), proof.gap
+    (657.46456, 0.0)
+    """
+    answer = as_answer(instance, solution, bounds)
+    path = _walked(instance, answer)
+    values = tuple(_value(instance, goal, path) for goal in instance.goals)
+    for goal, value, claimed in zip(instance.goals, values, answer.values, strict=False):
+        if claimed is not None and not abs(value - claimed) <= TOLERANCE * abs(value):
+            raise SolverError(f"{goal.name} is {value:.9g}, not {claimed:.9g} as claimed")
+    spent = _spent(instance, path)
+    found = _bounds(instance, values, answer.bounds)
+    gaps = [
+        max((v - b) / (abs(v) or 1.0) for v, b in zip(values, each, strict=True)) for each in found
+    ]
+    return Certificate(values, found[0], gaps[0], gaps[1], spent, instance.nodes)
+
+
+class _Walk(NamedTuple):
+    """A path: its arcs, and where times are asked when its last act ends."""
+
+    arcs: Ints
+    ends: float
+
+
+def _walked(instance: Instance, answer: Answer) -> _Walk:
+    """Return a path that leads from the start to an end, or say where it breaks."""
+    acts = None
+    if answer.what == "acts":
+        if instance.timed is None:
+            raise SolverError("acts: no times are asked of this instance; give nodes or arcs")
+        acts = _in_range(answer.numbers, len(instance.timed.move), "act")
+        arcs = instance.timed.move[acts]
+    elif answer.what == "arcs":
+        arcs = _in_range(answer.numbers, instance.arcs, "arc")
+    else:
+        arcs = _arcs_of(instance, _in_range(answer.numbers, instance.nodes, "node"))
+    at = 0
+    for step, arc in enumerate(arcs.tolist(), start=1):
+        if instance.source[arc] != at:
+            where = f"{instance.source[arc]} to {instance.target[arc]}"
+            raise SolverError(
+                f"step {step}: arc {arc} leads from {where}; the path is at node {at}"
+            )
+        at = int(instance.target[arc])
+    if not instance.ends[at]:
+        raise SolverError(f"the path stops at node {at}, where none may end")
+    ends = 0.0
+    if instance.timed is not None and instance.asks_time:
+        ends = path_makespan(instance.timed, arcs, acts)
+    return _Walk(arcs, ends)
+
+
+def _in_range(numbers: Ints, count: int, what: str) -> Ints:
+    wrong = numbers[(numbers < 0) | (numbers >= count)]
+    if len(wrong):
+        raise SolverError(f"{what} {wrong[0]} does not exist; they are 0 to {count - 1}")
+    return numbers
+
+
+def _arcs_of(instance: Instance, nodes: Ints) -> Ints:
+    """Return the arcs between nodes, the first of those side by side; the start may be left out."""
+    if len(nodes) and nodes[0] == 0:
+        nodes = nodes[1:]
+    before = np.concatenate([[0], nodes[:-1]]).astype(np.int64)
+    codes = instance.source.astype(np.int64) * instance.nodes + instance.target
+    wanted = before * instance.nodes + nodes
+    at = np.searchsorted(codes, wanted)
+    for step, (place, code) in enumerate(zip(at.tolist(), wanted.tolist(), strict=True), start=1):
+        if place == len(codes) or codes[place] != code:
+            first, second = divmod(code, instance.nodes)
+            raise SolverError(f"step {step}: no arc leads from node {first} to node {second}")
+    return np.asarray(at)
+
+
+def _value(instance: Instance, goal: _Target, path: _Walk) -> float:
+    """Return what a goal is worth of a path."""
+    own: Floats = instance.amounts[path.arcs][:, list(goal.columns)]
+    worth = {
+        SUM: lambda: float(own.sum()),
+        PEAK: lambda: float(own.max(initial=0.0)),
+        TAIL: lambda: _target_sums(goal, own.sum(axis=0)),
+        TIME: lambda: path.ends,
+    }
+    return worth[goal.kind]()
+
+
+def _spent(instance: Instance, path: _Walk) -> dict[str, float]:
+    """Return what a path takes of caps; a `SolverError` names one that it exceeds."""
+    out = {}
+    for cap in instance.caps:
+        own = path.ends
+        if cap.column is not None:
+            own = float(instance.amounts[path.arcs, cap.column].sum())
+        if not own <= cap.most + TOLERANCE * abs(cap.most):
+            raise SolverError(f"{cap.name} is {own:.9g}, more than the {cap.most:g} allowed")
+        out[cap.name] = own
+    return out
+
+
+def _bounds(
+    instance: Instance, values: Sequence[float], claims: Sequence[Claim]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return what is proven of every goal, and what is claimed."""
+    if len(claims) > len(values):
+        raise SolverError(f"there are {len(claims)} bounds for {len(values)} goals")
+    stage, out, said = first_stage(instance), list[float](), list[float]()
+    for k, (goal, value) in enumerate(zip(instance.goals, values, strict=True)):
+        claim = claims[k] if k < len(claims) else Claim()
+        bound = proven(instance, stage, goal, claim)
+        if _lays_down(instance, claim) and bound < value - BELOW * abs(value):
+            bound = max(bound, within_caps(instance, value, claim.prices))
+        bare = claim.potentials is None and claim.cut is None
+        bare &= claim.weights is None and claim.shares is None and not claim.prices
+        bare &= claim.labels is None
+        _require_modest(goal, claim, (value, bound), bare=bare)
+        if not bound < value - BELOW * abs(value):
+            bound = value
+        out.append(bound)
+        claimed = claim.value if bare and claim.value is not None else bound
+        said.append(min(value, max(bound, claimed)))
+        stage = next_stage(stage, goal, value)
+    return tuple(out), tuple(said)
+
+
+def _lays_down(instance: Instance, claim: Claim) -> bool:
+    """Return whether partial paths may say more than prices do."""
+    one = len(instance.goals) == 1 and instance.goals[0].kind == SUM
+    columns = all(cap.column is not None for cap in instance.caps)
+    known = claim.potentials is None and bool(instance.caps)
+    return one and columns and known and instance.is_layered
+
+
+def _require_modest(goal: _Target, claim: Claim, found: tuple[float, float], *, bare: bool) -> None:
+    """Raise an error if a bound is above the value of a path, or above what is to prove it."""
+    value, bound = found
+    if bound > value + ABOVE * abs(value):
+        raise SolverError(f"{goal.name}: the bound {bound:.9g} is above the path's {value:.9g}")
+    if claim.value is None:
+        return
+    if claim.value > value + ABOVE * abs(value):
+        raise SolverError(
+            f"{goal.name}: a bound of {claim.value:.9g} is claimed; the path takes {value:.9g}"
+        )
+    if not bare and claim.value > bound + ABOVE * abs(value):
+        raise SolverError(
+            f"{goal.name}: a bound of {claim.value:.9g} is claimed, and {bound:.9g} is proven"
+        )
+
+
+def path_makespan(timed: TimedGraph, arcs: Ints, acts: Ints | None = None) -> float:
+    """Return when the last act of a path ends, s, whoever acts as is best, or as acts (k,) say."""
+    first = np.searchsorted(timed.move, np.arange(len(timed.prepares) + 1))
+    labels = {(0.0, *[0.0] * len(timed.kinds))}
+    for step, arc in enumerate(arcs.tolist()):
+        every = range(first[arc], first[arc + 1]) if acts is None else [int(acts[step])]
+        found = {_acted(timed, act, label) for act in every for label in labels}
+        labels = {x for x in found if not any(_beats(y, x) for y in found)}
+    return min(label[0] for label in labels)
+
+
+def _acted(timed: TimedGraph, act: int, label: tuple[float, ...]) -> tuple[float, ...]:
+    """Return when an act ends, and since when robots of columns are free after it."""
+    end, *since = label
+    move, column = timed.move[act], int(timed.column[act])
+    begins = end if column < 0 else max(end, since[column] + float(timed.prepares[move]))
+    ends = begins + float(timed.acts[move])
+    where = {HELD: 0.0, NOW: ends}
+    return (ends, *(where[o] if o < 0 else since[o] for o in timed.origin[act].tolist()))
+
+
+def _beats(first: tuple[float, ...], second: tuple[float, ...]) -> bool:
+    return first != second and all(a <= b for a, b in zip(first, second, strict=True))
