@@ -10,7 +10,7 @@ from dataclasses import replace
 from math import radians
 from typing import Any
 
-from seqopt.contact.curing import Curing, find_curing
+from seqopt.contact.curing import Curing, _find_curing
 from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
 from seqopt.errors import ProblemError, SceneError, SeqoptError, StepError, did_you_mean
 from seqopt.plan.calling.formulation import Formulation, as_formulation
@@ -245,7 +245,7 @@ def asked_standing(options: argparse.Namespace) -> Standing | None:
 def _curing_words(words: Sequence[str]) -> Curing:
     """Return how mortar cures by its words."""
     try:
-        return find_curing(" ".join(words))
+        return _find_curing(" ".join(words))
     except SceneError as error:
         raise ProblemError(f"--{error}") from error
 

@@ -42,7 +42,7 @@ class Curing(Terse):
     --------
     >>> Curing(((300.0, 0.4), (900.0, 1.0))).share(600.0)
     0.4
-    >>> find_curing("15min").share(90.0)
+    >>> _find_curing("15min").share(90.0)
     0.1
     """
 
@@ -81,7 +81,7 @@ class Curing(Terse):
 
 
 def _said(points: Points) -> str:
-    """Return points in the words of `find_curing`."""
+    """Return points in the words of `_find_curing`."""
     if points and points == _linear(points[-1][0]):
         return f"{points[-1][0]:g}s"
     return ",".join(f"{age:g}s={share:g}" for age, share in points) or "never"
@@ -114,7 +114,7 @@ def _linear(seconds: float) -> Points:
     return tuple((share * seconds, share) for share in SHARES)
 
 
-def find_curing(given: Curing | str | Iterable[str]) -> Curing:
+def _find_curing(given: Curing | str | Iterable[str]) -> Curing:
     """Return how mortar cures: itself, or by words.
 
     ``15min`` (or ``s``, ``h``) has full bond after that and before a share in proportion, counted
@@ -123,9 +123,9 @@ def find_curing(given: Curing | str | Iterable[str]) -> Curing:
 
     Examples
     --------
-    >>> find_curing("never").share(1e9)
+    >>> _find_curing("never").share(1e9)
     0.0
-    >>> find_curing("5min=0.4,15min=1 1-2:1h").points_of("1-2")[-1]
+    >>> _find_curing("5min=0.4,15min=1 1-2:1h").points_of("1-2")[-1]
     (3600.0, 1.0)
     """
     if isinstance(given, Curing):

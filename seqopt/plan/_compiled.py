@@ -153,6 +153,8 @@ def _of_states(name: str, graph: States | AllOrders, below: float) -> Instance:
     rows, timed = _rows(graph, visited), None
     whole = visited.graph
     if states.is_timed:
+        if states.standing is not None and states.standing.curing is not None:
+            raise ProblemError("instance: how mortar cures is not in it; leave curing out")
         timed = timed_graph(states, visited)
         every = [k for k, goal in enumerate(states.goals) if goal.measure is not Measure.MAKESPAN]
         peaks = tuple(whole.peaks[k] for k in every)

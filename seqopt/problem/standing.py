@@ -10,7 +10,7 @@ from operator import le
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.contact.curing import Curing, find_curing
+from seqopt.contact.curing import Curing, _find_curing
 from seqopt.contact.mortar import DRY, Mortar, bond_mortar, find_mortar
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
@@ -51,7 +51,7 @@ class Standing:
     def __post_init__(self) -> None:
         object.__setattr__(self, "mortar", find_mortar(self.mortar))
         if self.curing is not None:
-            self._settle(find_curing(self.curing))
+            self._settle(_find_curing(self.curing))
         if not (isinstance(self.tilt, int | float) and 0 <= self.tilt < pi / 2):
             raise ProblemError(f"tilt {short(self.tilt)}: give an angle from 0 to below pi/2, rad")
 

@@ -8,7 +8,7 @@ from itertools import count
 
 import numpy as np
 
-from seqopt.contact.curing import find_curing
+from seqopt.contact.curing import _find_curing
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import EPOXY
 from seqopt.sequence._rule_check import RuleBook
@@ -49,7 +49,7 @@ def least_cured_makespan(engine, rules, words, most=np.inf):
     """
     book, tick = RuleBook(engine.network, rules), count()
     worst, stands = worsts(engine, rules), stands_with(engine.network)
-    curing, none = find_curing(words), (None,) * len(engine.network.scene.robots)
+    curing, none = _find_curing(words), (None,) * len(engine.network.scene.robots)
     heap, seen = [(0.0, next(tick), (0, none), (0.0,) * len(none), ())], set()
     while heap:
         end, _, (bricks, grips), since, placed = heapq.heappop(heap)
