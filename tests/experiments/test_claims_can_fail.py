@@ -34,6 +34,7 @@ from experiments.placement import (
     free_formulations,
     free_growth,
     heuristic_gaps,
+    replanning,
     robust_placement,
     speed_accuracy,
     staged_construction,
@@ -205,6 +206,11 @@ CHECKS = {
         peers.judge,
         tuple(TOOLS[TOOLS["part"] == part] for part in ("models", "placement")),
         *("ratio_lowest", 15.0, {"tool": "SciPy bars, banded"}),
+    ),
+    "replanning": Check(
+        replanning.holds,
+        ("replanning", "replanning_losses"),
+        *("anew", 0.8, {"plan": "free", "step": 10}),
     ),
     "robust_placement": Check(
         robust_placement.holds,
