@@ -70,7 +70,7 @@ def compile_instance(
     >>> import seqopt
     >>> problem = seqopt.optimize("arch25", "free", aim="minmax,steps").problem
     >>> seqopt.compile_instance(problem, below=40.0)
-    <Instance 'arch25': 3174 nodes, 6806 arcs, minmax, steps>
+    <Instance 'arch25': 71035 nodes, 247081 arcs, minmax, steps>
     """
     name = name or problem.engine.network.scene.name
     told = {"seqopt": version("seqopt"), **(facts or {})}

@@ -77,6 +77,13 @@ def save_instance(instance: Instance, path: Path | str) -> None:
     ------
     FileError
         If it cannot be written, or there is no such format.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import seqopt
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_instance(seqopt.read_instance("chain-12-way"), f"{folder}/chain.mps")
     """
     path = Path(path)
     if path.suffix == "":

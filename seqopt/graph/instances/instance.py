@@ -72,7 +72,7 @@ class Instance(FrozenValue, Shown):
     --------
     >>> import seqopt
     >>> seqopt.compile_instance(seqopt.optimize("arch25").problem)
-    <Instance 'arch25': 531 nodes, 9630 arcs, least sum>
+    <Instance 'arch25': 493 nodes, 12453 arcs, least sum>
     """
 
     name: str
