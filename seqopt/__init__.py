@@ -50,7 +50,7 @@ _HOMES = {
     "scene.scenarios": ("scenarios",),
     "plan.plan": ("Plan",),
     "graph.instances._files": ("read_instance", "save_instance"),
-    "plan._compiled": ("compile_instance",),
+    "plan.bare._compiled": ("compile_instance",),
     "plan.judge.bare._judging": ("judge_instance",),
     "plan.build": ("GivenSequence",),
     "plan.judge.certificate": ("Certificate",),

@@ -7,7 +7,7 @@ from seqopt.graph.instances._files import read_instance as read_instance
 from seqopt.graph.instances._files import save_instance as save_instance
 from seqopt.network.build import build_network as build_network
 from seqopt.network.network import Network as Network
-from seqopt.plan._compiled import compile_instance as compile_instance
+from seqopt.plan.bare._compiled import compile_instance as compile_instance
 from seqopt.plan.build import GivenSequence as GivenSequence
 from seqopt.plan.calling.formulation import Formulation as Formulation
 from seqopt.plan.calling.formulation import formulations as formulations

@@ -13,6 +13,7 @@ from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene import Scene
+from tests.builders import on_soft_ground
 
 Grips = tuple[int, ...]
 LOOSE_AT = 11  # the joint that is loosened: between bricks 12 and 13 of 25
@@ -125,3 +126,13 @@ def parted() -> Iterator[Case]:
     straight = ArchShape(pitch=np.full(25, 0.3), pattern="V", closed=False)
     in_line = without_joint(arch_scene(straight))
     yield Case("parted", len(sets), "3 in a line", in_line, (HELD,))
+
+
+def softened(arch, i):
+    """A scene as it is, on soft ground, or with joints that barely turn or hold, in turn."""
+    return (
+        arch,
+        on_soft_ground(arch, 1e4),
+        loosened(arch, 1e-5, only_turning=True),
+        loosened(arch, 1e-6, only_turning=False),
+    )[i % 4]

@@ -60,6 +60,11 @@ class Asked:
     first: Chosen
     watch: Watch
 
+    def by(self, kept: Bools) -> Chosen:
+        """Return the best path by some moves (m,), with its exact makespan."""
+        swept = Sweep(self.timed, self.prices, kept, Caps(sums=self.caps.sums)).run(Watch())
+        return Chosen(swept.path, swept.best, self.prices.bound)
+
 
 Choose = Callable[[Asked], Chosen]
 
@@ -75,6 +80,13 @@ class StageFound:
     bounds: list[float] = field(default_factory=list)
     proofs: list[LabelProof] = field(default_factory=list)
     late: bool = False
+
+    def require_path(self) -> None:
+        """Raise an error if no path was found, in time or at all."""
+        if not self.path and self.late:
+            raise StopError("time")
+        if not self.path:
+            raise InfeasibleError("no plan is within all budgets")
 
 
 def beams(
@@ -212,10 +224,7 @@ class Stages:
                     low, labels = middle + 1, tuple(swept.kept)
         except LateError:
             stage.late = True
-        if not stage.path:
-            if stage.late:
-                raise StopError("time")
-            raise InfeasibleError("no plan is within all budgets")
+        stage.require_path()
         stage.bounds.append(float(levels[min(low, high)]))
         stage.proofs.append(self._proof(labels, prices))
         stage.kept = stage.kept & (amounts <= tied(float(levels[high])))
@@ -249,10 +258,7 @@ class Stages:
             bound, labels = value, tuple(swept.kept)
         except LateError:
             stage.late = True
-        if not stage.path:
-            if stage.late:
-                raise StopError("time")
-            raise InfeasibleError("no plan is within all budgets")
+        stage.require_path()
         stage.bounds.append(bound)
         stage.proofs.append(self._proof(labels, prices))
         stage.caps = replace(stage.caps, sums=(*stage.caps.sums, (k, tied(value))))

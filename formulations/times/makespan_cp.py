@@ -32,14 +32,13 @@ from typing import Any
 
 import numpy as np
 
-from formulations.times._labels import Caps, Sweep
 from formulations.times._search import in_time
 from formulations.times._stages import Asked, Chosen
 from seqopt.arrays import Ints
 from seqopt.errors import ExtraError, ProblemError
 from seqopt.graph._timed import HELD, NOW
 from seqopt.graph.paths import distances
-from seqopt.plan.calling.formulation import FormulationKind, Watch
+from seqopt.plan.calling.formulation import FormulationKind
 
 FINEST = 1000  # parts of a second
 WORKERS = 8  # ways to search that take turns
@@ -288,19 +287,12 @@ def _least(asked: Asked) -> Chosen:
     moves, bound, done = program.solve()
     bound = max(bound, asked.prices.bound)
     if len(moves):
-        first = min(first, _path(asked, moves), key=lambda each: each.value)
+        kept = np.zeros(len(asked.kept), dtype=bool)
+        kept[moves] = True
+        first = min(first, asked.by(kept), key=lambda each: each.value)
     if done and scaled.slack == 0.0:
         bound = first.value
     return Chosen(first.path, first.value, min(bound, first.value), late=not done)
-
-
-def _path(asked: Asked, moves: Ints) -> Chosen:
-    """Return the path of moves with its exact makespan."""
-    kept = np.zeros(len(asked.kept), dtype=bool)
-    kept[moves] = True
-    caps = Caps(sums=asked.caps.sums)
-    swept = Sweep(asked.timed, asked.prices, kept, caps).run(Watch())
-    return Chosen(swept.path, swept.best, asked.prices.bound)
 
 
 FORMULATION = in_time(

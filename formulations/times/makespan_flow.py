@@ -22,12 +22,10 @@ import numpy as np
 from scipy import sparse
 
 from formulations.solvers import STOPS, minimize_rows
-from formulations.times._labels import Caps, Sweep
 from formulations.times._prices import useful
 from formulations.times._search import in_time
 from formulations.times._stages import Asked, Chosen
-from seqopt.arrays import Bools
-from seqopt.plan.calling.formulation import FormulationKind, Watch
+from seqopt.plan.calling.formulation import FormulationKind
 
 
 def _bounded(asked: Asked) -> Chosen:
@@ -58,15 +56,8 @@ def _bounded(asked: Asked) -> Chosen:
     if taken.any():
         every = np.zeros(len(kept), dtype=bool)
         every[np.flatnonzero(kept)[taken]] = True
-        first = min(first, _path(asked, every), key=lambda each: each.value)
+        first = min(first, asked.by(every), key=lambda each: each.value)
     return Chosen(first.path, first.value, min(bound, first.value), late=found.end in STOPS)
-
-
-def _path(asked: Asked, kept: Bools) -> Chosen:
-    """Return the path of some moves with its makespan."""
-    caps = Caps(sums=asked.caps.sums)
-    swept = Sweep(asked.timed, asked.prices, kept, caps).run(Watch())
-    return Chosen(swept.path, swept.best, asked.prices.bound)
 
 
 FORMULATION = in_time(

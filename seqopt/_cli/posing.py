@@ -25,7 +25,7 @@ from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.plan._bases import without_arms
+from seqopt.plan._other.bases import without_arms
 from seqopt.plan.calling.formulation import On, find_formulation
 from seqopt.problem.problem import (
     Orders,

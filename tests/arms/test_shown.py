@@ -21,7 +21,7 @@ from seqopt._files import csv_text
 from seqopt.arms._drawn import idle_arm
 from seqopt.arms._model import ArmModel
 from seqopt.errors import ExtraError, ProblemError, SceneError
-from seqopt.plan._bases import without_arms
+from seqopt.plan._other.bases import without_arms
 from seqopt.report._pictures import VIEW, Film, steps_picture
 from seqopt.report._robots import _known_arms
 from seqopt.report.page import Build, _tasks

@@ -11,19 +11,12 @@ import pandas as pd
 import pytest
 
 from seqopt._cli.answer import plain
-from seqopt._cli.main import main
 from seqopt.responses.table import analyze
 from seqopt.sequence.two_robots import cantilever
 from tests.commands import beside_models
+from tests.commands import command as run
 
 SMALL = "chain:bricks=7"
-
-
-def run(capsys, *words):
-    """Exit status, standard output and standard error of one command."""
-    status = main([str(word) for word in words])
-    out, err = capsys.readouterr()
-    return status, out, err
 
 
 def strict(text):

@@ -8,11 +8,11 @@ import re
 import pandas as pd
 import pytest
 
-from seqopt._cli.main import main
 from seqopt.scene.scene_file import load_scene, save_scene
 from seqopt.sequence.schedule_file import read_plan
 from tests.builders import small_arch
 from tests.commands import beside_models
+from tests.commands import command as run
 
 
 @pytest.fixture
@@ -20,15 +20,6 @@ def arch(tmp_path):
     path = tmp_path / "arch.json"
     save_scene(small_arch(5), path)
     return str(path)
-
-
-def run(capsys, *arguments):
-    try:
-        status = main([*arguments])
-    except SystemExit as stop:
-        status = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return status, out, err
 
 
 def test_optimize_writes_a_plan_that_reads_back(capsys, tmp_path, arch):

@@ -23,16 +23,7 @@ from seqopt.sequence.two_robots import cantilever, sequential
 from seqopt.study.published import printed_steps
 from tests.builders import anywhere, from_both_ends
 from tests.commands import beside_models
-
-
-def run(capsys, *arguments):
-    """Exit status, standard output and standard error of one command."""
-    try:
-        status = main(list(arguments))
-    except SystemExit as stop:
-        status = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return status, out, err
+from tests.commands import command as run
 
 
 def summary(capsys, *words):

@@ -11,15 +11,7 @@ from seqopt._cli.main import main
 from seqopt.scene.scene_file import load_scene, save_scene
 from seqopt.sequence.schedule_file import read_plan
 from tests.builders import small_arch
-
-
-def run(capsys, *arguments):
-    try:
-        status = main([*arguments])
-    except SystemExit as stop:
-        status = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return status, out, err
+from tests.commands import command as run
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,9 @@ import json
 
 import pytest
 
-from seqopt._cli.main import main
 from seqopt.scene.scene_file import save_scene
 from tests.builders import small_arch
+from tests.commands import command as run
 
 
 @pytest.fixture
@@ -16,15 +16,6 @@ def arch(tmp_path):
     path = tmp_path / "arch.json"
     save_scene(small_arch(5), path)
     return str(path)
-
-
-def run(capsys, *arguments):
-    try:
-        status = main([*arguments])
-    except SystemExit as stop:
-        status = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return status, out, err
 
 
 DOWN = ("--schedule", "free", "--direction", "take-down")

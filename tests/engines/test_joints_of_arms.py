@@ -19,8 +19,8 @@ from seqopt.graph.scenarios import engine_for
 from seqopt.network.build import build_network
 from seqopt.responses._tolerance import misfits
 from tests.arms.joints import compliances, with_joints
-from tests.builders import block, on_soft_ground, six_bricks
-from tests.limit_scenes import loosened
+from tests.builders import block, six_bricks
+from tests.limit_scenes import softened
 from tests.soft_bodies import SoftBodies
 
 STATES = 200  # random ones, one in two with hands that are moved
@@ -47,12 +47,7 @@ def drawn_jacobians(rng, scene, robots, joints=6):
 def drawn_state(arch, i):
     """A random state: scene, brick count, nodes of robots in order, and how far they are moved."""
     rng = np.random.default_rng([i, 11])
-    scene = (
-        arch,
-        on_soft_ground(arch, 1e4),
-        loosened(arch, 1e-5, only_turning=True),
-        loosened(arch, 1e-6, only_turning=False),
-    )[i % 4]
+    scene = softened(arch, i)
     robots = int(rng.integers(1, 5))
     stiffness = 10 ** rng.uniform(4, 8, (robots, 1)) * 10 ** rng.uniform(-1, 1, (robots, 6))
     hands = [

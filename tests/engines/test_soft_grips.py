@@ -17,8 +17,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, MechanismError, SceneError
 from seqopt.network.build import build_network
 from tests.builders import moved as turned_scene
-from tests.builders import on_soft_ground, six_bricks
-from tests.limit_scenes import loosened
+from tests.builders import six_bricks
+from tests.limit_scenes import softened
 from tests.soft_bodies import SoftBodies
 
 STATES = 200  # random ones, one in two with hands that are moved
@@ -63,12 +63,7 @@ def inner_nodes(net, bricks):
 def drawn_state(arch, i):
     """A random state: scene, brick count, nodes, stiffness of hands, and how far they are moved."""
     rng = np.random.default_rng([i, 7])
-    scene = (
-        arch,
-        on_soft_ground(arch, 1e4),
-        loosened(arch, 1e-5, only_turning=True),
-        loosened(arch, 1e-6, only_turning=False),
-    )[i % 4]
+    scene = softened(arch, i)
     size = 10 ** rng.uniform(3, 9)
     shift = size if rng.random() < 0.7 else tuple(size * 10 ** rng.uniform(-1, 1, 3))
     turn = None if rng.random() < 0.6 else 10 ** rng.uniform(1, 7)

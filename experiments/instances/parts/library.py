@@ -1,8 +1,8 @@
 """The library of instances: the command that makes each, and what is known of it.
 
 Command: ``python -m experiments.instances.parts.library [NAME ...]`` makes all of them anew, or
-those that are named, and says which files change. Large ones are made only where they are named:
-their files are not stored, their checksums are (`LARGE`).
+those that are named, and says which files change. Large ones (`LARGE`) are made only where they are
+named: neither their files are stored nor anything that is known of them.
 """
 
 import hashlib

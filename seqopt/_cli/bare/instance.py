@@ -15,7 +15,7 @@ from seqopt._cli.values import number_word
 from seqopt._files import require_apart
 from seqopt.errors import ProblemError
 from seqopt.graph.instances._files import WRITERS, save_instance
-from seqopt.plan._compiled import compile_instance
+from seqopt.plan.bare._compiled import compile_instance
 from seqopt.plan.calling.formulation import find_formulation
 from seqopt.plan.judge.bare._claims import first_stage
 

@@ -57,8 +57,8 @@ from seqopt._cli.words.optimizing import (
 from seqopt._files import csv_text
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.states.states import States
-from seqopt.plan._bases import FoundBases, choose_bases
-from seqopt.plan._fewest_props import FoundProps, fewest_props
+from seqopt.plan._other.bases import FoundBases, choose_bases
+from seqopt.plan._other.fewest_props import FoundProps, fewest_props
 from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation, formulation_names
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.out_of_sample import Trial, judge_unseen, worst_values

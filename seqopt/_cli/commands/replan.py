@@ -29,7 +29,7 @@ from seqopt._cli.words.optimizing import AIM, TIME
 from seqopt._cli.words.where import Place
 from seqopt._files import read_text
 from seqopt.errors import FileError, InfeasibleError, StepError
-from seqopt.plan._replan import compared, without
+from seqopt.plan._other.replan import compared, without
 from seqopt.plan.plan import Plan
 from seqopt.responses._tolerance import value_text
 from seqopt.responses.quantities import length_text

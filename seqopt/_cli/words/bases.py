@@ -12,7 +12,7 @@ import numpy as np
 from seqopt._cli.values import number_word
 from seqopt._files import read_text
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.plan._bases import Base, facing, grid, level_axis
+from seqopt.plan._other.bases import Base, facing, grid, level_axis
 from seqopt.scene.scene import Scene
 
 _COLUMNS = ("robot", "x", "y", "z", "heading_deg")

@@ -16,8 +16,8 @@ import pandas as pd
 
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError, StepError
-from seqopt.plan._bases import _bound, _is_below, _value
 from seqopt.plan._kept import moved
+from seqopt.plan._other.bases import _bound, _is_below, _value
 from seqopt.plan.judge._proof import Proof
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import states_of

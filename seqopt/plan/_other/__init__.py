@@ -1,0 +1,1 @@
+"""Plans of other scenes: other bases of robots, fewer props, a build that goes otherwise."""

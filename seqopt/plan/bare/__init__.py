@@ -1,0 +1,1 @@
+"""Problems as instances, which need no scene: compiled, and solved."""
