@@ -38,6 +38,8 @@ PAGES = (
             "infeasible",
             "driving",
             "props",
+            "taking_down",
+            "how_long",
         )
     ),
 )
