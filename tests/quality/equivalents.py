@@ -180,7 +180,7 @@ EQUIVALENT = (
     ),
     *(
         Equivalent(OPERATOR, line, old, new, "which way of two that agree is taken")
-        for line, old, new in (("support", "or", "and"),)
+        for line, old, new in (("support", "or", "and"), ("if few", "if few", "if not few"))
     ),
     Equivalent(OPERATOR, "loss.max", "initial=1.0", "initial=0.0", "every loss is one at least"),
     *(

@@ -133,9 +133,8 @@ class ComplianceOperator(FrozenValue):
         and mapped; else those of the loads are mapped, once, and then summed. So are reactions,
         which few of the wrenches tell. ``loads``: from the others, if it was made before.
         """
-        if name == "support" or self.few_loads(
-            len(index)
-        ):  # whatever was asked before: answers do not depend on it
+        few = name == "support" or self.few_loads(len(index))
+        if few:  # whatever was asked before: answers do not depend on it
             loads = self.loads(index, force) if loads is None else loads
             return loads.sum(self.of_loads(name))
         states = self._states(name)
