@@ -7,11 +7,11 @@ from seqopt.graph.instances._files import read_instance as read_instance
 from seqopt.graph.instances._files import save_instance as save_instance
 from seqopt.network.build import build_network as build_network
 from seqopt.network.network import Network as Network
-from seqopt.plan.bare._compiled import compile_instance as compile_instance
+from seqopt.plan._bare._compiled import compile_instance as compile_instance
 from seqopt.plan.build import GivenSequence as GivenSequence
 from seqopt.plan.calling.formulation import Formulation as Formulation
 from seqopt.plan.calling.formulation import formulations as formulations
-from seqopt.plan.judge.bare._judging import judge_instance as judge_instance
+from seqopt.plan.judge._bare._judging import judge_instance as judge_instance
 from seqopt.plan.judge.certificate import Certificate as Certificate
 from seqopt.plan.plan import Plan as Plan
 from seqopt.plan.solving import pose as pose

@@ -16,10 +16,10 @@ from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.scenarios import ScenarioLayers, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
+from seqopt.plan._bare._instances import solve_instance
 from seqopt.plan._kept import with_postures
 from seqopt.plan._layers import solve_layers, with_budgets
 from seqopt.plan._states import solve_orders, solve_states
-from seqopt.plan.bare._instances import solve_instance
 from seqopt.plan.calling.formulation import Formulation, On, Run, as_formulation
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import (

@@ -15,9 +15,9 @@ from seqopt._cli.values import number_word
 from seqopt._files import require_apart
 from seqopt.errors import ProblemError
 from seqopt.graph.instances._files import WRITERS, save_instance
-from seqopt.plan.bare._compiled import compile_instance
+from seqopt.plan._bare._compiled import compile_instance
 from seqopt.plan.calling.formulation import find_formulation
-from seqopt.plan.judge.bare._claims import first_stage
+from seqopt.plan.judge._bare._claims import first_stage
 
 DESCRIPTION = (
     "Write the graph of a problem: its nodes and arcs, what they take, what is to be small and "

@@ -11,7 +11,7 @@ from seqopt._cli.options import declare, form_options
 from seqopt.errors import SolverError
 from seqopt.graph.instances._files import read_instance
 from seqopt.graph.instances.instance import Instance
-from seqopt.plan.judge.bare._judging import judge_instance
+from seqopt.plan.judge._bare._judging import judge_instance
 from seqopt.plan.judge.certificate import TOLERANCE, Certificate
 
 DESCRIPTION = (

@@ -23,8 +23,8 @@ from seqopt.graph.instances.instance import PEAK, SUM, TAIL, Instance, _Target
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.paths import TIED, tied
+from seqopt.plan.judge._bare._labels import Labels, labels_prove
 from seqopt.plan.judge._budget_proof import least_within
-from seqopt.plan.judge.bare._labels import Labels, labels_prove
 
 ABOVE = 1e-6  # over a value: how far a claim may be above what is proven
 

@@ -24,8 +24,8 @@ from seqopt.plan.calling.formulation import (
     as_formulation,
     formulations,
 )
-from seqopt.plan.judge.bare._claims import Claim, as_layers
-from seqopt.plan.judge.bare._judging import judge_instance
+from seqopt.plan.judge._bare._claims import Claim, as_layers
+from seqopt.plan.judge._bare._judging import judge_instance
 from seqopt.plan.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Aim

@@ -11,7 +11,7 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import SolverError
 from seqopt.graph._timed import HELD, NOW, TimedGraph
 from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _Target, _target_sums
-from seqopt.plan.judge.bare._claims import (
+from seqopt.plan.judge._bare._claims import (
     ABOVE,
     Claim,
     first_stage,
@@ -19,7 +19,7 @@ from seqopt.plan.judge.bare._claims import (
     proven,
     within_caps,
 )
-from seqopt.plan.judge.bare._files import Answer, as_answer
+from seqopt.plan.judge._bare._files import Answer, as_answer
 from seqopt.plan.judge.certificate import TOLERANCE, Certificate
 
 BELOW = 1e-9  # by how much a path must be better, over the size of the value

@@ -14,7 +14,7 @@ from seqopt._files import read_text
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.instances.instance import Instance
-from seqopt.plan.judge.bare._claims import Claim
+from seqopt.plan.judge._bare._claims import Claim
 from seqopt.scene._checks import short
 
 WHAT = ("nodes", "arcs", "acts")
