@@ -119,7 +119,7 @@ class AllOrders(Shown):
     def planned(self, order: Order) -> States:
         """Return the free schedule of one order that is asked for: the take-down of it, if any."""
         found = self.at(order)
-        return found if self.down is None else replace(found, rules=self.down)
+        return found if self.down is None else replace(found, rules=self.down, spares=False)
 
     def at(self, order: Order) -> States:
         """Return the free schedule of one order."""
