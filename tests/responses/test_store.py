@@ -244,8 +244,8 @@ RUN = """
 import sys
 from seqopt._cli.main import main
 if __name__ == "__main__":
-    words = ["optimize", sys.argv[1], "--formulation", "cascade", "--out", sys.argv[2]]
-    sys.exit(main([*words, "--cache", sys.argv[3], *sys.argv[4:]]))
+    words = ["optimize", sys.argv[1], "--formulation", "cascade", "--tables", "all"]
+    sys.exit(main([*words, "--out", sys.argv[2], "--cache", sys.argv[3], *sys.argv[4:]]))
 """
 
 
