@@ -130,7 +130,7 @@ class BuildProver:
         for name, mortar in self._mortars.items():
             known = self._known[name]
             new = [step for state, step in distinct.items() if state not in known]
-            new.sort(key=attrgetter("bricks"))
+            new.sort(key=_asking)
             what = f"proving what stands, {name}"
             tell = partial(with_progress, what, new, self._progress)
             known.update(self._way(new)(self._network, new, mortar, tell) if new else ())
@@ -182,6 +182,11 @@ def _failing(network: Network, step: Step, mortar: Mortar) -> tuple[str, str]:
     """Return the brick and the joint that fail first in a step that falls."""
     (found,) = each_verdict(network, [step], mortar)
     return found.first_block, found.first_contact
+
+
+def _asking(step: Step) -> tuple[int, int]:
+    """Return when a step is asked: one that fewer hold before others, which its forces prove."""
+    return step.bricks, sum(node is not None for node in step.grips)
 
 
 def _state(step: Step) -> _State:

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy import linalg, sparse
@@ -100,14 +101,21 @@ class _Balance:
         self._transposed = blocks = self._map.T.tobsr((3, 6))
         self._bodies = blocks.shape[1] // 6
         self._owner = np.repeat(np.arange(blocks.shape[0] // 3), np.diff(blocks.indptr))
-        own = np.arange(len(self._owner))
+        own, each = np.arange(len(self._owner)), np.arange(self._bodies)
         both = np.flatnonzero(self._owner[1:] == self._owner[:-1])  # where a force has two bodies
         first = np.concatenate([own, both, both + 1])
         second = np.concatenate([own, both + 1, both])
         place = blocks.indices[first] * self._bodies + blocks.indices[second]
         order = np.argsort(place, kind="stable")
-        self._first, self._second = first[order], second[order]
-        self._places, self._starts = np.unique(place[order], return_index=True)
+        self._first, self._right = first[order], blocks.data[second[order]]
+        self._half, self._left = np.empty((len(own), 6, 3)), np.empty((len(order), 6, 3))
+        self._products = np.empty(
+            (len(order), 6, 6)
+        )  # written again and again: new pages cost more
+        places, self._starts = np.unique(place[order], return_index=True)
+        self._places = np.union1d(places, each * (self._bodies + 1))  # bodies may be loose
+        self._met = np.searchsorted(self._places, places)
+        self._diagonal = np.searchsorted(self._places, each * (self._bodies + 1))
 
     def wrench(self, force: Floats) -> Floats:
         """Return the wrenches (6B,) of forces (N, 3)."""
@@ -119,30 +127,39 @@ class _Balance:
 
     def solver(self, weight: Floats) -> _Solve:
         """Return the solution of systems with weights; raises an error if there is none."""
-        data = self._transposed.data
-        half = data.transpose(0, 2, 1) @ weight[self._owner]
-        block = np.add.reduceat(half[self._first] @ data[self._second], self._starts)
-        size, regular = 6 * self._bodies, _REGULAR * np.abs(block).max()
-        rows, columns = np.divmod(self._places, self._bodies)
+        across = self._transposed.data.transpose(0, 2, 1)
+        np.matmul(across, weight[self._owner], out=self._half)
+        np.take(self._half, self._first, axis=0, out=self._left, mode="clip")
+        np.matmul(self._left, self._right, out=self._products)
+        block = np.zeros((len(self._places), 6, 6))
+        block[self._met] = np.add.reduceat(self._products, self._starts)
+        regular = _REGULAR * np.abs(block).max()
+        block[self._diagonal] += regular * np.eye(6)
+        size, (rows, columns) = 6 * self._bodies, np.divmod(self._places, self._bodies)
         if size <= _DENSE:
             full = np.zeros((self._bodies, 6, self._bodies, 6))
             full[rows, :, columns] = block
             full = full.reshape(size, size)
-            factor = linalg.cho_factor(full + regular * np.eye(size), check_finite=False)
-            return _refined(full, lambda r: linalg.cho_solve(factor, r, check_finite=False))
+            factor = linalg.cho_factor(full, check_finite=False)
+            solve = partial(linalg.cho_solve, factor, check_finite=False)
+            return _refined(full, solve, regular)
         ends = np.searchsorted(rows, np.arange(self._bodies + 1))
-        matrix = sparse.bsr_array((block, columns, ends), shape=(size, size)).tocsc()
-        safe, symmetric = regular * sparse.eye_array(size, format="csc"), {"SymmetricMode": True}
-        factors = splu(matrix + safe, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
-        return _refined(matrix, factors.solve)
+        lines = sparse.bsr_array((block, columns, ends), shape=(size, size)).tocsr()
+        same = sparse.csc_array((lines.data, lines.indices, lines.indptr), shape=(size, size))
+        symmetric = {"SymmetricMode": True}  # so that lines are columns
+        factors = splu(same, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
+        return _refined(lines, factors.solve, regular)
 
 
-def _refined(matrix: Floats | sparse.csc_array, solve: _Solve) -> _Solve:
-    """Return the solution of a system by that of one nearby, corrected once."""
+def _refined(matrix: Floats | sparse.csr_array, solve: _Solve, regular: float) -> _Solve:
+    """Return the solution of a system by that of one nearby, corrected once.
+
+    ``matrix``: of the one nearby, whose diagonal is larger by ``regular``.
+    """
 
     def solution(right: Floats) -> Floats:
         first = solve(right)
-        return np.asarray(first + solve(right - matrix @ first))
+        return np.asarray(first + solve(right - (matrix @ first - regular * first)))
 
     return solution
 

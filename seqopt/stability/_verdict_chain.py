@@ -24,6 +24,7 @@ from seqopt.work._threads import one_thread
 _TIGHT = 0.01 * EXACT  # largest violation of forces that are believed without a cone program
 _CLEAR = 10 * EXACT  # least bound of a motion that is
 _LEAST = 1e-3  # corner force below which it changes no less, over the force scale
+_KEPT = 8  # answers that are tried on steps with more grips
 _ACROSS = 0.3  # how much forces along faces change, beside those across them
 
 
@@ -72,6 +73,7 @@ class VerdictChain:
         self._corner_force: Floats | None = None
         self._grip_force: dict[int, Floats] = {}
         self._motion: Floats | None = None
+        self._kept: list[tuple[Floats, dict[int, Floats]]] = []  # of as many corners
 
     def __call__(self, bricks: int, grips: Grips) -> tuple[Assembly, Proven, Way]:
         """Return a partial structure, its case proven, and how."""
@@ -94,6 +96,12 @@ class VerdictChain:
             claim = Answer(Claim.SOLVED, 1.0, *none, motion)
             yield judged(assembly, case, claim), Way.EARLIER_MOTION
         force, level = np.concatenate(none), np.ones((len(none[0]) + len(held), 3))
+        for kept, grip_force in self._kept:
+            if len(kept) == len(assembly.corner) and grip_force.keys() <= set(held):
+                grip = [grip_force.get(node, none[1][0]) for node in held]  # one more bears nothing
+                parts = (kept / assembly.scales[0], np.array(grip) / assembly.scales[0])
+                claim = Answer(Claim.SOLVED, 0.0, *parts, np.zeros((len(assembly.centroid), 6)))
+                yield judged(assembly, case, claim), Way.EARLIER_FORCES
         if case.tension[0] > 0 or case.cohesion[0] > 0:
             for answer in islice(approach(assembly, case, force, level), 1):
                 yield _labeled(judged(assembly, case, answer), Way.FORCES)
@@ -126,6 +134,8 @@ class VerdictChain:
         if proven.held <= EXACT:
             self._corner_force = force * answer.contact_force
             self._grip_force = dict(zip(held, force * answer.grip_force, strict=True))
+            same = [each for each in self._kept if len(each[0]) == len(self._corner_force)]
+            self._kept = [*same, (self._corner_force, self._grip_force)][-_KEPT:]
         if proven.bound > EXACT and np.isfinite(answer.motion).all():
             self._motion = answer.motion / np.repeat([1.0, length], 3)
 
