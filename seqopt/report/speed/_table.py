@@ -1,0 +1,203 @@
+"""How long every engine and formulation takes and how accurate it is; which of them to take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from seqopt._showing import display
+from seqopt.arrays import Bools
+from seqopt.plan.calling.formulation import On
+from seqopt.plan.solving import USUAL
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DONE, CUT, FAILED = "done", "cut off", "failed"
+SAME = 1.1  # times that differ by less are equal: repetitions do
+USUAL_NAMES = (USUAL[On.LAYERS], USUAL[On.STATES])
+
+
+def dominated(table: pd.DataFrame) -> Bools:
+    """Return which rows another one beats: at least as good in everything, and better in something.
+
+    ``table``: with ``seconds``, ``gap`` and ``error``. A row without a plan is beaten. Times count
+    as equal where they differ by less than `SAME`, so that noise beats nobody.
+    """
+    known = np.isfinite(table[["seconds", "gap", "error"]].to_numpy(float)).all(axis=1)
+    seconds = table["seconds"].to_numpy(float)
+    no_later = seconds[:, None] <= SAME * seconds
+    better = seconds[:, None] * SAME < seconds
+    for name in ("gap", "error"):
+        values = table[name].to_numpy(float)
+        no_later &= values[:, None] <= values
+        better |= values[:, None] < values
+    beats = no_later & better & known[:, None]
+    return np.asarray(beats.any(axis=0) | ~known)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SpeedTable:
+    """One problem by every engine and formulation.
+
+    ``reference``: the engine that others are compared with; ``limit``: of each, s; ``table``: a row
+    per ``engine`` and ``formulation``, with or without its ``proof``, whether it proves its plan
+    (``exact``), the ``seconds`` from scene to plan, the ``gap`` to the proven optimum and the
+    ``error`` of responses, both by the reference, its ``status`` and ``why`` there is no plan;
+    ``refused``: engines that cannot compute the scene, and why.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> from seqopt.report import compare
+    >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("wall:columns=2,courses=2"))
+    >>> found = compare(engine, seqopt.CRITERIA["worst-ratio"], speed=1.0).speed
+    >>> found.take["engine"] in seqopt.engines.registry.ENGINES, float(found.take["gap"])
+    (True, 0.0)
+    """
+
+    scene: str
+    bricks: int
+    method: str
+    reference: str
+    limit: float
+    table: pd.DataFrame
+    refused: Mapping[str, str] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        return f"<SpeedTable of {self.scene}: {self.sentence}>"
+
+    def __str__(self) -> str:
+        return "\n".join([self.sentence, "", *self.lines()])
+
+    def _repr_html_(self) -> str:
+        """Return the sentence and the table as HTML."""
+        return f"<p>{self.sentence}</p>{self.rows()._repr_html_()}"  # type: ignore[operator]
+
+    def plot(self) -> Figure:
+        """Return the chart of speed against accuracy (extra ``plot``)."""
+        found: Figure = display("speed_chart")(self)
+        return found
+
+    @cached_property
+    def kept(self) -> Bools:
+        """Which rows no other one beats."""
+        return ~dominated(self.table)
+
+    @cached_property
+    def take(self) -> pd.Series[float]:
+        """The row to take: of the most accurate, the soonest.
+
+        Of those that are equally soon one that proves its plan, of the reference if it can be, and
+        the usual formulation.
+        """
+        best = self.table[self.kept & (self.table["status"] == DONE)]
+        best = best[best["error"] == best["error"].min()]
+        best = best[best["gap"] == best["gap"].min()]
+        best = best[best["seconds"] <= SAME * best["seconds"].min()]
+        by = pd.DataFrame(
+            {
+                "heuristic": ~best["exact"].astype(bool),
+                "other": best["engine"] != self.reference,
+                "unusual": ~best["formulation"].isin(USUAL_NAMES),
+                "seconds": best["seconds"],
+            }
+        )
+        return best.loc[by.sort_values([*by]).index[0]]
+
+    @property
+    def sentence(self) -> str:
+        """Which engine and formulation to take, and what would be sooner."""
+        took = self.take
+        proven = "the proven best plan" if took["exact"] else "the best plan"
+        worth = proven if took["gap"] == 0 else f"a plan {100 * took['gap']:.2g} % above the best"
+        said = f"Take {way_named(took)}: {worth} in {seconds_text(took['seconds'])}"
+        if took["error"]:
+            said += f", responses off by {error_text(took['error'])}"
+        sooner = self.table[self.kept & (self.table["seconds"] * SAME < took["seconds"])]
+        if sooner.empty:
+            return f"{said}; nothing else is sooner by more than a tenth."
+        first = sooner.loc[sooner["seconds"].idxmin()]
+        lost = [f"its plan {100 * first['gap']:.2g} % above the best"] if first["gap"] else []
+        lost += [f"responses off by {error_text(first['error'])}"] if first["error"] else []
+        return (
+            f"{said}; sooner is {way_named(first)}, {seconds_text(first['seconds'])}, "
+            f"{' and '.join(lost)}."
+        )
+
+    def rows(self) -> pd.DataFrame:
+        """Return the table with the share of gaps in percent and a mark for what nobody beats."""
+        table = self.table
+        names = [way_named(row, engine=False) for _, row in table.iterrows()]
+        marks = np.where(self.kept, "yes", "")
+        found = pd.DataFrame({"engine": table["engine"], "formulation": names})
+        found["time, s"] = table["seconds"]
+        found["above the best, %"] = 100 * table["gap"]
+        found["error of responses"] = table["error"]
+        return found.assign(**{"how it ended": table["status"], "not beaten": marks})
+
+    def lines(self) -> Iterator[str]:
+        """Yield the table in at most 80 columns, an engine after the other."""
+        yield f"{'':25}{'seconds':>9}{'gap':>10}{'error':>10}"
+        for name, own in self.table.groupby("engine", sort=False):
+            yield f"{name}, the reference" if name == self.reference else str(name)
+            without = own[own["gap"].isna()]
+            for at, row in own.drop(without.index).iterrows():
+                mark = "*" if self.kept[self.table.index.get_loc(at)] else " "
+                late = f"  {CUT}" if row["status"] == CUT else ""
+                yield (
+                    f"{mark} {way_named(row, engine=False):23}{_digits(row['seconds']):>9}"
+                    f"{gap_text(row['gap']):>10}{error_text(row['error']):>10}{late}"
+                )
+            for why, rows in without.groupby("why", sort=False):
+                names = [way_named(row, engine=False) for _, row in rows.iterrows()]
+                what = names[0] if len(names) == 1 else f"{len(names)} formulations"
+                said = str(why) or f"not ready after {self.limit:g} s"
+                yield f"  {what}: {said}"
+        for name, why in self.refused.items():
+            yield f"{name}: {why}"
+
+
+def way_named(row: pd.Series[float], *, engine: bool = True) -> str:
+    """Return what is typed for a row: ``compliance with overlap_dp``, ``cascade, no proof``."""
+    name = f"{row['formulation']}{'' if row['proof'] else ', no proof'}"
+    return f"{row['engine']} with {name}" if engine else name
+
+
+def _digits(seconds: float) -> str:
+    """Return a time with three digits that count."""
+    return f"{seconds:,.0f}" if seconds >= 100 else f"{seconds:#.3g}"
+
+
+def seconds_text(seconds: float) -> str:
+    """Return a time in words.
+
+    Examples
+    --------
+    >>> seconds_text(0.1014), seconds_text(26.04), seconds_text(512.2)
+    ('0.101 s', '26.0 s', '512 s')
+    """
+    return f"{_digits(seconds)} s"
+
+
+def gap_text(gap: float) -> str:
+    """Return a gap in percent."""
+    return "-" if np.isnan(gap) else "forbidden" if np.isinf(gap) else f"{100 * gap:.2g} %"
+
+
+def error_text(error: float) -> str:
+    """Return an error as people write it: 2e-6, 0.02.
+
+    Examples
+    --------
+    >>> error_text(2.1e-6), error_text(0.0213), error_text(0.0)
+    ('2e-6', '0.021', '0')
+    """
+    if np.isnan(error):
+        return "-"
+    return f"{error:.2g}" if error >= 1e-3 or not error else f"{error:.0e}".replace("e-0", "e-")
