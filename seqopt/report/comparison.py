@@ -25,8 +25,10 @@ from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve
 from seqopt.problem._arms import arm_faults
 from seqopt.problem.criteria import RankSum, WorstRatio
-from seqopt.problem.problem import Aim
+from seqopt.problem.problem import Aim, Problem
 from seqopt.problem.requirements import Criterion, _prop_faults, overloads
+from seqopt.report.speed._measure import speed_accuracy
+from seqopt.report.speed._table import SpeedTable
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._tolerance import COLUMN, is_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
@@ -106,6 +108,10 @@ class Comparison(Terse):
         table counts the steps that fall, as ``falls_dry``.
     enough : Enough
         Which model was enough for all steps, and what more detailed ones would change.
+    speed : SpeedTable or None
+        How long every engine and formulation takes for the loop, or where there is none the free
+        schedule, and how accurate it is, if that was asked for: ``speed.sentence`` says which to
+        take, ``speed.table`` has the numbers, ``speed.plot()`` draws them.
     """
 
     maxima: pd.DataFrame
@@ -119,6 +125,7 @@ class Comparison(Terse):
     criteria: Mapping[str, Criterion]
     verdicts: Mapping[str, tuple[BuildVerdicts, ...]]
     enough: Enough
+    speed: SpeedTable | None = None
 
 
 def compare(
@@ -127,6 +134,7 @@ def compare(
     progress: Tell = lambda _: None,
     robots: Sequence[str] = (),
     prover: BuildProver | None = None,
+    speed: float = 0.0,
 ) -> Comparison:
     """Analyze every method on an engine's scene and solve its usual loop by every formulation.
 
@@ -142,6 +150,9 @@ def compare(
         Of those that take part, as many as a method needs; found from reach by default.
     prover : BuildProver, optional
         Says which steps stand; by default dry, and with epoxy.
+    speed : float, optional
+        Seconds for each engine and formulation, if their speed is to be set against their accuracy;
+        ``engine`` is then what the others are compared with.
 
     Returns
     -------
@@ -158,6 +169,7 @@ def compare(
     loop = None if problem is None else _facts(problem, rows, robots)
     own = _free_criterion(criterion, [largest(scene, tables[str(name)]) for name in maxima])
     free, refused = _free_plan(engine, own, robots, progress)
+    measured = _speed(engine, (problem, free), seconds=speed, progress=progress) if speed else None
     notes, criteria = notes + refused, dict[str, Criterion]()
     if free is not None:
         tables[FREE], rows[FREE] = free.responses(), _free_row(free)
@@ -170,7 +182,25 @@ def compare(
     table = _table(rows, left := (within := LinearRange(engine)).of_builds(tables), verdicts)
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
     found = (maxima, printed, table, tables, loop, tuple(notes), refusal)
-    return Comparison(*found, left, criteria, verdicts, what_was_enough(within, tables))
+    return Comparison(*found, left, criteria, verdicts, what_was_enough(within, tables), measured)
+
+
+def _speed(
+    engine: Engine, found: tuple[Layers | None, Plan | None], seconds: float, progress: Tell
+) -> SpeedTable:
+    """Return speed and accuracy for the loop or, where there is none, the free schedule."""
+    loop, free = found
+    if loop is not None:
+        problem = Problem(engine, loop.schedule, loop.criterion)
+    elif free is not None:
+        states = free.states
+        problem = Problem(engine, states.rules, states.criterion, states.goals)
+    else:
+        raise ProblemError(
+            f"speed: neither a loop of the robots of {engine.network.scene.name} nor a free "
+            "schedule is possible, so nothing is chosen; leave it out, or change their reach"
+        )
+    return speed_accuracy(problem, seconds, progress)
 
 
 def _table(

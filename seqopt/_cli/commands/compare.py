@@ -36,12 +36,14 @@ from seqopt._cli.outputs import (
     figure_notes,
     require_out,
     softness_files,
+    speed_files,
     write_outputs,
 )
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import _parse_grip_range, asked_criterion, parse_robots
+from seqopt._cli.values import _parse_grip_range, asked_criterion, number_word, parse_robots
 from seqopt.arms.reach import find_postures
 from seqopt.engines.registry import provenance
+from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import FormulationKind, formulations
 from seqopt.problem.criteria import RankSum
@@ -49,6 +51,7 @@ from seqopt.problem.requirements import Criterion
 from seqopt.report._pages import PAGE, comparison_page
 from seqopt.report.comparison import CLOSED, Comparison, compare
 from seqopt.report.softness import _softness_lines, held_softly, turning_points
+from seqopt.report.speed._table import SpeedTable
 from seqopt.report.text import format_details
 from seqopt.responses.table import builds_in_words
 from seqopt.scene.scene import Scene
@@ -69,6 +72,7 @@ EXAMPLES = (
     "seqopt compare wall:columns=6,courses=4 --out wall",
     "seqopt compare arch25 --criteria worst-ratio --json",
     "seqopt compare arch25 --grips 1e5..1e9",
+    "seqopt compare arch25 --speed --out speed",
 )
 WRITTEN = {
     "--out DIR": "write tables, figures and a page with all builds",
@@ -87,6 +91,7 @@ RESPONSES = {
     "D_max": ("displacement,", "0.001 mm", 14),
 }  # above each column of responses, and how wide it is
 SOFTLY = "The same builds, by the stiffness of grips in N/m"
+SPEED = "Speed against accuracy"
 TURNS = "What turns as grips become softer"
 NO_TURN = "nothing does in this range"
 HOW_SOFT = (
@@ -103,6 +108,14 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     scene_options(basic)
     robots_option(basic, "all methods, each of which takes as many as it needs")
     declare(basic, WRITTEN)
+    basic.add_argument(
+        "--speed",
+        metavar="SECONDS",
+        nargs="?",
+        const="10",
+        help="also chart speed against accuracy: the loop by every engine and formulation, each "
+        "within so many seconds (10); errors are those beside the engine that --engine names",
+    )
     criterion_options(command)
     declare(engine_options(command), POSTURES)
     form_options(command, strict=True, builds=True)
@@ -110,14 +123,15 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Answer:
     """Compare all ways to build a scene."""
-    grips = _parse_grip_range(options.grips)
+    grips, seconds = _parse_grip_range(options.grips), _speed_seconds(options.speed)
     scene = asked_scene(options, ranged=True)
     find_postures(scene, options.cache, options.tell)
     engine = asked_engine(options, build_network(scene))
     criterion = asked_criterion(options)
     require_out(options)
     prover = asked_prover(options, engine.network)
-    result = compare(engine, criterion, options.tell, parse_robots(options.robots), prover)
+    robots = parse_robots(options.robots)
+    result = compare(engine, criterion, options.tell, robots, prover, seconds)
     about = {"scene": scene.name, "criteria": _criteria(result), **provenance(engine)}
     text, headings = _tell(result, scene, criterion)
     blocks = [text]
@@ -128,12 +142,15 @@ def run(options: argparse.Namespace) -> Answer:
     if grips:
         blocks += _softly(softly, turns)
         headings = (*headings, SOFTLY, TURNS)
+    if result.speed is not None:
+        blocks.append(_speed(result.speed))
+        headings = (*headings, SPEED)
     written: tuple[Path, ...] = ()
     if options.out is not None:
         options.tell("drawing figures")
         files = comparison_files(result) | {"summary.json": json.dumps(about, indent=2) + "\n"}
         page = {PAGE: comparison_page(engine, result)}
-        files |= softness_files(softly)
+        files |= softness_files(softly) | speed_files(result.speed)
         written = write_outputs(options, lambda: files | page)
         blocks.append(_where(options.out))
     else:
@@ -142,7 +159,8 @@ def run(options: argparse.Namespace) -> Answer:
     answer = Answer(
         facts=about
         | {"scene": scene_facts(scene), "criterion": criterion.name, **_facts(result)}
-        | ({"grips": {"rows": softly, "turns": list(turns)}} if grips else {}),
+        | ({"grips": {"rows": softly, "turns": list(turns)}} if grips else {})
+        | ({} if result.speed is None else {"speed": result.speed.facts()}),
         text="\n\n".join(blocks),
         headings=headings,
         written=written,
@@ -157,6 +175,27 @@ def run(options: argparse.Namespace) -> Answer:
     over = exceeded(scene, *result.tables.values())
     left = builds_in_words(result.departures)
     return strictly(answer, options, over, left, result.verdicts)
+
+
+def _speed_seconds(text: str | None) -> float:
+    """Return how long each engine and formulation may take, s; zero if speed is not asked for."""
+    if text is None:
+        return 0.0
+    try:
+        return number_word(text, "--speed")
+    except ProblemError as error:
+        raise ProblemError(f"{error}; give seconds, and the scene before it") from None
+
+
+def _speed(table: SpeedTable) -> str:
+    """Return speed and accuracy of every engine and formulation, in at most 80 columns."""
+    about = (
+        f"The {table.method} problem, {table.limit:g} s for each. Seconds: from scene to plan. "
+        "Gap: of the plan, above the proven optimum. Error: of its responses, beside those of "
+        f"{table.reference}, over the largest of their kind. *: no other is better in one and as "
+        "good in the others; times count as equal within a tenth."
+    )
+    return "\n".join([SPEED, wrapped(table.sentence), "", *table.lines(), "", wrapped(about)])
 
 
 def _softly(table: pd.DataFrame, turns: Sequence[str]) -> list[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -27,7 +28,7 @@ from seqopt.report._style import (
 )
 from seqopt.report.speed._labels import Label, place
 from seqopt.report.speed._table import CUT, SpeedTable, error_text, seconds_text
-from seqopt.report.text import in_words, typed
+from seqopt.report.text import in_words
 
 ENGINES = ("compliance", "frame", "auto", "discrete", "planar")  # in the order of their looks
 PALE = 0.28
@@ -41,7 +42,7 @@ CORNER = 0.16  # share of a panel
 def speed_chart(*speeds: SpeedTable, width: float = WIDTH) -> Figure:
     """Return the chart of one problem or of several, side by side: above gaps, below errors."""
     narrow = int((width - 0.7) / len(speeds) / LETTER)
-    titles = [_title(speed, narrow) for speed in speeds]
+    titles = [_title(speed, narrow, full=len(speeds) == 1) for speed in speeds]
     lines = max(title.count("\n") for title in titles)
     figure = new_figure(4.6 + 0.15 * lines + 0.3 * (width < WIDTH), width)
     panels = figure.subplots(
@@ -64,21 +65,22 @@ def speed_chart(*speeds: SpeedTable, width: float = WIDTH) -> Figure:
     return figure
 
 
-def _title(speed: SpeedTable, width: int) -> str:
+def _title(speed: SpeedTable, width: int, *, full: bool) -> str:
     """Return what is built, and what to take, as lines."""
     took = speed.take
-    words = f"take {took['engine']} with {_words(took, full=True)}: {seconds_text(took['seconds'])}"
     what = f"{speed.scene}, {speed.bricks} bricks"
+    if full:
+        return "\n".join([what, *textwrap.wrap(speed.sentence, width, break_on_hyphens=False)])
+    words = f"take {took['engine']} with {_words(took)}: {seconds_text(took['seconds'])}"
     return "\n".join([what, *textwrap.wrap(words, width, break_on_hyphens=False)])
 
 
-def _words(row: pd.Series[float], *, full: bool = False) -> str:
-    name = str(row["formulation"])
-    words = typed(name) if full else in_words(name).replace("_", " ")
+def _words(row: pd.Series[float]) -> str:
+    words = in_words(str(row["formulation"])).replace("_", " ")
     return words if row["proof"] else f"{words}, no proof"
 
 
-def _look(engine: str, *, filled: bool = True) -> dict[str, object]:
+def _look(engine: str, *, filled: bool = True) -> dict[str, Any]:
     known = ENGINES.index(engine) if engine in ENGINES else len(ENGINES)
     return look(known).mark(filled=filled)
 
@@ -90,9 +92,10 @@ def _height(name: str, values: pd.Series[float]) -> pd.Series[float]:
 
 def _seen(speed: SpeedTable, name: str) -> pd.DataFrame:
     """Return the rows with a point, where it is, and whether another one beats it."""
-    table = speed.table.assign(kept=speed.kept)
-    table = table[np.isfinite(table[name].to_numpy(float))]
-    return table.assign(height=_height(name, table[name]))
+    every: pd.DataFrame = speed.table.assign(kept=speed.kept)
+    table = every[np.isfinite(every[name].to_numpy(float))]
+    found: pd.DataFrame = table.assign(height=_height(name, table[name]))
+    return found
 
 
 def _points(axes: Axes, speed: SpeedTable, name: str) -> Iterator[tuple[Axes, float, float]]:
@@ -110,24 +113,37 @@ def _points(axes: Axes, speed: SpeedTable, name: str) -> Iterator[tuple[Axes, fl
 
 def _named(axes: Axes, speed: SpeedTable, name: str) -> Iterator[Label]:
     """Yield words for points: above for formulations, each once a level; below for engines."""
-    seen, took = _seen(speed, name).sort_values("seconds"), speed.take.name
+    seen, took = _seen(speed, name).sort_values("seconds"), _index(speed)
     for height, level in seen.groupby("height"):
         level = level.sort_values("kept", ascending=False, kind="stable")  # noqa: PLW2901
         if name == "error":
-            first = level.loc[took] if took in level.index else level.iloc[0]
-            words = _engines(level, str(first["engine"]))
-            yield Label(axes, (first["seconds"], float(height)), words, bool(first["kept"]))  # type: ignore[arg-type]
-            continue
-        said = set[str]()
-        for own in _neighbors(level):
-            first = own.loc[took] if took in own.index else own.iloc[0]
-            words = dict.fromkeys([_words(first), *(_words(row) for _, row in own.iterrows())])
-            new = [each for each in words if each not in said]
-            said |= {*words}
-            if new:
-                more = f"\nand {len(new) - 1} more" if len(new) > 1 else ""
-                at = (first["seconds"], float(height))  # type: ignore[arg-type]
-                yield Label(axes, at, new[0] + more, bool(first["kept"]))
+            first: pd.Series[float] = level.loc[took] if took in level.index else level.iloc[0]
+            engines = _engines(level, str(first["engine"]))
+            yield Label(axes, _at(first, height), engines, bool(first["kept"]))
+        else:
+            yield from _named_once(axes, level, height, took)
+
+
+def _index(speed: SpeedTable) -> Any:
+    """Return where in the table the row to take is."""
+    return speed.take.name
+
+
+def _at(row: pd.Series[float], height: object) -> tuple[float, float]:
+    return float(row["seconds"]), float(str(height))
+
+
+def _named_once(axes: Axes, level: pd.DataFrame, height: object, took: Any) -> Iterator[Label]:
+    """Yield words for the formulations of one height, none of which is named twice."""
+    said = set[str]()
+    for own in _neighbors(level):
+        first: pd.Series[float] = own.loc[took] if took in own.index else own.iloc[0]
+        words = dict.fromkeys([_words(first), *(_words(row) for _, row in own.iterrows())])
+        new = [each for each in words if each not in said]
+        said |= {*words}
+        if new:
+            more = f"\nand {len(new) - 1} more" if len(new) > 1 else ""
+            yield Label(axes, _at(first, height), new[0] + more, bool(first["kept"]))
 
 
 def _engines(level: pd.DataFrame, first: str) -> str:
@@ -158,11 +174,11 @@ def _limits(speed: SpeedTable, gaps: Axes, errors: Axes) -> None:
     across = gaps.get_xaxis_transform()
     for row, (engine, own) in enumerate(late.groupby("engine", sort=False)):
         at = (speed.limit, 0.95 - 0.085 * row)
-        mark = {**_look(str(engine), filled=False), "marker": ">", "ms": 6}
+        mark: dict[str, Any] = {**_look(str(engine), filled=False), "marker": ">", "ms": 6}
         gaps.plot(*at, transform=across, clip_on=False, **mark)
         count = f"{len(own)} ways" if len(own) > 1 else "1 way"
         words = f"{engine}: {count} stopped"
-        beside = {"textcoords": "offset points", "ha": "right", "va": "center"}
+        beside: dict[str, Any] = {"textcoords": "offset points", "ha": "right", "va": "center"}
         gaps.annotate(words, at, (-7, 0), across, fontsize=SMALL, color=GRAY, **beside)
 
 
@@ -177,7 +193,11 @@ def _scales(panels: np.ndarray, speeds: Sequence[SpeedTable]) -> None:
     panels[1, 0].set_yticks([NONE, *ticks], ["none", *(error_text(tick) for tick in ticks)])
     panels[1, 0].set_yticks([], minor=True)
     for axes in panels.ravel():
-        size = {"width": 2 * CORNER, "height": 2 * 1.4 * CORNER, "transform": axes.transAxes}
+        size: dict[str, Any] = {
+            "width": 2 * CORNER,
+            "height": 2 * 1.4 * CORNER,
+            "transform": axes.transAxes,
+        }
         axes.add_patch(Ellipse((0, 0), **size, fc=GREEN, alpha=0.16, lw=0, zorder=0))
 
 
@@ -185,7 +205,7 @@ def _legend(figure: Figure, speeds: Sequence[SpeedTable], across: int) -> None:
     """Name the engines, and say what marks mean."""
     present = dict.fromkeys(name for speed in speeds for name in speed.table["engine"])
     marks = [Line2D([], [], label=name, **_look(name)) for name in present]
-    plain_mark = {"marker": "o", "ls": "none", "color": INK}
+    plain_mark: dict[str, Any] = {"marker": "o", "ls": "none", "color": INK}
     marks += [
         Line2D([], [], **plain_mark, label="proves its plan"),
         Line2D([], [], **plain_mark, mfc="white", label="heuristic"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -30,9 +31,11 @@ class Label:
     needed: bool
 
 
-def place(figure: Figure, labels: Sequence[Label], taken: Sequence[tuple[Axes, float, float]]) -> None:
+def place(
+    figure: Figure, labels: Sequence[Label], taken: Sequence[tuple[Axes, float, float]]
+) -> None:
     """Write labels where there is room, the needed ones first, around points that are taken."""
-    FigureCanvasAgg(figure).draw()  # which settles where everything is
+    FigureCanvasAgg(figure).draw()  # type: ignore[no-untyped-call]  # which settles where everything is
     scale = figure.dpi / 72
     boxes = [_around(axes, x, y, ROOM * scale) for axes, x, y in taken]
     boxes += [text.get_window_extent() for axes in figure.axes for text in axes.texts]
@@ -103,8 +106,9 @@ def _spot(text: Annotation, label: Label, boxes: Sequence[Bbox], scale: float) -
         return None
     dx, dy, box = best
     text.set_position((dx, dy))
-    text.set_horizontalalignment(_side(dx, "left", "center", "right"))
-    text.set_verticalalignment(_side(dy, "bottom", "center", "top"))
+    across: dict[float, Any] = {0.0: "left", 0.5: "center", 1.0: "right"}
+    up: dict[float, Any] = {0.0: "bottom", 0.5: "center", 1.0: "top"}
+    text.set(ha=across[_share(dx)], va=up[_share(dy)])
     if float(np.hypot(dx, dy)) > FAR:
         _lead(label, (dx, dy))
     return box
@@ -113,10 +117,6 @@ def _spot(text: Annotation, label: Label, boxes: Sequence[Bbox], scale: float) -
 def _share(shift: float) -> float:
     """Return which share of a text lies before its anchor."""
     return 0.0 if shift > 1 else 1.0 if shift < -1 else 0.5
-
-
-def _side(shift: float, above: str, between: str, below: str) -> str:
-    return above if shift > 1 else below if shift < -1 else between
 
 
 def _outside(box: Bbox, room: Bbox) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -19,13 +19,7 @@ from seqopt._interrupts import ending
 from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of
 from seqopt.errors import ProblemError, SeqoptError, TimeUpError
 from seqopt.plan._layers import on_the_way
-from seqopt.plan.calling.formulation import (
-    End,
-    Formulation,
-    FormulationKind,
-    On,
-    formulations,
-)
+from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, On, formulations
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import layers_of, natural, solve
 from seqopt.problem.problem import Aim, Problem
@@ -35,8 +29,18 @@ from seqopt.work.progress import Stage, Tell
 
 TIMES = 3
 UNPROVEN = {On.LAYERS: "cascade", On.STATES: "schedule_search"}  # what needs the fewest models
-Clock = Callable[[], float]
 Found = TypeVar("Found")
+
+
+@dataclass(frozen=True)
+class Timer:
+    """What tells the time, s, and what ends a block in time by a `TimeoutError`."""
+
+    now: Callable[[], float] = time.perf_counter
+    within: Callable[[float], AbstractContextManager[None]] = ending
+
+
+WALL = Timer()
 
 
 @dataclass(frozen=True)
@@ -61,7 +65,7 @@ class _Stage:
     problem: Problem
     reference: Reference
     seconds: float
-    clock: Clock
+    timer: Timer
 
     def posed(self) -> Problem:
         """Return the problem with an engine of its own, of which nothing is computed yet."""
@@ -74,15 +78,18 @@ class _Stage:
 
     def least(self, call: Callable[[], Found]) -> tuple[float, Found]:
         """Return the least time that a call takes, and what it returns; `TimeoutError` if late."""
-        spent, best = 0.0, np.inf
-        for done in range(TIMES):
-            if done and spent * (done + 1) / done > self.seconds:
+        start = self.timer.now()
+        with self.timer.within(self.seconds):
+            found = call()
+        best = spent = self.timer.now() - start
+        for _ in range(1, TIMES):
+            if spent + best > self.seconds:
                 break
-            began, start = time.perf_counter(), self.clock()
-            with ending(self.seconds):
+            start = self.timer.now()
+            with suppress(TimeoutError), self.timer.within(self.seconds):
                 found = call()
-            best = min(best, self.clock() - start)
-            spent += time.perf_counter() - began
+                best = min(best, self.timer.now() - start)
+            spent += self.timer.now() - start
         return best, found
 
     def rows(self, ways: list[_Way]) -> Iterator[dict[str, object]]:
@@ -123,11 +130,11 @@ class _Stage:
             seconds, plan = self.least(call)
         except (SeqoptError, TimeoutError) as error:
             return self._without(_reason(error))
-        error = np.nan
-        with suppress(TimeoutError, SeqoptError), ending(self.seconds):
-            error = self.reference.error(plan.engine, plan.steps)
+        off = np.nan
+        with suppress(TimeoutError, SeqoptError), self.timer.within(self.seconds):
+            off = self.reference.error(plan.engine, plan.steps)
         status = DONE if plan.ended is End.DONE else CUT
-        found = {"seconds": before + seconds, "gap": self.reference.gap(plan), "error": error}
+        found = {"seconds": before + seconds, "gap": self.reference.gap(plan), "error": off}
         return {**found, "status": status, "why": ""}
 
 
@@ -140,7 +147,9 @@ def _ways(problem: Problem) -> list[_Way]:
     """Return what chooses: formulations that minimize the same, and a search without proof."""
     on = natural(problem)
     if on not in UNPROVEN:
-        raise ProblemError(f"speed: it is measured where grips or states are chosen, not {on.value}")
+        raise ProblemError(
+            f"speed: it is measured where grips or states are chosen, not {on.value}"
+        )
     known = [f for f in formulations().values() if on in (f.on, *f.also)]
     known = [f for f in known if f.aim is not Aim.PEAK]  # another aim, with gaps of its own
     unproven = [_Way(f, proof=False) for f in known if f.name == UNPROVEN[on]]
@@ -148,14 +157,11 @@ def _ways(problem: Problem) -> list[_Way]:
 
 
 def speed_accuracy(
-    problem: Problem,
-    seconds: float = 10.0,
-    progress: Tell = lambda _: None,
-    clock: Clock = time.perf_counter,
+    problem: Problem, seconds: float = 10.0, progress: Tell = lambda _: None, timer: Timer = WALL
 ) -> SpeedTable:
     """Solve a problem by every engine and formulation, each within so many seconds.
 
-    ``problem``: with the engine that the others are compared with; ``clock``: which tells the
+    ``problem``: with the engine that the others are compared with; ``timer``: which tells the
     time. Raises `ProblemError` if the problem is of another kind; `TimeUpError` if the reference
     itself takes longer.
     """
@@ -163,7 +169,7 @@ def speed_accuracy(
     recipe = recipe_of(problem.engine)
     name = type(problem.engine).__name__ if recipe is None else recipe.engine
     try:
-        with ending(seconds):
+        with timer.within(seconds):
             reference.prepare()
     except TimeoutError:
         raise TimeUpError(
@@ -174,7 +180,7 @@ def speed_accuracy(
     names = [name, *(each for each in ENGINES if each != name)] if recipe else [name]
     for done, each in enumerate(names):
         progress(Stage(f"speed of {each}", done / len(names)))
-        stage = _Stage(each, problem, reference, seconds, clock)
+        stage = _Stage(each, problem, reference, seconds, timer)
         try:
             stage.posed()
         except SeqoptError as error:

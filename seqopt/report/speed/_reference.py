@@ -53,7 +53,7 @@ class Reference:
             raise KeyboardInterrupt
         if plan.ended is not End.DONE or plan.certificate is None:
             raise SolverError(f"{plan.formulation.name} ended early: no optimum is proven")
-        return plan.certificate.values
+        return plan.certificate.values  # noqa: PD011  # of goals
 
     def gap(self, plan: Plan) -> float:
         """Return how far a plan is above the optimum, over its size; infinite if not allowed."""
@@ -78,7 +78,9 @@ class Reference:
 
     def error(self, engine: Engine, steps: Sequence[Step]) -> float:
         """Return the largest difference of a response of steps, over the largest of its kind."""
-        pairs = zip(self._kinds(engine, steps), self._kinds(self.problem.engine, steps), strict=True)
+        pairs = zip(
+            self._kinds(engine, steps), self._kinds(self.problem.engine, steps), strict=True
+        )
         found = max(
             float(np.nanmax(np.abs(own - known)) / (np.nanmax(np.abs(known)) or 1.0))
             for own, known in pairs

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -26,15 +26,15 @@ USUAL_NAMES = (USUAL[On.LAYERS], USUAL[On.STATES])
 def dominated(table: pd.DataFrame) -> Bools:
     """Return which rows another one beats: at least as good in everything, and better in something.
 
-    ``table``: with ``seconds``, ``gap`` and ``error``. A row without a plan is beaten. Times count
-    as equal where they differ by less than `SAME`, so that noise beats nobody.
+    ``table``: with ``seconds``, ``gap``, ``error`` and ``exact``: what proves its plan is not
+    beaten by what does not. A row without a plan is beaten. Times count as equal where they differ
+    by less than `SAME`, so that noise beats nobody.
     """
     known = np.isfinite(table[["seconds", "gap", "error"]].to_numpy(float)).all(axis=1)
-    seconds = table["seconds"].to_numpy(float)
+    seconds, proves = table["seconds"].to_numpy(float), table["exact"].to_numpy(bool)
     no_later = seconds[:, None] <= SAME * seconds
     better = seconds[:, None] * SAME < seconds
-    for name in ("gap", "error"):
-        values = table[name].to_numpy(float)
+    for values in (table["gap"].to_numpy(float), table["error"].to_numpy(float), ~proves):
         no_later &= values[:, None] <= values
         better |= values[:, None] < values
     beats = no_later & better & known[:, None]
@@ -91,24 +91,19 @@ class SpeedTable:
 
     @cached_property
     def take(self) -> pd.Series[float]:
-        """The row to take: of the most accurate, the soonest.
+        """The row to take: the most accurate, one that proves its plan if any does, the soonest.
 
-        Of those that are equally soon one that proves its plan, of the reference if it can be, and
-        the usual formulation.
+        Of those that are equally soon one of the reference, and the usual formulation.
         """
         best = self.table[self.kept & (self.table["status"] == DONE)]
-        best = best[best["error"] == best["error"].min()]
-        best = best[best["gap"] == best["gap"].min()]
+        for name in ("error", "gap"):
+            best = best[best[name] == best[name].min()]
+        best = best[best["exact"] == best["exact"].max()]
         best = best[best["seconds"] <= SAME * best["seconds"].min()]
-        by = pd.DataFrame(
-            {
-                "heuristic": ~best["exact"].astype(bool),
-                "other": best["engine"] != self.reference,
-                "unusual": ~best["formulation"].isin(USUAL_NAMES),
-                "seconds": best["seconds"],
-            }
-        )
-        return best.loc[by.sort_values([*by]).index[0]]
+        other, usual = best["engine"] != self.reference, best["formulation"].isin(USUAL_NAMES)
+        by = pd.DataFrame({"other": other, "unusual": ~usual, "seconds": best["seconds"]})
+        found: pd.Series[float] = best.loc[by.sort_values([*by]).index[0]]
+        return found
 
     @property
     def sentence(self) -> str:
@@ -122,16 +117,26 @@ class SpeedTable:
         sooner = self.table[self.kept & (self.table["seconds"] * SAME < took["seconds"])]
         if sooner.empty:
             return f"{said}; nothing else is sooner by more than a tenth."
-        first = sooner.loc[sooner["seconds"].idxmin()]
-        lost = [f"its plan {100 * first['gap']:.2g} % above the best"] if first["gap"] else []
-        lost += [f"responses off by {error_text(first['error'])}"] if first["error"] else []
-        return (
-            f"{said}; sooner is {way_named(first)}, {seconds_text(first['seconds'])}, "
-            f"{' and '.join(lost)}."
-        )
+        at: Any = sooner["seconds"].idxmin()
+        first: pd.Series[float] = sooner.loc[at]
+        lost = "its plan is the best one too, which it does not prove"
+        lost = f"its plan is {100 * first['gap']:.2g} % above the best" if first["gap"] else lost
+        if first["error"] > took["error"]:
+            lost += f", responses are off by {error_text(first['error'])}"
+        return f"{said}; sooner is {way_named(first)} in {seconds_text(first['seconds'])}: {lost}."
+
+    def facts(self) -> dict[str, object]:
+        """Return all of it as plain values, for scripts."""
+        names = ("reference", "limit", "sentence")
+        rows = self.table.assign(kept=self.kept)
+        return {name: getattr(self, name) for name in names} | {
+            "take": {name: self.take[name] for name in ("engine", "formulation", "proof")},
+            "rows": rows,
+            "refused": dict(self.refused),
+        }
 
     def rows(self) -> pd.DataFrame:
-        """Return the table with the share of gaps in percent and a mark for what nobody beats."""
+        """Return the table in words, gaps in percent, with a mark for what nobody beats."""
         table = self.table
         names = [way_named(row, engine=False) for _, row in table.iterrows()]
         marks = np.where(self.kept, "yes", "")
@@ -139,13 +144,14 @@ class SpeedTable:
         found["time, s"] = table["seconds"]
         found["above the best, %"] = 100 * table["gap"]
         found["error of responses"] = table["error"]
-        return found.assign(**{"how it ended": table["status"], "not beaten": marks})
+        found["how it ended"], found["not beaten"] = table["status"], marks
+        return found
 
     def lines(self) -> Iterator[str]:
         """Yield the table in at most 80 columns, an engine after the other."""
         yield f"{'':25}{'seconds':>9}{'gap':>10}{'error':>10}"
         for name, own in self.table.groupby("engine", sort=False):
-            yield f"{name}, the reference" if name == self.reference else str(name)
+            yield str(name) + ", the reference" * (name == self.reference)
             without = own[own["gap"].isna()]
             for at, row in own.drop(without.index).iterrows():
                 mark = "*" if self.kept[self.table.index.get_loc(at)] else " "
@@ -154,10 +160,10 @@ class SpeedTable:
                     f"{mark} {way_named(row, engine=False):23}{_digits(row['seconds']):>9}"
                     f"{gap_text(row['gap']):>10}{error_text(row['error']):>10}{late}"
                 )
-            for why, rows in without.groupby("why", sort=False):
-                names = [way_named(row, engine=False) for _, row in rows.iterrows()]
-                what = names[0] if len(names) == 1 else f"{len(names)} formulations"
-                said = str(why) or f"not ready after {self.limit:g} s"
+            for _, rows in without.groupby("why", sort=False):
+                one = way_named(rows.iloc[0], engine=False)
+                what = one if len(rows) == 1 else f"{len(rows)} formulations"
+                said = str(own["why"][rows.index[0]]) or f"not ready after {self.limit:g} s"
                 yield f"  {what}: {said}"
         for name, why in self.refused.items():
             yield f"{name}: {why}"
