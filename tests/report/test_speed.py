@@ -38,6 +38,14 @@ def made(*rows):
     return SpeedTable("arch", 7, "loop", "compliance", 9.0, table_of(*rows))
 
 
+FOUR = (
+    ("compliance", "overlap_dp", True, True, 0.1, 0.0, 0.0),
+    ("compliance", "cascade", False, False, 0.05, 0.02, 0.0),
+    ("frame", "overlap_dp", True, True, 30.0, 0.0, 2e-6),
+    ("compliance", "overlap_mip", True, True, 0.3, 0.0, 0.0),
+)
+
+
 def beats(one, other):
     """Return whether a row beats another, by the definition."""
     pairs = [*zip(one[1:], other[1:], strict=True)]

@@ -72,7 +72,7 @@ EXAMPLES = (
     "seqopt compare wall:columns=6,courses=4 --out wall",
     "seqopt compare arch25 --criteria worst-ratio --json",
     "seqopt compare arch25 --grips 1e5..1e9",
-    "seqopt compare arch25 --speed --out speed",
+    "seqopt compare arch25 --speed 20 --out speed",
 )
 WRITTEN = {
     "--out DIR": "write tables, figures and a page with all builds",
@@ -152,7 +152,7 @@ def run(options: argparse.Namespace) -> Answer:
         page = {PAGE: comparison_page(engine, result)}
         files |= softness_files(softly) | speed_files(result.speed)
         written = write_outputs(options, lambda: files | page)
-        blocks.append(_where(options.out))
+        blocks.append(_where(options.out, speed=result.speed is not None))
     else:
         more = "" if options.details else "; --details shows more here"
         blocks.append(wrapped(f"--out DIR writes tables, figures and a step viewer{more}."))
@@ -219,13 +219,15 @@ def _fixed(result: Comparison) -> list[str]:
     return [name for name in map(str, fixed) if name in _shown_tables(result)]
 
 
-def _where(folder: Path) -> str:
+def _where(folder: Path, *, speed: bool) -> str:
     """Return which file of a folder is for what."""
+    timed = "\n  speed.csv: a row per engine and formulation" * speed
     return (
         f"written to {folder}\n"
         f"  {PAGE}: every build step by step; open it in a browser\n"
         "  comparison.csv: a row per way to build; steps_NAME.csv: a row per step of each\n"
         "  summary.json: the criteria with their numbers, the engine, and versions of packages"
+        f"{timed}"
     ) + ("" if figure_notes() else "\n  *.png, *.svg: the figures")
 
 
