@@ -117,6 +117,13 @@ def test_every_stored_figure_is_stated_in_one_place_or_more():
             assert sum(f"{{{{ {name} }}}}" in page for page in pages) == 1, name
 
 
+SHOWN = {
+    "arch": "- The reference arch",
+    "vault": "A barrel vault of 46 blocks",
+    "wall": "A wall of 12 bricks",
+}  # what the README calls the scenes of its chart
+
+
 def readme_figures():
     """What the README states of stored rows, and where a change of either would show."""
     speed = pd.read_csv(RESULTS / "engine_speed.csv", index_col=0)["value"]
@@ -128,6 +135,9 @@ def readme_figures():
         r"takes ([\d,]+) times as long for the same choice \(([\d,]+) times on an arch": [
             STATED["frame_times"],
             STATED["frame_times_least"],
+        ],
+        "".join(rf"{scene}: (Take .+?\.) (?:- )?" for scene in SHOWN.values()): [
+            STATED[f"take_{name}"] for name in SHOWN
         ],
         r"is ([\d,]+) times as fast in the median of five rounds \(([\d,]+) in the lowest\)": [
             two(speed["ratio_median"]),

@@ -37,6 +37,7 @@ def ending_by_processor(seconds: float) -> Iterator[None]:
         _thread.interrupt_main()
 
     before = signal.signal(signal.SIGPROF, end)
+    heard = signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job hears none
     signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
@@ -47,6 +48,7 @@ def ending_by_processor(seconds: float) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, before)
+        signal.signal(signal.SIGINT, heard)
 
 
 PROCESSOR = Timer(time.process_time, ending_by_processor)

@@ -100,7 +100,10 @@ def _seen(speed: SpeedTable, name: str) -> pd.DataFrame:
 
 def _points(axes: Axes, speed: SpeedTable, name: str) -> Iterator[tuple[Axes, float, float]]:
     """Draw a point for every plan, those that another one beats pale; yield where they are."""
-    for _, row in _seen(speed, name).sort_values("kept").iterrows():
+    seen = _seen(speed, name).sort_values("kept")
+    spots = pd.DataFrame({"x": np.log10(seen["seconds"]).round(2), "y": seen["height"]})
+    spots = spots.join(seen[["engine", "exact", "kept"]])  # one pale point on another is not pale
+    for _, row in seen[~spots.duplicated()].iterrows():
         alpha, size = (1.0, 6.5) if row["kept"] else (PALE, 5.5)
         mark = _look(str(row["engine"]), filled=bool(row["exact"]))
         at = float(row["seconds"]), float(row["height"])
@@ -113,13 +116,15 @@ def _points(axes: Axes, speed: SpeedTable, name: str) -> Iterator[tuple[Axes, fl
 
 def _named(axes: Axes, speed: SpeedTable, name: str) -> Iterator[Label]:
     """Yield words for points: above for formulations, each once a level; below for engines."""
-    seen, took = _seen(speed, name).sort_values("seconds"), _index(speed)
+    seen, took, named = _seen(speed, name).sort_values("seconds"), _index(speed), set[str]()
     for height, level in seen.groupby("height"):
         level = level.sort_values("kept", ascending=False, kind="stable")  # noqa: PLW2901
         if name == "error":
             first: pd.Series[float] = level.loc[took] if took in level.index else level.iloc[0]
             engines = _engines(level, str(first["engine"]))
-            yield Label(axes, _at(first, height), engines, bool(first["kept"]))
+            if engines not in named:
+                yield Label(axes, _at(first, height), engines, bool(first["kept"]))
+            named.add(engines)
         else:
             yield from _named_once(axes, level, height, took)
 

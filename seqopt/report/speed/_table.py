@@ -53,12 +53,11 @@ class SpeedTable:
 
     Examples
     --------
-    >>> import seqopt
-    >>> from seqopt.report import compare
-    >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("wall:columns=2,courses=2"))
-    >>> found = compare(engine, seqopt.CRITERIA["worst-ratio"], speed=1.0).speed
-    >>> found.take["engine"] in seqopt.engines.registry.ENGINES, float(found.take["gap"])
-    (True, 0.0)
+    >>> rows = [("compliance", "overlap_dp", True, True, 0.1, 0.0, 0.0, "done", "")]
+    >>> names = ["engine", "formulation", "proof", "exact", "seconds", "gap", "error"]
+    >>> table = pd.DataFrame(rows, columns=[*names, "status", "why"])
+    >>> print(SpeedTable("arch25", 25, "three-robot", "compliance", 10.0, table).sentence[:55])
+    Take compliance with overlap_dp: the proven best plan i
     """
 
     scene: str
