@@ -140,10 +140,8 @@ def compare(
 
     Parameters
     ----------
-    engine : Engine
-        What computes responses; it has the scene.
-    criterion : Criterion
-        What a step costs.
+    engine, criterion : Engine, Criterion
+        What computes responses, and has the scene; what a step costs.
     progress : callable, optional
         Told how far it is, in a few words or as a `seqopt.work.Stage`.
     robots : sequence of str, optional
@@ -151,8 +149,7 @@ def compare(
     prover : BuildProver, optional
         Says which steps stand; by default dry, and with epoxy.
     speed : float, optional
-        Seconds for each engine and formulation, if their speed is to be set against their accuracy;
-        ``engine`` is then what the others are compared with.
+        Seconds for each engine and formulation, to set their speed against their accuracy.
 
     Returns
     -------
@@ -167,22 +164,32 @@ def compare(
     tables |= {name: plan.responses() for name, plan in plans.items()}
     rows |= {name: _row(plan) for name, plan in plans.items()}
     loop = None if problem is None else _facts(problem, rows, robots)
-    own = _free_criterion(criterion, [largest(scene, tables[str(name)]) for name in maxima])
-    free, refused = _free_plan(engine, own, robots, progress)
+    fixed = [largest(scene, tables[str(name)]) for name in maxima]
+    free, refused = _free_plan(engine, _free_criterion(criterion, fixed), robots, progress)
     measured = _speed(engine, (problem, free), seconds=speed, progress=progress) if speed else None
-    notes, criteria = notes + refused, dict[str, Criterion]()
+    notes += refused + _loop_notes(scene, problem)
     if free is not None:
         tables[FREE], rows[FREE] = free.responses(), _free_row(free)
-        criteria[FREE] = free.states.criterion
-    if problem is not None:
-        criteria = {problem.schedule.method: problem.criterion, **criteria}
-        notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
     verdicts = (prover or BuildProver(engine.network, progress=progress)).of_tables(tables)
     table = _table(rows, left := (within := LinearRange(engine)).of_builds(tables), verdicts)
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
-    found = (maxima, printed, table, tables, loop, tuple(notes), refusal)
-    return Comparison(*found, left, criteria, verdicts, what_was_enough(within, tables), measured)
+    found = (maxima, printed, table, tables, loop, tuple(notes), refusal, left)
+    judged = (_criteria(problem, free), verdicts, what_was_enough(within, tables))
+    return Comparison(*found, *judged, measured)
+
+
+def _loop_notes(scene: Scene, loop: Layers | None) -> list[str]:
+    """Return which robots never grip in a loop, in words."""
+    if loop is None:
+        return []
+    return idle_note(scene, f"{loop.schedule.method} loop", loop.schedule.steps)
+
+
+def _criteria(loop: Layers | None, free: Plan | None) -> dict[str, Criterion]:
+    """Return the criteria of the loop and the free schedule, by the problem."""
+    found = {} if loop is None else {loop.schedule.method: loop.criterion}
+    return found | ({} if free is None else {FREE: free.states.criterion})
 
 
 def _speed(

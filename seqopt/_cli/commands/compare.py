@@ -30,6 +30,7 @@ from seqopt._cli.options import (
     form_options,
     robots_option,
     scene_options,
+    speed_option,
 )
 from seqopt._cli.outputs import (
     comparison_files,
@@ -40,10 +41,9 @@ from seqopt._cli.outputs import (
     write_outputs,
 )
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import _parse_grip_range, asked_criterion, number_word, parse_robots
+from seqopt._cli.values import _parse_grip_range, asked_criterion, parse_robots, speed_seconds
 from seqopt.arms.reach import find_postures
 from seqopt.engines.registry import provenance
-from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import FormulationKind, formulations
 from seqopt.problem.criteria import RankSum
@@ -51,7 +51,6 @@ from seqopt.problem.requirements import Criterion
 from seqopt.report._pages import PAGE, comparison_page
 from seqopt.report.comparison import CLOSED, Comparison, compare
 from seqopt.report.softness import _softness_lines, held_softly, turning_points
-from seqopt.report.speed._table import SpeedTable
 from seqopt.report.text import format_details
 from seqopt.responses.table import builds_in_words
 from seqopt.scene.scene import Scene
@@ -108,14 +107,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     scene_options(basic)
     robots_option(basic, "all methods, each of which takes as many as it needs")
     declare(basic, WRITTEN)
-    basic.add_argument(
-        "--speed",
-        metavar="SECONDS",
-        nargs="?",
-        const="10",
-        help="also chart speed against accuracy: the loop by every engine and formulation, each "
-        "within so many seconds (10); errors are those beside the engine that --engine names",
-    )
+    speed_option(basic)
     criterion_options(command)
     declare(engine_options(command), POSTURES)
     form_options(command, strict=True, builds=True)
@@ -123,7 +115,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Answer:
     """Compare all ways to build a scene."""
-    grips, seconds = _parse_grip_range(options.grips), _speed_seconds(options.speed)
+    grips, seconds = _parse_grip_range(options.grips), speed_seconds(options.speed)
     scene = asked_scene(options, ranged=True)
     find_postures(scene, options.cache, options.tell)
     engine = asked_engine(options, build_network(scene))
@@ -133,18 +125,12 @@ def run(options: argparse.Namespace) -> Answer:
     robots = parse_robots(options.robots)
     result = compare(engine, criterion, options.tell, robots, prover, seconds)
     about = {"scene": scene.name, "criteria": _criteria(result), **provenance(engine)}
-    text, headings = _tell(result, scene, criterion)
-    blocks = [text]
-    if options.details:
-        blocks.append(format_details(result, scene))
+    blocks, headings = _sections(result, scene, criterion, details=options.details)
     softly = held_softly(engine, _shown_tables(result), grips, options.tell)
     turns = turning_points(softly, _fixed(result)) if grips else ()
     if grips:
         blocks += _softly(softly, turns)
         headings = (*headings, SOFTLY, TURNS)
-    if result.speed is not None:
-        blocks.append(_speed(result.speed))
-        headings = (*headings, SPEED)
     written: tuple[Path, ...] = ()
     if options.out is not None:
         options.tell("drawing figures")
@@ -177,25 +163,15 @@ def run(options: argparse.Namespace) -> Answer:
     return strictly(answer, options, over, left, result.verdicts)
 
 
-def _speed_seconds(text: str | None) -> float:
-    """Return how long each engine and formulation may take, s; zero if speed is not asked for."""
-    if text is None:
-        return 0.0
-    try:
-        return number_word(text, "--speed")
-    except ProblemError as error:
-        raise ProblemError(f"{error}; give seconds, and the scene before it") from None
-
-
-def _speed(table: SpeedTable) -> str:
-    """Return speed and accuracy of every engine and formulation, in at most 80 columns."""
-    about = (
-        f"The {table.method} problem, {table.limit:g} s for each. Seconds: from scene to plan. "
-        "Gap: of the plan, above the proven optimum. Error: of its responses, beside those of "
-        f"{table.reference}, over the largest of their kind. *: no other is better in one and as "
-        "good in the others; times count as equal within a tenth."
-    )
-    return "\n".join([SPEED, wrapped(table.sentence), "", *table.lines(), "", wrapped(about)])
+def _sections(
+    result: Comparison, scene: Scene, criterion: Criterion, *, details: bool
+) -> tuple[list[str], tuple[str, ...]]:
+    """Return what a comparison found as blocks of lines, and their headings."""
+    text, headings = _tell(result, scene, criterion)
+    blocks = [text, format_details(result, scene)] if details else [text]
+    if result.speed is not None:
+        blocks.append("\n".join([SPEED, *result.speed.told(wrapped)]))
+    return blocks, (*headings, SPEED)
 
 
 def _softly(table: pd.DataFrame, turns: Sequence[str]) -> list[str]:

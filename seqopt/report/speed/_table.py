@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -145,6 +145,16 @@ class SpeedTable:
         found["error of responses"] = table["error"]
         found["how it ended"], found["not beaten"] = table["status"], marks
         return found
+
+    def told(self, wrapped: Callable[[str], str]) -> Iterator[str]:
+        """Yield what to take, the table, and what its columns are, as lines."""
+        yield from (wrapped(self.sentence), "", *self.lines(), "")
+        yield wrapped(
+            f"The {self.method} problem, {self.limit:g} s for each. Seconds: from scene to plan. "
+            "Gap: of the plan, above the proven optimum. Error: of its responses, beside those of "
+            f"{self.reference}, over the largest of their kind. *: none is better in one of these, "
+            "or proves more, and as good in the rest; times within a tenth count as equal."
+        )
 
     def lines(self) -> Iterator[str]:
         """Yield the table in at most 80 columns, an engine after the other."""
