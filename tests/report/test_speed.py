@@ -92,6 +92,15 @@ def test_what_to_take_is_computed():
     assert "which it does not prove" in luck.sentence
 
 
+def test_long_reasons_are_wrapped():
+    table = table_of(*FOUR)
+    table.loc[2, ["gap", "error", "why"]] = [np.nan, np.nan, "brick 5: " + "it is too far " * 9]
+    refused = {"planar": "brick 11: its centroid lies outside the middle plane; " * 3}
+    lines = [*SpeedTable("arch", 7, "loop", "compliance", 9.0, table, refused).lines()]
+    assert max(map(len, lines)) <= 80
+    assert sum("too far" in line for line in lines) > 1
+
+
 @pytest.fixture(scope="module")
 def loop():
     network = seqopt.build_network(small_arch(5))

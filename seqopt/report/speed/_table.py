@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DONE, CUT, FAILED = "done", "cut off", "failed"
+COLUMNS = 80  # of a terminal
 SAME = 1.1  # times that differ by less are equal: repetitions do
 USUAL_NAMES = (USUAL[On.LAYERS], USUAL[On.STATES])
 
@@ -173,9 +175,13 @@ class SpeedTable:
                 one = way_named(rows.iloc[0], engine=False)
                 what = one if len(rows) == 1 else f"{len(rows)} formulations"
                 said = str(own["why"][rows.index[0]]) or f"not ready after {self.limit:g} s"
-                yield f"  {what}: {said}"
+                yield from _wrapped(f"  {what}: {said}")
         for name, why in self.refused.items():
-            yield f"{name}: {why}"
+            yield from _wrapped(f"{name}: {why}")
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(text, COLUMNS, subsequent_indent="    ", break_on_hyphens=False)
 
 
 def way_named(row: pd.Series[float], *, engine: bool = True) -> str:
