@@ -10,7 +10,7 @@ import sys
 import pandas as pd
 import pytest
 
-from experiments.harness.results import RESULTS, markdown, two
+from experiments.harness.results import RESULTS, markdown, stored, two
 from seqopt._cli.arguments import COMMANDS
 from seqopt.plan.calling.formulation import On, exhibits, formulations
 from tests.browser import browsed
@@ -159,6 +159,11 @@ def test_readme_states_what_is_stored(pattern, figures):
 
 def test_readme_in_words_what_is_stored():
     text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    points = stored("speed_points")
+    ended = points[points["scene"].str.startswith("barrel")].groupby("engine")["status"].unique()
+    assert "In the vault the stiff-bar frame fails, and discrete elements need longer" in text
+    assert [*ended["frame"]] == ["failed"]
+    assert [*ended["discrete"]] == ["cut off"]
     speed = pd.read_csv(RESULTS / "engine_speed.csv", index_col=0)["value"]
     assert f"of {round(1 / speed['fast_s_per_set'], -4):,.0f} three-grip sets a second" in text
     assert f"is {round(speed['ratio_median'], -2):,.0f} times as fast in the median" in text

@@ -82,7 +82,7 @@ def test_what_to_take_is_computed():
     assert found.kept.tolist() == [True, True, False, False]
     assert found.sentence == (
         "Take compliance with overlap_dp: the proven best plan in 0.100 s; sooner is compliance "
-        "with cascade, no proof in 0.0500 s: its plan is 2 % above the best."
+        "with cascade (no proof) in 0.0500 s: its plan is 2 % above the best."
     )
     others = made(*FOUR[2:])  # other rows, another sentence
     assert others.sentence.startswith("Take compliance with overlap_mip: the proven best plan")

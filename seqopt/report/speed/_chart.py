@@ -27,12 +27,14 @@ from seqopt.report._style import (
     styled,
 )
 from seqopt.report.speed._labels import Label, place
-from seqopt.report.speed._table import CUT, SpeedTable, error_text, seconds_text
+from seqopt.report.speed._table import CUT, DONE, FAILED, SpeedTable, error_text, seconds_text
 from seqopt.report.text import in_words
 
 ENGINES = ("compliance", "frame", "auto", "discrete", "planar")  # in the order of their looks
 PALE = 0.28
 NONE = 1e-9  # where an error of zero is drawn
+LOST = {CUT: (">", "stopped"), FAILED: ("x", "failed"), DONE: ("^", "not allowed")}  # no point
+LINE = 22  # letters of a line beside a point
 NEAR = 1.35  # times of points that share words differ by less
 LETTER = 0.072  # inches of a letter of a title
 CORNER = 0.16  # share of a panel
@@ -44,7 +46,7 @@ def speed_chart(*speeds: SpeedTable, width: float = WIDTH) -> Figure:
     narrow = int((width - 0.7) / len(speeds) / LETTER)
     titles = [_title(speed, narrow, full=len(speeds) == 1) for speed in speeds]
     lines = max(title.count("\n") for title in titles)
-    figure = new_figure(4.6 + 0.15 * lines + 0.3 * (width < WIDTH), width)
+    figure = new_figure(4.6 + 0.15 * lines + 0.7 * (width < WIDTH), width)
     panels = figure.subplots(
         2, len(speeds), sharex="col", sharey="row", squeeze=False, height_ratios=[3, 2]
     )
@@ -60,7 +62,7 @@ def speed_chart(*speeds: SpeedTable, width: float = WIDTH) -> Figure:
     dress(*panels.ravel())
     if len(speeds) > 1:
         name_panels(*panels[0])
-    _legend(figure, speeds, across=3 if width < WIDTH else 6)
+    _legend(figure, speeds, across=2 if width < WIDTH else 6)
     place(figure, labels, taken)
     return figure
 
@@ -154,7 +156,8 @@ def _named_once(axes: Axes, level: pd.DataFrame, height: object, took: Any) -> I
 def _engines(level: pd.DataFrame, first: str) -> str:
     worst = float(level["error"].max())
     names = dict.fromkeys([first, *level["engine"]])
-    return ", ".join(names) + (f": {error_text(worst)}" if worst else "")
+    said = ", ".join(names) + (f": {error_text(worst)}" if worst else "")
+    return textwrap.fill(said, LINE)
 
 
 def _neighbors(level: pd.DataFrame) -> Iterator[pd.DataFrame]:
@@ -166,23 +169,21 @@ def _neighbors(level: pd.DataFrame) -> Iterator[pd.DataFrame]:
 
 
 def _limits(speed: SpeedTable, gaps: Axes, errors: Axes) -> None:
-    """Draw the end of the time that each had, and who had not finished then."""
-    known = speed.table.loc[speed.table["gap"].notna(), "seconds"]
-    late = speed.table[(speed.table["status"] == CUT) & speed.table["gap"].isna()]
-    high = max(float(known.max()), speed.limit if len(late) else 0.0)
+    """Draw the end of the time that each had, and say who has no point, and why."""
+    table = speed.table[~np.isfinite(speed.table["gap"].to_numpy(float))]
+    known = speed.table.drop(table.index)["seconds"]
+    late = bool((table["status"] == CUT).any())
+    high = max(float(known.max()), speed.limit * late)
     gaps.set(xscale="log", xlim=(float(known.min()) / 2.5, 2.2 * high))
     plain(gaps.xaxis)
-    if late.empty:
-        return
-    for axes in (gaps, errors):
+    for axes in (gaps, errors) if late else ():
         axes.axvline(speed.limit, color=GRAY, lw=0.8, ls=":")
     across = gaps.get_xaxis_transform()
-    for row, (engine, own) in enumerate(late.groupby("engine", sort=False)):
-        at = (speed.limit, 0.95 - 0.085 * row)
-        mark: dict[str, Any] = {**_look(str(engine), filled=False), "marker": ">", "ms": 6}
-        gaps.plot(*at, transform=across, clip_on=False, **mark)
-        count = f"{len(own)} ways" if len(own) > 1 else "1 way"
-        words = f"{engine}: {count} stopped"
+    for row, ((engine, status), own) in enumerate(table.groupby(["engine", "status"], sort=False)):
+        at = (high, 0.95 - 0.085 * row)
+        mark: dict[str, Any] = {**_look(str(engine), filled=False), "ms": 6}
+        gaps.plot(*at, transform=across, clip_on=False, **mark | {"marker": LOST[str(status)][0]})
+        words = f"{engine}: {len(own)} way{'s' * (len(own) > 1)} {LOST[str(status)][1]}"
         beside: dict[str, Any] = {"textcoords": "offset points", "ha": "right", "va": "center"}
         gaps.annotate(words, at, (-7, 0), across, fontsize=SMALL, color=GRAY, **beside)
 

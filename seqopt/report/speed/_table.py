@@ -185,8 +185,8 @@ def _wrapped(text: str) -> list[str]:
 
 
 def way_named(row: pd.Series[float], *, engine: bool = True) -> str:
-    """Return what is typed for a row: ``compliance with overlap_dp``, ``cascade, no proof``."""
-    name = f"{row['formulation']}{'' if row['proof'] else ', no proof'}"
+    """Return what is typed for a row: ``compliance with overlap_dp``, ``cascade (no proof)``."""
+    name = f"{row['formulation']}{'' if row['proof'] else ' (no proof)'}"
     return f"{row['engine']} with {name}" if engine else name
 
 
