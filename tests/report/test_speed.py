@@ -153,6 +153,16 @@ def test_every_way_is_a_row_and_nothing_is_drawn_wrong(loop):
     assert flaws(speed_chart(made(*FOUR), made(*FOUR))) == []
 
 
+@pytest.mark.slow
+def test_states_are_measured_too():
+    engine = ComplianceEngine(seqopt.build_network(small_arch(3)))
+    worst = seqopt.CRITERIA["worst-ratio"]
+    found = speed_accuracy(seqopt.pose(engine, seqopt.FreeRules(), worst, "minmax,steps"), 60.0)
+    assert {"schedule_search", "path_dp", "flow_lp"} <= {*found.table["formulation"]}
+    assert (found.table["gap"] == 0).all()
+    assert len({line.index("%") for line in found.lines() if "%" in line}) == 1  # columns
+
+
 def test_the_chart_shows_both_and_pales_what_is_beaten():
     figure = speed_chart(made(*FOUR))
     gaps, errors = figure.axes

@@ -160,7 +160,7 @@ class SpeedTable:
 
     def lines(self) -> Iterator[str]:
         """Yield the table in at most 80 columns, an engine after the other."""
-        yield f"{'':25}{'seconds':>9}{'gap':>10}{'error':>10}"
+        yield f"{'':29}{'seconds':>9}{'gap':>10}{'error':>10}"
         for name, own in self.table.groupby("engine", sort=False):
             yield str(name) + ", the reference" * (name == self.reference)
             without = own[own["gap"].isna()]
@@ -168,7 +168,7 @@ class SpeedTable:
                 mark = "*" if self.kept[self.table.index.get_loc(at)] else " "
                 late = f"  {CUT}" if row["status"] == CUT else ""
                 yield (
-                    f"{mark} {way_named(row, engine=False):23}{_digits(row['seconds']):>9}"
+                    f"{mark} {way_named(row, engine=False):27}{_digits(row['seconds']):>9}"
                     f"{gap_text(row['gap']):>10}{error_text(row['error']):>10}{late}"
                 )
             for _, rows in without.groupby("why", sort=False):
