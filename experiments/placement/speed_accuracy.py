@@ -43,7 +43,7 @@ from seqopt.study.published import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
 STORE = RESULTS / "runs.csv"
 RATIOS = RESULTS / "worst_ratios.csv"
 POINTS = RESULTS / "speed_points.csv"
-QUICK_SCENES, POINT_LIMIT = ("wall:columns=2,courses=2",), 60.0
+QUICK_SCENES, POINT_LIMIT = ("wall:columns=3,courses=2",), 60.0
 QUICK_WAYS = ("loop, worst ratio", "free, 3 robots")
 LIMIT = 100.0  # seconds per process; what fails is charged as much
 SHIFT = 0.01  # s, of geometric means
@@ -189,7 +189,7 @@ def _points(*, quick: bool, load: bool) -> pd.DataFrame:
     if len(stored) and set(stored["version"]) == {version("seqopt")}:
         return stored
     module = "experiments.placement.parts.speed_points"
-    scenes, seconds = (QUICK_SCENES, 2.0) if quick else (SCENES, POINT_LIMIT)
+    scenes, seconds = (QUICK_SCENES, 5.0) if quick else (SCENES, POINT_LIMIT)
     rows = [row for scene in scenes for row in apart(module, scene, seconds)]
     return pd.DataFrame(rows).assign(version=version("seqopt"), machine=machine())
 
