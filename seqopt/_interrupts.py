@@ -69,6 +69,25 @@ def answered(told: Callable[[], object]) -> Iterator[None]:
 
 
 @contextmanager
+def _heard(over: threading.Event) -> Iterator[None]:
+    """Let an end be heard where interrupts are ignored, as they are in a background job."""
+    before = signal.getsignal(signal.SIGINT)
+
+    def end_only(*_: object) -> None:
+        if over.is_set():
+            raise KeyboardInterrupt
+
+    if before != signal.SIG_IGN:
+        yield
+        return
+    signal.signal(signal.SIGINT, end_only)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
 def ending(seconds: float) -> Iterator[None]:
     """Raise `TimeoutError` between two instructions of a block that takes longer than it may.
 
@@ -88,10 +107,11 @@ def ending(seconds: float) -> Iterator[None]:
     timer = threading.Timer(min(seconds, threading.TIMEOUT_MAX), end)
     timer.daemon = True
     try:
-        timer.start()
-        yield
-        timer.cancel()
-        timer.join()  # an end that is on its way comes now, and not later
+        with _heard(over):
+            timer.start()
+            yield
+            timer.cancel()
+            timer.join()  # an end that is on its way comes now, and not later
     except KeyboardInterrupt:
         if not over.is_set():
             raise

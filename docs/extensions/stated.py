@@ -9,6 +9,7 @@ import pandas as pd
 
 from experiments.harness.results import markdown, stored, two
 from experiments.instances.parts.tables import instance_tables
+from experiments.placement.parts.speed_points import speed_tables
 from seqopt.plan.calling.formulation import On, formulations
 
 UNNEEDED = "not needed without budgets"
@@ -85,6 +86,7 @@ def stated() -> dict[str, str]:
         | _solvers(contest)
         | _budgets(contest)
         | _engines(runs)
+        | _taken(stored("speed_points"))
         | _heuristics(runs, stored("heuristic_gaps"))
         | _shapes(stored("program_shapes"))
         | _outside(stored("outside_assemblies"))
@@ -206,6 +208,15 @@ def _budgets(contest: pd.DataFrame) -> dict[str, str]:
         "highs_memory": two(other["memory_MB"].max() / 1024),
         "lagrangian_below": two(bound.max()),
         "lagrangian_gap": two(100 * priced["proven_gap"].max()),
+    }
+
+
+def _taken(points: pd.DataFrame) -> dict[str, str]:
+    """Return which engine and formulation to take in each scene of README's chart."""
+    names = ("arch", "vault", "wall")
+    return {
+        f"take_{name}": table.sentence
+        for name, table in zip(names, speed_tables(points), strict=True)
     }
 
 

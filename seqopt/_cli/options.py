@@ -202,3 +202,15 @@ def steps_options(takes: Takes, *, required: bool = True) -> None:
     plan = "CSV file of the steps: step, type, bricks, and NAME_node for each robot"
     declare(steps, {"--plan FILE": plan})
     robots_option(takes, "--method")
+
+
+def speed_option(takes: Takes) -> None:
+    """Add what asks for speed against accuracy."""
+    takes.add_argument(
+        "--speed",
+        metavar="SECONDS",
+        nargs="?",
+        const="10",
+        help="also chart speed against accuracy: the loop by every engine and formulation, each "
+        "within so many seconds (10); errors are those beside the engine that --engine names",
+    )

@@ -20,6 +20,7 @@ from seqopt.plan.out_of_sample import Trial
 from seqopt.plan.plan import Plan
 from seqopt.report._pages import PAGE, plan_page
 from seqopt.report.comparison import Comparison
+from seqopt.report.speed._table import SpeedTable
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
 from seqopt.sequence.exports._arm_tasks import _in_postures
 from seqopt.sequence.exports._tasks import plan_tasks, tasks_csv, tasks_json
@@ -64,6 +65,18 @@ def softness_files(table: pd.DataFrame) -> dict[str, bytes | str]:
     from seqopt.report.charts import _softness_chart  # noqa: PLC0415  # matplotlib is an extra
 
     return files | picture_files("grips", _softness_chart(table, [*dict.fromkeys(table["build"])]))
+
+
+def speed_files(table: SpeedTable | None) -> dict[str, bytes | str]:
+    """Return speed against accuracy by file name: as table, and as picture where one is drawn."""
+    if table is None:
+        return {}
+    files: dict[str, bytes | str] = {"speed.csv": csv_text(table.table)}
+    if figure_notes():
+        return files
+    from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
+
+    return files | picture_files("speed", table.plot())
 
 
 TABLES = {

@@ -50,6 +50,16 @@ def number_word(text: str, where: str, *, zero: bool = False) -> float:
     return value
 
 
+def speed_seconds(text: str | None) -> float:
+    """Return how long each engine and formulation may take, s; zero if speed is not asked for."""
+    if text is None:
+        return 0.0
+    try:
+        return number_word(text, "--speed")
+    except ProblemError as error:
+        raise ProblemError(f"{error}; give seconds, and the scene before it") from None
+
+
 def count_word(text: str | None, where: str, most: int, least: int = 1, usual: int = 0) -> int:
     """Return a whole number from the least to the most, or the usual one where none is given.
 

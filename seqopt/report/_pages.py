@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import chain, count
 from pathlib import Path
@@ -10,9 +11,9 @@ from pathlib import Path
 import pandas as pd
 
 from seqopt._files import csv_text
-from seqopt._showing import Page
+from seqopt._showing import Page, display
 from seqopt.engines.interface import Engine
-from seqopt.errors import FileError, ProblemError
+from seqopt.errors import ExtraError, FileError, ProblemError
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.front import Front
 from seqopt.problem.requirements import overloads
@@ -25,7 +26,8 @@ from seqopt.report.comparison import (
     largest,
     shown_table,
 )
-from seqopt.report.page import Build, Scatter, report_page
+from seqopt.report.page import Build, Scatter, _Drawn, report_page
+from seqopt.report.speed._table import SpeedTable
 from seqopt.responses.quantities import _number_text, length_text
 from seqopt.responses.table import OUTSIDE, REMEDY, Departure, LinearRange, analyze, builds_in_words
 from seqopt.scene.scene import Scene
@@ -45,6 +47,7 @@ LEGEND = {OVER: "a robot would hold more than it can", OUTSIDE: "its numbers are
 PAGE = "report.html"
 FIRST = (CLOSED, FREE)  # of a comparison: its other rows may be more than are seen at once
 PLANS = ("plan.csv", "pick.csv", "steps_*.csv")  # of optimize, pareto and compare
+PHONE = 3.75  # inches: as wide as a telephone shows at 100 pixels an inch
 SMALL = 60  # bricks up to which a plan is shown beside the fixed methods
 Tables = Mapping[str, pd.DataFrame]
 
@@ -86,7 +89,7 @@ def _page(
     engine: Engine,
     builds: Sequence[Build],
     sentence: str,
-    tables: Sequence[tuple[str, pd.DataFrame]],
+    tables: Sequence[tuple[str, pd.DataFrame | _Drawn]],
     scatter: Scatter | None = None,
 ) -> str:
     """Return a page of several builds, whose sentence also says what is wrong with some."""
@@ -182,7 +185,10 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     shown = shown.join(_falls(builds))
     shown = shown.sort_values("problem", key=lambda each: ~each.isin(FIRST), kind="stable")
     shown = shown.rename_axis("method or formulation").reset_index()
-    tables = [(_with_legend("Methods and formulations; a click shows the build", shown), shown)]
+    tables: list[tuple[str, pd.DataFrame | _Drawn]] = (
+        [] if result.speed is None else [*_speed_parts(result.speed)]
+    )
+    tables += [(_with_legend("Methods and formulations; a click shows the build", shown), shown)]
     if result.printed is not None:
         printed = result.printed.add_suffix(", printed").rename_axis("largest").reset_index()
         tables.append(("What the paper prints", printed))
@@ -193,6 +199,20 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
         scatter = Scatter("Speed against accuracy: a click shows the plan", points, axes[:1])
     sentence = f"{len(builds)} ways to build {scene.name}, step by step and side by side"
     return _page(engine, builds, sentence, tables, scatter)
+
+
+def _speed_parts(speed: SpeedTable) -> Iterator[tuple[str, pd.DataFrame | _Drawn]]:
+    """Yield speed against accuracy as a picture, where matplotlib is installed, and a table."""
+    title = f"Speed against accuracy, errors beside {speed.reference}"
+    with suppress(ExtraError):
+        draw = display("speed_chart")
+        from seqopt.report._style import WIDTH, picture_files  # noqa: PLC0415  # an extra
+
+        wide, narrow = (
+            picture_files("", draw(speed, width=width))[".png"] for width in (WIDTH, PHONE)
+        )
+        yield title, _Drawn(wide, narrow, speed.sentence)
+    yield f"{title}, in numbers. {speed.sentence}", speed.rows()
 
 
 def folder_page(engine: Engine, folder: Path, prover: BuildProver) -> str:

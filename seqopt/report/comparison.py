@@ -25,8 +25,10 @@ from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve
 from seqopt.problem._arms import arm_faults
 from seqopt.problem.criteria import RankSum, WorstRatio
-from seqopt.problem.problem import Aim
+from seqopt.problem.problem import Aim, Problem
 from seqopt.problem.requirements import Criterion, _prop_faults, overloads
+from seqopt.report.speed._measure import speed_accuracy
+from seqopt.report.speed._table import SpeedTable
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._tolerance import COLUMN, is_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
@@ -106,6 +108,10 @@ class Comparison(Terse):
         table counts the steps that fall, as ``falls_dry``.
     enough : Enough
         Which model was enough for all steps, and what more detailed ones would change.
+    speed : SpeedTable or None
+        How long every engine and formulation takes for the loop, or where there is none the free
+        schedule, and how accurate it is, if that was asked for: ``speed.sentence`` says which to
+        take, ``speed.table`` has the numbers, ``speed.plot()`` draws them.
     """
 
     maxima: pd.DataFrame
@@ -119,6 +125,7 @@ class Comparison(Terse):
     criteria: Mapping[str, Criterion]
     verdicts: Mapping[str, tuple[BuildVerdicts, ...]]
     enough: Enough
+    speed: SpeedTable | None = None
 
 
 def compare(
@@ -127,21 +134,22 @@ def compare(
     progress: Tell = lambda _: None,
     robots: Sequence[str] = (),
     prover: BuildProver | None = None,
+    speed: float = 0.0,
 ) -> Comparison:
     """Analyze every method on an engine's scene and solve its usual loop by every formulation.
 
     Parameters
     ----------
-    engine : Engine
-        What computes responses; it has the scene.
-    criterion : Criterion
-        What a step costs.
+    engine, criterion : Engine, Criterion
+        What computes responses, and has the scene; what a step costs.
     progress : callable, optional
         Told how far it is, in a few words or as a `seqopt.work.Stage`.
     robots : sequence of str, optional
         Of those that take part, as many as a method needs; found from reach by default.
     prover : BuildProver, optional
         Says which steps stand; by default dry, and with epoxy.
+    speed : float, optional
+        Seconds for each engine and formulation, to set their speed against their accuracy.
 
     Returns
     -------
@@ -156,21 +164,50 @@ def compare(
     tables |= {name: plan.responses() for name, plan in plans.items()}
     rows |= {name: _row(plan) for name, plan in plans.items()}
     loop = None if problem is None else _facts(problem, rows, robots)
-    own = _free_criterion(criterion, [largest(scene, tables[str(name)]) for name in maxima])
-    free, refused = _free_plan(engine, own, robots, progress)
-    notes, criteria = notes + refused, dict[str, Criterion]()
+    fixed = [largest(scene, tables[str(name)]) for name in maxima]
+    free, refused = _free_plan(engine, _free_criterion(criterion, fixed), robots, progress)
+    measured = _speed(engine, (problem, free), seconds=speed, progress=progress) if speed else None
+    notes += refused + _loop_notes(scene, problem)
     if free is not None:
         tables[FREE], rows[FREE] = free.responses(), _free_row(free)
-        criteria[FREE] = free.states.criterion
-    if problem is not None:
-        criteria = {problem.schedule.method: problem.criterion, **criteria}
-        notes += idle_note(scene, f"{problem.schedule.method} loop", problem.schedule.steps)
     notes += _add_largest(scene, rows, tables)
     verdicts = (prover or BuildProver(engine.network, progress=progress)).of_tables(tables)
     table = _table(rows, left := (within := LinearRange(engine)).of_builds(tables), verdicts)
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
-    found = (maxima, printed, table, tables, loop, tuple(notes), refusal)
-    return Comparison(*found, left, criteria, verdicts, what_was_enough(within, tables))
+    found = (maxima, printed, table, tables, loop, tuple(notes), refusal, left)
+    judged = (_criteria(problem, free), verdicts, what_was_enough(within, tables))
+    return Comparison(*found, *judged, measured)
+
+
+def _loop_notes(scene: Scene, loop: Layers | None) -> list[str]:
+    """Return which robots never grip in a loop, in words."""
+    if loop is None:
+        return []
+    return idle_note(scene, f"{loop.schedule.method} loop", loop.schedule.steps)
+
+
+def _criteria(loop: Layers | None, free: Plan | None) -> dict[str, Criterion]:
+    """Return the criteria of the loop and the free schedule, by the problem."""
+    found = {} if loop is None else {loop.schedule.method: loop.criterion}
+    return found | ({} if free is None else {FREE: free.states.criterion})
+
+
+def _speed(
+    engine: Engine, found: tuple[Layers | None, Plan | None], seconds: float, progress: Tell
+) -> SpeedTable:
+    """Return speed and accuracy for the loop or, where there is none, the free schedule."""
+    loop, free = found
+    if loop is not None:
+        problem = Problem(engine, loop.schedule, loop.criterion)
+    elif free is not None:
+        states = free.states
+        problem = Problem(engine, states.rules, states.criterion, states.goals)
+    else:
+        raise ProblemError(
+            f"speed: neither a loop of the robots of {engine.network.scene.name} nor a free "
+            "schedule is possible, so nothing is chosen; leave it out, or change their reach"
+        )
+    return speed_accuracy(problem, seconds, progress)
 
 
 def _table(

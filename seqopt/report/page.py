@@ -51,6 +51,7 @@ RESPONSES = {
 }
 PARTS = {"style": "viewer.css", "three": "three.js", "charts": "charts.js", "viewer": "viewer.js"}
 MOST = 6_000_000  # numbers of fields in a page: about 8 MB
+NARROW = 600  # pixels up to which a screen shows the narrow form of a picture
 LEFT_OUT = "Displacements and axial forces of some builds are left out"
 
 
@@ -105,6 +106,15 @@ class Scatter:
             "logarithmic": [*self.logarithmic],
             "values": {name: known[name].tolist() for name in known},
         }
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """A picture on a page: as PNG for wide screens and for narrow ones, and what it shows."""
+
+    wide: bytes
+    narrow: bytes
+    said: str
 
 
 def _structure_data(network: Network) -> dict[str, object]:
@@ -264,7 +274,7 @@ def report_page(
     engine: Engine,
     builds: Sequence[Build],
     sentence: str,
-    tables: Sequence[tuple[str, pd.DataFrame]] = (),
+    tables: Sequence[tuple[str, pd.DataFrame | _Drawn]] = (),
     scatter: Scatter | None = None,
 ) -> str:
     """Return a page that shows builds of one scene, as HTML that needs nothing else.
@@ -288,7 +298,7 @@ def report_page(
     return _filled(
         title=f"{escape(scene.name)}, step by step",
         sentence=escape(sentence + loading),
-        tables="".join(_table(caption, table) for caption, table in tables),
+        tables="".join(_part(caption, part) for caption, part in tables),
         data=data.replace("<", "\\u003c"),  # so that it cannot end the script it stands in
     )
 
@@ -361,9 +371,19 @@ def _asset(name: str) -> str:
     return resources.files("seqopt").joinpath(f"data/viewer/{name}").read_text(encoding="utf-8")
 
 
-def _table(caption: str, table: pd.DataFrame) -> str:
-    """Return a table as HTML, numbers with four digits."""
-    body = table.to_html(
+def _part(caption: str, part: pd.DataFrame | _Drawn) -> str:
+    """Return a table as HTML, numbers with four digits, or a picture."""
+    if isinstance(part, _Drawn):
+        wide, narrow = (
+            f"data:image/png;base64,{b64encode(png).decode('ascii')}"
+            for png in (part.wide, part.narrow)
+        )
+        return (
+            f'<figure class="drawn"><figcaption>{escape(caption)}</figcaption><picture>'
+            f'<source media="(max-width: {NARROW}px)" srcset="{narrow}">'
+            f'<img src="{wide}" alt="{escape(part.said)}"></picture></figure>'
+        )
+    body = part.to_html(
         index=False, border=0, na_rep="", float_format=_number_text, classes="wide"
     ).replace(' style="text-align: right;"', "")  # as the page does itself
     return f'<figure class="table"><figcaption>{escape(caption)}</figcaption>{body}</figure>'

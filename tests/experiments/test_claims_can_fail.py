@@ -222,6 +222,11 @@ CHECKS = {
         ("runs",),
         *("total", 9.0, {"engine": "rigid bricks", "formulation": "overlap_dp"}),
     ),
+    "speed_accuracy corner": Check(
+        lambda points: all(speed_accuracy.corner_reached(points).values()),
+        ("speed_points",),
+        *("seconds", 0.01, {"engine": "frame"}),
+    ),
     "speed_accuracy free": Check(
         lambda ratios: all(speed_accuracy.free_pays(ratios).values()),
         ("worst_ratios",),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import signal
 import subprocess
 import sys
 import threading
@@ -26,13 +27,13 @@ from experiments.harness.claim import (
 from experiments.harness.runs import ENGINES, NO_PROOF, REFERENCE, rows
 from experiments.placement.parts.speed_charts import (
     data_profile,
-    headline,
     pareto,
     performance_profile,
     profile_charts,
     shifted_mean,
     worst_step_chart,
 )
+from experiments.placement.parts.speed_points import ending_by_processor, points, speed_tables
 from experiments.placement.speed_accuracy import (
     COMPARED,
     KEY,
@@ -132,17 +133,37 @@ def test_the_claim_can_fail(smoke):
 @pytest.mark.xdist_group("smoke")
 def test_charts_and_table_come_from_rows(smoke):
     table = smoke.assign(scene="arch25")
-    for figure in (
-        headline(table),
-        worst_step_chart(table, pd.read_csv(RATIOS)),
-        profile_charts(table),
-    ):
+    for figure in (worst_step_chart(table, pd.read_csv(RATIOS)), profile_charts(table)):
         figure.canvas.draw()
     means = summarize(smoke).set_index("formulation")
     assert means.loc["overlap_dp", "optimal"] == means.loc["overlap_dp", "runs"] == len(COMPARED)
     assert set(specs(quick=True)) < {
         (s, e, "weighted-published", 1) for s in ("chain7",) for e in ENGINES
     }
+
+
+@pytest.mark.slow
+def test_points_are_read_as_they_were_measured():
+    measured = points("wall:columns=2,courses=2", 20.0)
+    (table,) = speed_tables(measured)
+    assert (table.reference, table.limit) == ("compliance", 20.0)
+    assert table.table["seconds"].equals(measured["seconds"])
+    assert table.take["exact"]
+    worse = measured.assign(gap=measured["gap"].where(~measured["exact"], 0.5))
+    (other,) = speed_tables(worse)
+    assert other.sentence != table.sentence
+
+
+def burn():
+    while True:
+        sum(range(1000))
+
+
+def test_processor_time_ends_what_takes_too_long():
+    with pytest.raises(TimeoutError), ending_by_processor(0.02):
+        burn()
+    with pytest.raises(KeyboardInterrupt), ending_by_processor(60.0):
+        signal.raise_signal(signal.SIGINT)
 
 
 def test_pareto_front():

@@ -99,6 +99,19 @@ def test_what_takes_too_long_ends():
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+def test_what_takes_too_long_ends_where_interrupts_are_ignored():
+    """As in a background job: an end comes, an interrupt does not."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with ending(100.0):
+            signal.raise_signal(signal.SIGINT)
+        with pytest.raises(TimeoutError), ending(0.01):
+            wait()
+        assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 def test_what_has_no_time_does_not_begin():
     done = []
     with pytest.raises(TimeoutError), ending(0.0):

@@ -1,20 +1,17 @@
 """The charts of speed against accuracy."""
 
-from typing import Any
-
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from experiments.harness.charts import note, subplots, ticks
-from experiments.harness.results import two
 from experiments.harness.runs import NO_PROOF, REFERENCE
+from experiments.placement.parts.speed_points import speed_tables
 from seqopt.arrays import Floats
 from seqopt.report import _style as inks
 from seqopt.report._style import dress, looks, name_panels, plain, styled
+from seqopt.report.speed._chart import speed_chart
 from seqopt.report.text import in_words
 
 
@@ -127,107 +124,12 @@ def _growth(axes: Axes, runs: pd.DataFrame) -> None:
 
 
 CLOSE = 0.01  # gap up to which an answer counts as close in profiles
-EXACT_GAP = 1e-9  # gaps below are rounding
-SEARCHES = {
-    NO_PROOF: "search of Bruun et al., without proof",
-    "cascade": "the same, its gap computed",
-    "rank_search": "rank search",
-    "beam": "beam search",
-}  # heuristics
-EXACT = {
-    "overlap_dp": "dynamic programming",
-    "overlap_lp": "linear program",
-    "overlap_mip": "integer program",
-}
-LOOKS = looks((*EXACT, "cascade", "rank_search", "beam"))
-ENGINES = {
-    REFERENCE: "exactly rigid bricks",
-    "auto": "automatic choice of engine",
-    "frame 1e7": "stiff-bar frame",
-    "discrete": "discrete elements",
-}
-DONE: dict[str, Any] = {"marker": "o", "color": inks.BLUE, "ms": 8, "ls": "none"}
-WITHOUT = {
-    "marker": "D",
-    "color": inks.VERMILION,
-    "mfc": "white",
-    "ms": 6,
-    "mew": 1.4,
-    "ls": "none",
-}
-SOLID, HATCHED = {"color": inks.BLUE}, {"fc": "white", "ec": inks.VERMILION, "hatch": "////"}
-LABEL: dict[str, Any] = {"va": "center", "in_layout": False}
+LOOKS = looks(("overlap_dp", "overlap_lp", "overlap_mip", "cascade", "rank_search", "beam"))
 
 
-@styled
-def headline(runs: pd.DataFrame) -> Figure:
-    table = runs[(runs["scene"] == "arch25") & (runs["criterion"] == "equations-2-3")]
-    figure, (ways, engines) = subplots(4.9, 2, 1, height_ratios=[7, 5])
-    _ways(ways, table[table["engine"] == REFERENCE].set_index("formulation"))
-    _engines(engines, table)
-    for panel in (ways, engines):
-        panel.spines[["top", "right"]].set_visible(False)
-        panel.tick_params(axis="y", length=0)
-    name_panels(ways, engines)
-    return figure
-
-
-def _ways(axes: Axes, table: pd.DataFrame) -> None:
-    order = [name for name in (*SEARCHES, *EXACT) if name in table.index]
-    least = float(table["total"].get(NO_PROOF, np.nan))
-    for row, name in enumerate(order):
-        time, gap = float(table["total"][name]), float(table["gap"][name])
-        exact = name in EXACT
-        style = (
-            {"color": inks.BLUE}
-            if exact
-            else {"fc": "white", "ec": inks.VERMILION, "hatch": "////"}
-        )
-        axes.barh(row, time, height=0.62, **style)
-        worth = "the best plan, proven" if exact else "the best plan, but not proven"
-        if gap > EXACT_GAP:
-            worth = f"a plan {100 * gap:.2g} % above the best"
-        if name == "overlap_dp":
-            worth += f": {100 * (time / least - 1):.0f} % more time than without proof"
-        note(axes, f"{time:.3f} s, {worth}", (time, row), (5, 0), **LABEL)
-    axes.set_yticks(range(len(order)), [(SEARCHES | EXACT)[name] for name in order])
-    axes.set(ylim=(len(order) - 0.4, -0.6), xlim=(0, 2.4 * float(table["total"][order].max())))
-    title = "Ways to choose the grips of the reference arch, with exactly rigid bricks"
-    axes.set(xlabel="time from scene to plan [s]", title=title)
-    kinds = [Patch(**SOLID, label="exact"), Patch(**HATCHED, label="heuristic")]
-    axes.legend(handles=kinds, loc="upper right")
-
-
-def _engines(axes: Axes, table: pd.DataFrame) -> None:
-    times = table.pivot_table(index="engine", columns="formulation", values="total")
-    ended = table[table["status"] == "time limit"]["engine"].unique()
-    error = table.groupby("engine")["error"].max()
-    names = [name for name in ENGINES if name in times.index]
-    base = float(times["overlap_dp"].get(REFERENCE, np.nan))
-    for row, name in enumerate(names):
-        exact, search = float(times["overlap_dp"][name]), float(times[NO_PROOF][name])
-        if name in ended:
-            axes.plot(exact, row, ">", color=inks.BLUE, mfc="white", ms=8)
-            note(axes, f"stopped after {exact:.0f} s", (exact, row), (8, 0), **LABEL)
-            continue
-        axes.plot([search, exact], [row, row], color=inks.GRAY, lw=1.2, zorder=1)
-        axes.plot(search, row, **WITHOUT)
-        axes.plot(exact, row, **DONE)
-        text = f"{two(exact)} s"
-        if name != REFERENCE:
-            text += f", {two(exact / base)} times as long"
-        if error[name] > 0:
-            text += f"; responses off by {error[name]:.0e}".replace("e-0", "e-")
-        note(axes, text, (exact, row), (9, 0), **LABEL)
-        note(axes, f"{two(search)} s", (search, row), (-8, 0), ha="right", **LABEL)
-    axes.set_yticks(range(len(names)), [ENGINES[name] for name in names])
-    axes.set(ylim=(len(names) - 0.4, -0.6), xscale="log", xlim=(0.01, 2e5))
-    axes.set(xlabel="time from scene to plan [s], logarithmic")
-    axes.set_title("Engines that compute the responses")
-    ticks([0.01, 0.1, 1, 10, 100], axes.xaxis)
-    words = {"exact: dynamic programming": DONE, "heuristic: without proof": WITHOUT}
-    kinds = [Line2D([], [], label=text, **mark) for text, mark in words.items()]
-    axes.legend(handles=kinds, loc="upper right")
+def headline(points: pd.DataFrame) -> Figure:
+    """Return README's chart: what `seqopt compare --speed` draws, for its scenes side by side."""
+    return speed_chart(*speed_tables(points))
 
 
 @styled

@@ -30,16 +30,18 @@ from seqopt._cli.options import (
     form_options,
     robots_option,
     scene_options,
+    speed_option,
 )
 from seqopt._cli.outputs import (
     comparison_files,
     figure_notes,
     require_out,
     softness_files,
+    speed_files,
     write_outputs,
 )
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import _parse_grip_range, asked_criterion, parse_robots
+from seqopt._cli.values import _parse_grip_range, asked_criterion, parse_robots, speed_seconds
 from seqopt.arms.reach import find_postures
 from seqopt.engines.registry import provenance
 from seqopt.network.build import build_network
@@ -69,6 +71,7 @@ EXAMPLES = (
     "seqopt compare wall:columns=6,courses=4 --out wall",
     "seqopt compare arch25 --criteria worst-ratio --json",
     "seqopt compare arch25 --grips 1e5..1e9",
+    "seqopt compare arch25 --speed 20 --out speed",
 )
 WRITTEN = {
     "--out DIR": "write tables, figures and a page with all builds",
@@ -87,6 +90,7 @@ RESPONSES = {
     "D_max": ("displacement,", "0.001 mm", 14),
 }  # above each column of responses, and how wide it is
 SOFTLY = "The same builds, by the stiffness of grips in N/m"
+SPEED = "Speed against accuracy"
 TURNS = "What turns as grips become softer"
 NO_TURN = "nothing does in this range"
 HOW_SOFT = (
@@ -103,6 +107,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     scene_options(basic)
     robots_option(basic, "all methods, each of which takes as many as it needs")
     declare(basic, WRITTEN)
+    speed_option(basic)
     criterion_options(command)
     declare(engine_options(command), POSTURES)
     form_options(command, strict=True, builds=True)
@@ -110,19 +115,17 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Answer:
     """Compare all ways to build a scene."""
-    grips = _parse_grip_range(options.grips)
+    grips, seconds = _parse_grip_range(options.grips), speed_seconds(options.speed)
     scene = asked_scene(options, ranged=True)
     find_postures(scene, options.cache, options.tell)
     engine = asked_engine(options, build_network(scene))
     criterion = asked_criterion(options)
     require_out(options)
     prover = asked_prover(options, engine.network)
-    result = compare(engine, criterion, options.tell, parse_robots(options.robots), prover)
+    robots = parse_robots(options.robots)
+    result = compare(engine, criterion, options.tell, robots, prover, seconds)
     about = {"scene": scene.name, "criteria": _criteria(result), **provenance(engine)}
-    text, headings = _tell(result, scene, criterion)
-    blocks = [text]
-    if options.details:
-        blocks.append(format_details(result, scene))
+    blocks, headings = _sections(result, scene, criterion, details=options.details)
     softly = held_softly(engine, _shown_tables(result), grips, options.tell)
     turns = turning_points(softly, _fixed(result)) if grips else ()
     if grips:
@@ -133,16 +136,17 @@ def run(options: argparse.Namespace) -> Answer:
         options.tell("drawing figures")
         files = comparison_files(result) | {"summary.json": json.dumps(about, indent=2) + "\n"}
         page = {PAGE: comparison_page(engine, result)}
-        files |= softness_files(softly)
+        files |= softness_files(softly) | speed_files(result.speed)
         written = write_outputs(options, lambda: files | page)
-        blocks.append(_where(options.out))
+        blocks.append(_where(options.out, speed=result.speed is not None))
     else:
         more = "" if options.details else "; --details shows more here"
         blocks.append(wrapped(f"--out DIR writes tables, figures and a step viewer{more}."))
     answer = Answer(
         facts=about
         | {"scene": scene_facts(scene), "criterion": criterion.name, **_facts(result)}
-        | ({"grips": {"rows": softly, "turns": list(turns)}} if grips else {}),
+        | ({"grips": {"rows": softly, "turns": list(turns)}} if grips else {})
+        | ({} if result.speed is None else {"speed": result.speed.facts()}),
         text="\n\n".join(blocks),
         headings=headings,
         written=written,
@@ -157,6 +161,17 @@ def run(options: argparse.Namespace) -> Answer:
     over = exceeded(scene, *result.tables.values())
     left = builds_in_words(result.departures)
     return strictly(answer, options, over, left, result.verdicts)
+
+
+def _sections(
+    result: Comparison, scene: Scene, criterion: Criterion, *, details: bool
+) -> tuple[list[str], tuple[str, ...]]:
+    """Return what a comparison found as blocks of lines, and their headings."""
+    text, headings = _tell(result, scene, criterion)
+    blocks = [text, format_details(result, scene)] if details else [text]
+    if result.speed is not None:
+        blocks.append("\n".join([SPEED, *result.speed.told(wrapped)]))
+    return blocks, (*headings, SPEED)
 
 
 def _softly(table: pd.DataFrame, turns: Sequence[str]) -> list[str]:
@@ -180,13 +195,15 @@ def _fixed(result: Comparison) -> list[str]:
     return [name for name in map(str, fixed) if name in _shown_tables(result)]
 
 
-def _where(folder: Path) -> str:
+def _where(folder: Path, *, speed: bool) -> str:
     """Return which file of a folder is for what."""
+    timed = "\n  speed.csv: a row per engine and formulation" * speed
     return (
         f"written to {folder}\n"
         f"  {PAGE}: every build step by step; open it in a browser\n"
         "  comparison.csv: a row per way to build; steps_NAME.csv: a row per step of each\n"
         "  summary.json: the criteria with their numbers, the engine, and versions of packages"
+        f"{timed}"
     ) + ("" if figure_notes() else "\n  *.png, *.svg: the figures")
 
 

@@ -1,0 +1,1 @@
+"""Speed against accuracy: one problem by every engine and formulation, timed and judged."""

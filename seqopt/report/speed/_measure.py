@@ -1,0 +1,191 @@
+"""The same problem by every engine and formulation: how long each takes, and what it finds.
+
+What an engine computes for all formulations, the costs of all choices, is computed once and its
+time is added to each. Everything is done up to `TIMES` times within the limit; the least counts.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, suppress
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+import pandas as pd
+
+from seqopt._interrupts import ending
+from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of
+from seqopt.errors import ProblemError, SeqoptError, TimeUpError
+from seqopt.plan._layers import on_the_way
+from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, On, formulations
+from seqopt.plan.plan import Plan
+from seqopt.plan.solving import layers_of, natural, solve
+from seqopt.problem.problem import Aim, Problem
+from seqopt.report.speed._reference import Reference
+from seqopt.report.speed._table import CUT, DONE, FAILED, SpeedTable
+from seqopt.work.progress import Stage, Tell
+
+TIMES = 3
+UNPROVEN = {On.LAYERS: "cascade", On.STATES: "schedule_search"}  # what needs the fewest models
+Found = TypeVar("Found")
+
+
+@dataclass(frozen=True)
+class Timer:
+    """What tells the time, s, and what ends a block in time by a `TimeoutError`."""
+
+    now: Callable[[], float] = time.perf_counter
+    within: Callable[[float], AbstractContextManager[None]] = ending
+
+
+WALL = Timer()
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A formulation, with its proof or without."""
+
+    formulation: Formulation
+    proof: bool = True
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """What a row says of it."""
+        proves = self.proof and self.formulation.kind is not FormulationKind.HEURISTIC
+        return {"formulation": self.formulation.name, "proof": self.proof, "exact": proves}
+
+
+@dataclass(frozen=True, eq=False)
+class _Stage:
+    """One engine that solves a problem, made anew for every repetition."""
+
+    name: str
+    problem: Problem
+    reference: Reference
+    seconds: float
+    timer: Timer
+
+    def posed(self) -> Problem:
+        """Return the problem with an engine of its own, of which nothing is computed yet."""
+        found = recipe_of(self.problem.engine)
+        if found is None:  # an object of one's own
+            return self.problem.but()
+        options = found.options if self.name in LIMITED or self.name == found.engine else {}
+        network = self.problem.engine.network
+        return self.problem.but(engine=make_engine(self.name, network, options.get("mortar")))  # type: ignore[arg-type]
+
+    def least(self, call: Callable[[], Found]) -> tuple[float, Found]:
+        """Return the least time that a call takes, and what it returns; `TimeoutError` if late."""
+        start = self.timer.now()
+        with self.timer.within(self.seconds):
+            found = call()
+        best = spent = self.timer.now() - start
+        for _ in range(1, TIMES):
+            if spent + best > self.seconds:
+                break
+            start = self.timer.now()
+            with suppress(TimeoutError), self.timer.within(self.seconds):
+                found = call()
+                best = min(best, self.timer.now() - start)
+            spent += self.timer.now() - start
+        return best, found
+
+    def rows(self, ways: list[_Way]) -> Iterator[dict[str, object]]:
+        """Yield a row for every way to choose."""
+        prepared: Problem | None = None
+        before, why = 0.0, ""
+        if self.reference.in_layers:
+            try:
+                before, prepared = self.least(self._prepared)
+            except (SeqoptError, TimeoutError) as error:
+                why = _reason(error)
+        for way in ways:
+            own = prepared if way.proof else None
+            if way.proof and why:
+                found = self._without(why)
+            else:
+                found = self._row(way, own, before if own is not None else 0.0)
+            yield {"engine": self.name, **way.facts, **found}
+
+    def _prepared(self) -> Problem:
+        found = self.posed()
+        _ = layers_of(found).sums
+        return found
+
+    def _without(self, why: str) -> dict[str, object]:
+        late = why == CUT
+        nothing = {"gap": np.nan, "error": np.nan}
+        return {"seconds": self.seconds if late else np.nan, **nothing} | {
+            "status": CUT if late else FAILED,
+            "why": "" if late else why,
+        }
+
+    def _row(self, way: _Way, prepared: Problem | None, before: float) -> dict[str, object]:
+        def call() -> Plan:
+            return on_the_way(solve(prepared or self.posed(), way.formulation, proof=way.proof))
+
+        try:
+            seconds, plan = self.least(call)
+        except (SeqoptError, TimeoutError) as error:
+            return self._without(_reason(error))
+        off = np.nan
+        with suppress(TimeoutError, SeqoptError), self.timer.within(self.seconds):
+            off = self.reference.error(plan.engine, plan.steps)
+        status = DONE if plan.ended is End.DONE else CUT
+        found = {"seconds": before + seconds, "gap": self.reference.gap(plan), "error": off}
+        return {**found, "status": status, "why": ""}
+
+
+def _reason(error: Exception) -> str:
+    """Return why there is no plan, in words; the same for all that take too long."""
+    return CUT if isinstance(error, TimeoutError | TimeUpError) else str(error)
+
+
+def _ways(problem: Problem) -> list[_Way]:
+    """Return what chooses: formulations that minimize the same, and a search without proof."""
+    on = natural(problem)
+    if on not in UNPROVEN:
+        raise ProblemError(
+            f"speed: it is measured where grips or states are chosen, not {on.value}"
+        )
+    known = [f for f in formulations().values() if on in (f.on, *f.also)]
+    known = [f for f in known if f.aim is not Aim.PEAK]  # another aim, with gaps of its own
+    unproven = [_Way(f, proof=False) for f in known if f.name == UNPROVEN[on]]
+    return [*map(_Way, known), *unproven]
+
+
+def speed_accuracy(
+    problem: Problem, seconds: float = 10.0, progress: Tell = lambda _: None, timer: Timer = WALL
+) -> SpeedTable:
+    """Solve a problem by every engine and formulation, each within so many seconds.
+
+    ``problem``: with the engine that the others are compared with; ``timer``: which tells the
+    time. Raises `ProblemError` if the problem is of another kind; `TimeUpError` if the reference
+    itself takes longer.
+    """
+    ways, reference = _ways(problem), Reference(problem)
+    recipe = recipe_of(problem.engine)
+    name = type(problem.engine).__name__ if recipe is None else recipe.engine
+    try:
+        with timer.within(seconds):
+            reference.prepare()
+    except TimeoutError:
+        raise TimeUpError(
+            f"speed within {seconds:g} s: {name}, which the others are compared with, needs longer "
+            "to prove an optimum; give more seconds, or fewer candidates"
+        ) from None
+    rows, refused = list[dict[str, object]](), dict[str, str]()
+    names = [name, *(each for each in ENGINES if each != name)] if recipe else [name]
+    for done, each in enumerate(names):
+        progress(Stage(f"speed of {each}", done / len(names)))
+        stage = _Stage(each, problem, reference, seconds, timer)
+        try:
+            stage.posed()
+        except SeqoptError as error:
+            refused[each] = str(error)
+            continue
+        rows += stage.rows(ways)
+    about = (problem.scene.name, len(problem.scene.bricks), problem.method, name, seconds)
+    return SpeedTable(*about, pd.DataFrame(rows), refused)
