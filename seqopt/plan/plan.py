@@ -467,12 +467,15 @@ def _states_asked(graph: States) -> dict[str, object]:
 
 
 def _bounds(plan: Plan) -> dict[str, float | None]:
-    """Return what no plan stays below, by aim; claimed of a search that ended early."""
+    """Return what no plan stays below, by aim; also claimed of a search that ended early."""
     proof, chosen = plan.certificate, plan.selection
     bounds: tuple[float, ...] = () if proof is None else proof.bounds
     if isinstance(chosen, StatePath):
-        early = proof is None or (chosen.stopped and not isfinite(proof.gap))
-        bounds = (chosen.bound if early else bounds)[: len(plan.states.aims)]
+        if proof is None:
+            bounds = chosen.bound
+        elif chosen.stopped and not isfinite(proof.gap):
+            bounds = tuple(map(max, chosen.bound, bounds))
+        bounds = bounds[: len(plan.states.aims)]
     found = plan._by_goal(bounds) if bounds else {}
     return {name: bound if isfinite(bound) else None for name, bound in found.items()}
 
