@@ -48,6 +48,7 @@ from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import response_table, step_fields
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, StepKind, idle_robots
 from seqopt.stability.steps import stability_table
 
@@ -271,6 +272,10 @@ class Plan(ShownBuild):
         choice = self.choice
         assert not isinstance(self.graph, States | Instance)  # they have no choice
         return self.graph.nodes(choice)
+
+    @property
+    def _begin(self) -> Site | None:
+        return self.graph.rules.begin if isinstance(self.graph, States) else None
 
     @property
     def explored(self) -> tuple[Layers, ...]:

@@ -252,11 +252,11 @@ def plan_values(
 
 def _makespan(problem: States, steps: Sequence[Step], starts: Sequence[float]) -> float:
     """Return how long a build takes, s, and require that no step comes before its mortar holds."""
-    standing, scene = problem.standing, problem.network.scene
+    standing, scene, begin = problem.standing, problem.network.scene, problem.rules.begin
     if standing is None or standing.curing is None:
-        return makespan(scene, steps)
-    check_cured(problem.network, steps, standing, starts)
-    return step_ends(scene, steps, starts)[-1]
+        return makespan(scene, steps, begin)
+    check_cured(problem.network, steps, standing, starts, begin)
+    return step_ends(scene, steps, starts, begin)[-1]
 
 
 def _in_all(
