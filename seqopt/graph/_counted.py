@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from scipy import sparse
-from scipy.optimize import linprog
 
 from seqopt.arrays import Floats
 from seqopt.graph.duality import least_sum
@@ -117,6 +116,8 @@ def _counted(network: Network, rules: FreeRules) -> _Counted:
 
 def _prices(graph: Graph, sizes: Floats) -> Iterator[Floats]:
     """Yield prices of the time of all and of robots of kinds, at most one together over all."""
+    from scipy.optimize import linprog  # noqa: PLC0415  # it takes long to load
+
     yield np.eye(1, len(sizes))[0]
     ends, moves = np.flatnonzero(graph.ends), np.arange(len(graph.source))
     rows = np.concatenate([graph.source, ends, graph.target])
