@@ -23,6 +23,7 @@ from seqopt.network.network import Network
 from seqopt.scene.holders._durations import Durations
 from seqopt.sequence._timing import require_durations
 from seqopt.sequence.rules import Ending, FreeRules
+from seqopt.sequence.schedule import Schedule
 
 _Counts = tuple[int, tuple[int, ...]]  # bricks that stand, and grips by kind
 
@@ -86,8 +87,13 @@ class _Counted:
         out.work.append([acts, *(b + prepares * (k == kind) for k, b in enumerate(busy))])
 
 
-def least_by_counts(network: Network, rules: FreeRules) -> float:
-    """Return what no build by some rules takes less than, s; it holds whatever else is asked."""
+def least_by_counts(network: Network, rules: FreeRules | Schedule) -> float:
+    """Return what no build by some rules takes less than, s; it holds whatever else is asked.
+
+    Of a schedule nothing is said: minus infinity.
+    """
+    if isinstance(rules, Schedule):
+        return -np.inf
     counted = _counted(network, rules)
     arcs = counted.arcs()
     start = (counted.span[0], counted.held)

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
+from seqopt.errors import InfeasibleError
 from seqopt.graph._counted import least_by_counts
 from seqopt.plan._status import Status
 from seqopt.plan.judge.schedules import judge_schedule
@@ -60,3 +61,15 @@ def test_a_search_that_ends_before_it_knows_anything_leaves_a_proven_bound():
     found = replace(plan, selection=early, certificate=proof)
     assert (found.status, found.gap) == (Status.FEASIBLE, proof.gap)
     assert found.summary()["bound"] == {"makespan": proof.bounds[0]}
+
+
+@pytest.mark.parametrize(
+    ("share", "said"), [(0.9, r"^free.* at least .* s, and"), (1.1, "^claimed")]
+)
+def test_a_budget_below_what_counts_say_is_proven_to_be_too_small(share, said):
+    engine = engine_of(3, 3)
+    cap = share * least_by_counts(engine.network, RULES)
+    assert cap < least_makespan(engine, RULES)
+    problem = seqopt.pose(engine, RULES, ONES, "minmax", budgets=f"makespan={cap}s")
+    with pytest.raises(InfeasibleError, match=said):
+        seqopt.solve(problem)

@@ -102,7 +102,7 @@ def _counted(
     problem: States, values: Sequence[float], bounds: Sequence[float]
 ) -> tuple[float, ...]:
     """Return bounds of first goals, those on makespans no less than what all builds take."""
-    if not problem.is_timed or isinstance(problem.rules, Schedule):
+    if not problem.is_timed:
         return tuple(bounds)
     least = least_by_counts(problem.network, problem.rules)
     return tuple(
