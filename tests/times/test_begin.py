@@ -17,7 +17,7 @@ from seqopt.sequence._timing import step_times
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.site import Site
 from tests.brute_force import ONES
-from tests.times.builders import RULES, engine_of, least_makespan
+from tests.times.builders import RULES, WORDS, engine_of, least_makespan
 from tests.times.curing import least_cured_makespan
 
 ALONE = FreeRules(least_grips=1)
@@ -123,3 +123,17 @@ def test_a_chart_and_tables_are_of_what_is_left():
     assert np.isfinite(rest.summary()["makespan"])
     again = seqopt.GivenSequence(engine, rest.steps)
     assert again.makespan is None  # where it begins is not known
+
+
+@pytest.mark.slow
+@pytest.mark.long
+def test_from_every_step_of_the_arch_the_rest_is_as_good():
+    scene = seqopt.load_scene("arch25").with_durations(WORDS)
+    plan = seqopt.optimize(scene, "free", aim="minmax,makespan")
+    for count in range(1, len(plan.steps)):
+        site = Site.after(plan.steps, count)
+        rest = seqopt.optimize(scene, "free", aim="minmax,makespan", begin=site)
+        own = step_times(scene, plan.steps[count:], begin=site)[-1].end
+        assert rest.objective["minmax"] <= plan.objective["minmax"] * (1 + 1e-9)
+        assert rest.makespan <= own * (1 + 1e-9)
+        assert rest.status is Status.OPTIMAL
