@@ -94,6 +94,7 @@ def stated() -> dict[str, str]:
         | {"vault_loads_table": _vault_loads(stored("vault_loads"))}
         | {f"{name}_table": _on_graphs(stored(name)) for name in GRAPHS}
         | {"classical_table": _classical(stored("classical"))}
+        | {"makespan_table": _makespans(stored("makespan"), stored("makespan_large"))}
         | instance_tables(stored("instance_library"), stored("instance_contest"))
     )
 
@@ -145,6 +146,28 @@ def _on_graphs(table: pd.DataFrame) -> str:
             cells = part.set_index("bricks")["cell"].reindex(counts, fill_value="not asked")
             rows.append([f"`{name}`", part["kind"].iloc[0], str(aim), *cells])
     return markdown(["formulation", "kind", "aim", *(f"{n} bricks" for n in counts)], rows)
+
+
+def _makespans(*tables: pd.DataFrame) -> str:
+    """Return a row per arch, robots and formulation: the plan, its proven bound, and seconds."""
+    every = pd.concat(tables).sort_values(["bricks", "robots", "formulation"], kind="stable")
+    rows = [
+        [
+            str(row["bricks"]),
+            row["robots"],
+            f"`{row['formulation']}`",
+            f"{row['planned']:.0f} s",
+            f"{row['makespan']:.0f} s",
+            f"{row['proven']:.0f} s",
+            row["status"]
+            if pd.isna(row["stopped"])
+            else f"{row['status']} ({row['stopped']} ended)",
+            f"{two(row['seconds'] + row['verify'])} s",
+        ]
+        for row in every.to_dict("records")
+    ]
+    head = ["bricks", "robots", "formulation", "fewest steps", "makespan", "proven bound"]
+    return markdown([*head, "status", "took"], rows)
 
 
 def _classical(table: pd.DataFrame) -> str:

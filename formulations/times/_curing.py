@@ -64,11 +64,12 @@ class Waits:
         if isinstance(space, FreeSpace):
             kind = {robot: k for k, each in enumerate(space.kinds) for robot in each.robots}
             steps = reassigned_steps(
-                scene, steps, lambda r, hold: kind[r] == kind[hold.robot], [*kind], waits
+                *(scene, steps, lambda r, hold: kind[r] == kind[hold.robot], [*kind], waits),
+                begin=problem.rules.begin,
             )
             place = {node: i for i, node in enumerate(node_numbers(space.network), start=1)}
             grips = tuple(tuple(0 if n is None else place[n] for n in step.grips) for step in steps)
-        times: tuple[StepTime, ...] = step_times(scene, steps, waits)
+        times: tuple[StepTime, ...] = step_times(scene, steps, waits, problem.rules.begin)
         starts = () if waits is None else tuple(time.start for time in times)
         return Soonest(grips, times[-1].end, starts)
 

@@ -171,8 +171,8 @@ class Sweep:
         columns = self._timed.free.shape[1]
         none = np.zeros((1, len(self._caps.sums)))
         start, since = np.zeros(1, dtype=np.int64), np.zeros((1, columns))
-        bricks = 0 if self._timed.curing is None else len(self._timed.curing.full)
-        placed = np.zeros((1, bricks))
+        curing = self._timed.curing
+        placed = np.zeros((1, 0)) if curing is None else curing.placed[None].copy()
         return Labels(start, np.zeros(1), since, none, np.full(1, -1), placed)
 
     def _bounds(self, labels: Labels) -> Floats:

@@ -51,8 +51,9 @@ RULE = {
 }
 WHERE = {
     "--from PLAN:STEP|STATE|N": "where the build begins: after a step of a plan (its folder or CSV "
-    "file); in a state of a JSON file (bricks that stand, by names or how many, grips by robot); "
-    "or with so many bricks that nobody holds",
+    "file); in a state of a JSON file (bricks that stand, by names or how many, grips by robot, "
+    "ages of bricks in s where mortar cures, else just placed); or with so many bricks that nobody "
+    "holds",
     "--to PLAN:STEP|STATE|N": "where it ends, said in the same ways; a number of bricks leaves "
     "grips to the rule ending",
     "--direction build|take-down": "with --schedule free: take-down removes bricks, the newest "

@@ -39,9 +39,12 @@ from seqopt.problem.requirements import Criterion
 from seqopt.scene.holders._props import Prop
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
+from seqopt.sequence._timing import step_times
 from seqopt.sequence.rules import FREE, Direction, FreeRules, with_robots
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
+from seqopt.sequence.steps import StepKind
+from seqopt.stability._aging.builds import CuringBuilds
 from seqopt.workflow import SEARCH, posed
 
 ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone
@@ -140,9 +143,28 @@ def asked_problem(options: argparse.Namespace) -> Asked:
     return Asked(scene, problem, whole, aim, known, unseen, fewest)
 
 
+def _aged(options: argparse.Namespace, scene: Scene, begin: Place) -> Place:
+    """Return where a build begins with the ages of bricks, where mortar cures: as the plan was."""
+    if not getattr(options, "curing", None) or not begin.done or begin.site is None:
+        return begin
+    standing = asked_standing(options)
+    if standing is None or standing.curing is None:
+        return begin
+    scene = in_seconds(options, scene) if getattr(options, "durations", ()) else scene
+    waits = CuringBuilds(build_network(scene), standing.mortar, standing.curing).waits
+    try:
+        times = step_times(scene, begin.done, waits)
+    except StepError as error:
+        raise StepError(f"{error}; or give a STATE.json with the ages of its bricks") from None
+    ends = [t.end for t, s in zip(times, begin.done, strict=True) if s.kind is StepKind.PLACE]
+    ages = tuple(times[-1].end - end for end in ends)
+    return replace(begin, site=replace(begin.site, ages=ages))
+
+
 def _asked_ends(options: argparse.Namespace, scene: Scene) -> tuple[Scene, Place, Place]:
     """Return where a build begins and ends, and the scene after what has changed."""
     scene, begin = asked_place(options, "from", scene)
+    begin = _aged(options, scene, begin)
     if hasattr(options, "change"):
         scene, begin, options.robots = options.change(scene, begin)
     if getattr(options, "keep", None) is not None:

@@ -30,7 +30,8 @@ class CuringStates(FrozenValue):
 
     ``cuts``: motions in which states fall, a floor under waits; ``bricks`` (n,): that stand;
     ``held`` (n, r), ``payload`` (n, r): the grips of states, as of `FallCuts`; ``full`` (b,): at
-    which age all joints that a brick closes have their full bond, s.
+    which age all joints that a brick closes have their full bond, s; ``placed`` (b,): when bricks
+    that stand at first were in their places, s, zero of others.
     """
 
     cuts: FallCuts
@@ -38,6 +39,7 @@ class CuringStates(FrozenValue):
     held: Ints
     payload: Floats
     full: Floats
+    placed: Floats
 
     def starts(self, state: Ints, placed: Floats, start: Floats) -> Floats:
         """Return from when on, no sooner than times (n,), s, states may begin, for all known.
@@ -163,7 +165,10 @@ def _curing(problem: States, visited: Visited, cuts: FallCuts) -> CuringStates:
     every = [(level, *problem._grips(rows, stand=True)) for level, _, rows in visited.states]
     bricks = [np.full(len(held), problem.space.bricks_at(level)) for level, held, _ in every]
     held, payload = (np.concatenate([each[k] for each in every]) for k in (1, 2))
-    return CuringStates(cuts, np.concatenate(bricks), held, payload, cuts.joints.full)
+    full, begin = cuts.joints.full, problem.rules.begin
+    placed = np.zeros(len(full))
+    placed[: 0 if begin is None else begin.bricks] = () if begin is None else begin.placed
+    return CuringStates(cuts, np.concatenate(bricks), held, payload, full, placed)
 
 
 def _moves(problem: States, graph: Graph, rows: Ints, levels: Ints) -> _Moves:

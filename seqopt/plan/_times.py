@@ -12,13 +12,16 @@ from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence._timing import StepTime, Waits, reassigned_steps, step_times
 from seqopt.sequence.schedule import Hold
+from seqopt.sequence.site import Site, _begin_step
 from seqopt.sequence.steps import Step, idle_robots
 
 
-def times_table(scene: Scene, steps: Sequence[Step], waits: Waits | None = None) -> pd.DataFrame:
+def times_table(
+    scene: Scene, steps: Sequence[Step], waits: Waits | None = None, begin: Site | None = None
+) -> pd.DataFrame:
     """Return who does what when, at the earliest: a row per step, as of `Plan.times`.
 
-    ``waits``: as of `step_times`, where mortar cures.
+    ``waits``: as of `step_times`, where mortar cures; ``begin``: where a part of a build begins.
 
     Examples
     --------
@@ -30,7 +33,7 @@ def times_table(scene: Scene, steps: Sequence[Step], waits: Waits | None = None)
     [[1, 'rob1', 30.0, 40.0], [2, 'rob2', 40.0, 50.0], [3, 'rob1', 50.0, 55.0]]
     """
     rows, end = [], 0.0
-    for step, time in zip(steps, step_times(scene, steps, waits), strict=True):
+    for step, time in zip(steps, step_times(scene, steps, waits, begin), strict=True):
         taken = [step.grips[r] for r in time.robots if step.grips[r] is not None]
         rows.append(
             {
@@ -57,14 +60,16 @@ def _cured(time: StepTime, before: float) -> dict[str, object]:
     return {"cures_s": max(0.0, time.start - ready), "joint": time.joint}
 
 
-def busy_table(scene: Scene, steps: Sequence[Step], waits: Waits | None = None) -> pd.DataFrame:
+def busy_table(
+    scene: Scene, steps: Sequence[Step], waits: Waits | None = None, begin: Site | None = None
+) -> pd.DataFrame:
     """Return how long each robot ``prepares_s``, ``acts_s``, ``holds_s`` and is ``idle_s``."""
-    times = step_times(scene, steps, waits)
+    times = step_times(scene, steps, waits, begin)
     out = {
         robot.name: dict.fromkeys(("prepares_s", "acts_s", "holds_s"), 0.0)
         for robot in scene.robots
     }
-    before: Sequence[int | None] = (None,) * len(scene.robots)
+    before: Sequence[int | None] = _begin_step(scene, begin).grips
     end = 0.0
     for step, time in zip(steps, times, strict=True):
         for r, robot in enumerate(scene.robots):
@@ -84,14 +89,18 @@ def busy_table(scene: Scene, steps: Sequence[Step], waits: Waits | None = None) 
 
 
 def reassign(
-    scene: Scene, steps: Sequence[Step], responses: pd.DataFrame, waits: Waits | None = None
+    scene: Scene,
+    steps: Sequence[Step],
+    responses: pd.DataFrame,
+    waits: Waits | None = None,
+    begin: Site | None = None,
 ) -> tuple[Step, ...]:
     """Return the same grips in the same order by robots with which the build takes least.
 
     ``responses``: of the steps, as of `seqopt.analyze`. A robot may have a grip if it reaches the
     node, gives way there as the one who had it, and carries the largest force of the grip within
-    its payload; who carried more before may go on. Where mortar cures (``waits``: as of
-    `step_times`) its payload is no less than that of the one who had it. A `StepError` says that
+    its payload; who carried more before may go on. Where mortar cures (``waits``, ``begin``: as
+    of `step_times`) its payload is no less than that of the one who had it. A `StepError` says that
     robots have arms.
     """
     if scene.has_arms:
@@ -111,7 +120,8 @@ def reassign(
             return True
         assert hold.node is not None  # steps of a plan have no open grips
         position = scene.node_position(hold.node)
-        force = float(forces[had][hold.first - 1 : hold.last].max())
+        shown = forces[had][max(0, hold.first - steps[0].number) : hold.last + 1 - steps[0].number]
+        force = float(shown.max(initial=0.0))
         most = scene.robots[robot].payload * (1 + LIMIT_TOLERANCE)
         if waits is not None and scene.robots[robot].payload < scene.robots[had].payload:
             return False
@@ -124,4 +134,4 @@ def reassign(
         for r, robot in enumerate(scene.robots)
         if robot.durations is not None or robot.name not in idle
     ]
-    return reassigned_steps(scene, steps, may, known, waits)
+    return reassigned_steps(scene, steps, may, known, waits, begin)

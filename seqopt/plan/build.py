@@ -18,6 +18,7 @@ from seqopt.responses._props import props_table
 from seqopt.responses._tolerance import tolerance_table
 from seqopt.responses.table import Departure, LinearRange, grips_table
 from seqopt.sequence._timing import Waits, has_durations, step_times
+from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step
 from seqopt.stability._aging.builds import CuringBuilds
 from seqopt.stability._step_verdicts import step_verdicts
@@ -137,13 +138,20 @@ class ShownBuild(Shown):
         ``joint`` that was the last to hold. Raises `StepError` if it is not known how long a robot
         takes that acts.
         """
-        return times_table(self.engine.network.scene, self.steps, self._waits)
+        return times_table(self.engine.network.scene, self.steps, self._waits, self._begin)
 
     @property
     def makespan(self) -> float | None:
         """How long the build takes, s; None if it is not known how long robots take."""
         scene = self.engine.network.scene
-        return step_times(scene, self.steps, self._waits)[-1].end if self._timed else None
+        if not self._timed:
+            return None
+        return step_times(scene, self.steps, self._waits, self._begin)[-1].end
+
+    @property
+    def _begin(self) -> Site | None:
+        """Where a part of a build begins, if that is known."""
+        return None
 
     @cached_property
     def _waits(self) -> Waits | None:
@@ -160,7 +168,8 @@ class ShownBuild(Shown):
         way as the one who had it. Raises `StepError` if it is not known how long robots take, or
         some have arms, whose postures count.
         """
-        return reassign(self.engine.network.scene, self.steps, self.responses(), self._waits)
+        scene = self.engine.network.scene
+        return reassign(scene, self.steps, self.responses(), self._waits, self._begin)
 
     def plot(
         self, step: int | Sequence[int] | None = None, *, forces: bool = False, magnify: float = 0.0
@@ -180,9 +189,9 @@ class ShownBuild(Shown):
 
     @property
     def _timed(self) -> bool:
-        """Whether it is known how long it takes: of a part it is not, what was before counts."""
+        """Whether it is known how long it takes: of a part only if where it begins is."""
         whole = bool(self.steps) and self.steps[0].number == 1
-        return whole and has_durations(self.engine.network.scene)
+        return (whole or self._begin is not None) and has_durations(self.engine.network.scene)
 
     def gantt(
         self, first: int | None = None, last: int | None = None, *, seconds: bool | None = None
@@ -203,7 +212,7 @@ class ShownBuild(Shown):
         shown = (first, last)
         if timed:
             drawn: Figure = display("seconds_picture")(
-                scene, self.steps, responses, shown, self._waits
+                scene, self.steps, responses, shown, self._waits, self._begin
             )
             return drawn
         figure: Figure = display("gantt_picture")(scene, self.steps, responses, shown)

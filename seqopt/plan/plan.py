@@ -48,6 +48,7 @@ from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import response_table, step_fields
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, StepKind, idle_robots
 from seqopt.stability.steps import stability_table
 
@@ -273,6 +274,10 @@ class Plan(ShownBuild):
         return self.graph.nodes(choice)
 
     @property
+    def _begin(self) -> Site | None:
+        return self.graph.rules.begin if isinstance(self.graph, States) else None
+
+    @property
     def explored(self) -> tuple[Layers, ...]:
         """The layers whose responses were computed: the whole, or what a search needed."""
         return (self.layers,) if self.search is None else self.search.explored
@@ -467,12 +472,15 @@ def _states_asked(graph: States) -> dict[str, object]:
 
 
 def _bounds(plan: Plan) -> dict[str, float | None]:
-    """Return what no plan stays below, by aim; claimed of a search that ended early."""
+    """Return what no plan stays below, by aim; also claimed of a search that ended early."""
     proof, chosen = plan.certificate, plan.selection
     bounds: tuple[float, ...] = () if proof is None else proof.bounds
     if isinstance(chosen, StatePath):
-        early = proof is None or (chosen.stopped and not isfinite(proof.gap))
-        bounds = (chosen.bound if early else bounds)[: len(plan.states.aims)]
+        if proof is None:
+            bounds = chosen.bound
+        elif chosen.stopped and not isfinite(proof.gap):
+            bounds = tuple(map(max, chosen.bound, bounds))
+        bounds = bounds[: len(plan.states.aims)]
     found = plan._by_goal(bounds) if bounds else {}
     return {name: bound if isfinite(bound) else None for name, bound in found.items()}
 

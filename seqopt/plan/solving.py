@@ -229,9 +229,10 @@ def _states(problem: Problem) -> States:
     asked = problem.engine, problem.moves, problem.criterion, goals, problem.limits
     found = replace(build_states(*asked, problem.stands), resources=problem.resources)
     _require_moves_left(found.space)
-    if problem.is_timed and found.rules.begin is not None:
+    if problem.is_timed and found.free_rules.takes_down:
         raise ProblemError(
-            "aim makespan: a build in time begins on an empty site; leave from and take-down out"
+            "aim makespan: how long it takes to take bricks away is not modeled; leave "
+            "direction=take-down out"
         )
     if caps := parse_caps(problem.budgets):
         found = within(found, caps)

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from seqopt._files import read_text
-from seqopt.errors import StepError, did_you_mean
+from seqopt.errors import SceneError, StepError, did_you_mean
 from seqopt.scene._checks import as_float, short
 from seqopt.scene.imports.formats import import_scene
 from seqopt.scene.scenarios import as_built
@@ -21,7 +21,7 @@ from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step
 
 SAME = 1e-9  # m; closer than this a brick is where it was planned
-KEYS = ("bricks", "grips", "last", "regrips", "step", "measured")
+KEYS = ("bricks", "grips", "last", "regrips", "step", "measured", "ages")
 
 
 def read_site(scene: Scene, path: Path) -> tuple[Scene, Site]:
@@ -44,12 +44,20 @@ def read_site(scene: Scene, path: Path) -> tuple[Scene, Site]:
     more = {key: told[key] for key in ("regrips", "step") if key in told}
     if any(not isinstance(value, int) or value < 0 for value in more.values()):
         raise StepError(f"{where}: {short(more)}; give whole numbers from 0")
-    site = Site(count, grips, last, **more)
     try:
+        site = Site(count, grips, last, **more, ages=_ages(scene, count, told.get("ages", {})))
         site.holds(scene)
-    except StepError as error:
+    except (SceneError, StepError) as error:
         raise StepError(f"{where}: {error}") from None
     return scene, site
+
+
+def _ages(scene: Scene, count: int, told: object) -> tuple[float, ...]:
+    """Return for how long bricks that stand have been there, s; just placed if nothing is said."""
+    names = [brick.name for brick in scene.placed[:count]]
+    if not isinstance(told, Mapping) or any(name not in map(str, names) for name in told):
+        raise StepError(f"ages {short(told)}; give seconds by brick, of those that stand")
+    return tuple(told.get(str(name), 0.0) for name in names) if told else ()
 
 
 def _measured(scene: Scene, told: object, where: str) -> Scene:

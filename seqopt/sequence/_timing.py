@@ -30,7 +30,8 @@ from seqopt.scene.holders._durations import EXAMPLE, Durations
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Hold, Schedule, holds
-from seqopt.sequence.steps import AnyStep, Step, StepKind, check_sequence
+from seqopt.sequence.site import Site, _begin_step
+from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind, check_sequence
 
 
 @dataclass(frozen=True)
@@ -72,14 +73,14 @@ def require_durations(scene: Scene, robots: Sequence[int] | None = None) -> tupl
 
 
 def step_times(
-    scene: Scene, steps: Sequence[AnyStep], waits: Waits | None = None
+    scene: Scene, steps: Sequence[AnyStep], waits: Waits | None = None, begin: Site | None = None
 ) -> tuple[StepTime, ...]:
     """Return when every step of a build happens at the earliest, in the order that is given.
 
-    Steps are all of one build, from its first on. ``waits``: what a step has to wait for besides,
-    where mortar cures: since nothing is gained by acting later, every step is done as soon as it
-    may. A `StepError` names robots that act of which it
-    is not known how long they take.
+    Steps are all of one build, from its first on, or from where it ``begin``s: there robots that
+    are free begin to prepare. ``waits``: what a step has to wait for besides, where mortar cures:
+    since nothing is gained by acting later, every step is done as soon as it may. A `StepError`
+    names robots that act of which it is not known how long they take.
 
     Examples
     --------
@@ -90,14 +91,14 @@ def step_times(
     >>> [(each.start, each.end) for each in step_times(scene, steps)[:4]]
     [(30.0, 40.0), (40.0, 50.0), (50.0, 55.0), (85.0, 95.0)]
     """
-    if steps and steps[0].number > 1:
+    if steps and steps[0].number > 1 and begin is None:
         raise StepError(f"steps from {steps[0].number} on: times are of whole builds; give all")
     robots = range(len(scene.robots))
-    busy = [r for r in robots if any(step.grips[r] is not None for step in steps)]
+    before: Sequence[object] = _begin_step(scene, begin).grips
+    busy = [r for r in robots if any(g[r] is not None for g in (before, *(s.grips for s in steps)))]
     durations = dict(zip(busy, require_durations(scene, busy), strict=True))
-    free, last = dict.fromkeys(busy, 0.0), dict[int, object]()
-    before: Sequence[object] = (None,) * len(robots)
-    now, out, placed = 0.0, list[StepTime](), list[float]()
+    free, last = dict.fromkeys(busy, 0.0), dict[int, object](enumerate(_lasts(scene, begin)))
+    now, out, placed = 0.0, list[StepTime](), [] if begin is None else begin.placed
     for step in steps:
         acting = tuple(r for r in busy if step.grips[r] != before[r])
         taker = next((r for r in acting if step.grips[r] is not None), None)
@@ -121,6 +122,13 @@ def step_times(
             free |= dict.fromkeys(acting, now)
         before = step.grips
     return tuple(out)
+
+
+def _lasts(scene: Scene, begin: Site | None) -> Grips:
+    """Return the node that every robot holds, or held last, where a build begins."""
+    holds = _begin_step(scene, begin).grips
+    stays = begin.stays if begin is not None and begin.stays else (None,) * len(holds)
+    return tuple(s if h is None else h for h, s in zip(holds, stays, strict=True))
 
 
 def _never(step: AnyStep) -> str:
@@ -186,18 +194,21 @@ def reassigned_steps(
     may: May,
     team: Sequence[int] | None = None,
     waits: Waits | None = None,
+    begin: Site | None = None,
 ) -> tuple[Step, ...]:
     """Return the same grips in the same order by those robots with which the build takes least.
 
     ``may``: whether a robot, by its index, may have a grip; ``team``: the robots that take part, by
-    default all; ``waits``: as of `step_times`. A `StepError` says that there is no such choice.
+    default all; ``waits``, ``begin``: as of `step_times`; who holds there goes on. A `StepError`
+    says that there is no such choice.
     """
     team = range(len(scene.robots)) if team is None else team
     own = dict(zip(team, require_durations(scene, team), strict=True))
-    every = sorted(holds(scene, steps), key=lambda hold: (hold.first, hold.robot))
-    count = len(scene.robots)
+    at_first = _begin_step(scene, begin)
+    whole = (at_first, *steps) if at_first.held else steps
+    every = sorted(holds(scene, whole), key=lambda hold: (hold.first, hold.robot))
     moves = any(durations.speed for durations in own.values())
-    labels = [_Label(0.0, (0.0,) * count, (_NOTHING,) * count, (None,) * count, None)]
+    labels = [_first_label(scene, every, begin)]
     for step in steps:
         ended = [i for i, hold in enumerate(every) if hold.last == step.number - 1]
         begun = [i for i, hold in enumerate(every) if hold.first == step.number]
@@ -220,7 +231,20 @@ def reassigned_steps(
         chosen.append(link[0])
         link = link[1]
     order = [i for step in steps for i, hold in enumerate(every) if hold.first == step.number]
-    return _with_robots(scene, steps, every, dict(zip(order, chosen[::-1], strict=True)))
+    by = {i: hold.robot for i, hold in enumerate(every) if hold.first == at_first.number}
+    by |= dict(zip(order, chosen[::-1], strict=True))
+    return check_sequence(scene, _with_robots(scene, steps, every, by), at_first)
+
+
+def _first_label(scene: Scene, every: Sequence[Hold], begin: Site | None) -> _Label:
+    """Return what it comes to before the first step: who holds there, and when bricks came."""
+    none, number = (0.0,) * len(scene.robots), _begin_step(scene, begin).number
+    has = [_NOTHING] * len(none)
+    for i, hold in enumerate(every):
+        if hold.first == number:
+            has[hold.robot] = i
+    placed = () if begin is None else tuple(begin.placed)
+    return _Label(0.0, none, tuple(has), _lasts(scene, begin), None, placed)
 
 
 def _cured(label: _Label, step: Step, start: float, waits: Waits | None) -> _Label:
@@ -283,7 +307,7 @@ def _nowhere_above(first: _Label, second: _Label) -> bool:
 
 def _with_robots(
     scene: Scene, steps: Sequence[Step], every: Sequence[Hold], chosen: dict[int, int]
-) -> tuple[Step, ...]:
+) -> list[Step]:
     """Return steps with the grips of chosen robots."""
     out = []
     for step in steps:
@@ -292,4 +316,4 @@ def _with_robots(
             if hold.first <= step.number <= hold.last:
                 grips[chosen[i]] = hold.node
         out.append(replace(step, grips=tuple(grips)))
-    return check_sequence(scene, out)
+    return out

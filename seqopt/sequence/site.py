@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from numbers import Integral
 
 from seqopt.errors import StepError
-from seqopt.scene._checks import short
+from seqopt.scene._checks import finite, short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Grips, Step, StepKind, _check_state
 
@@ -30,13 +30,16 @@ class Site:
     step : int, optional
         Number of the step that led there: steps are numbered on from it. By default 1, and 0 for
         the empty site.
+    ages : tuple of float, optional
+        For how long bricks, in build order, have been in their places, s, where mortar cures; those
+        of which nothing is said were placed just now.
 
     Examples
     --------
     >>> import seqopt
     >>> steps = seqopt.sequential(seqopt.build_network(seqopt.load_scene("arch25")))
     >>> Site.after(steps, 4)
-    Site(bricks=3, grips=(4, 2, None), stays=(None, None, None), regrips=0, step=4)
+    Site(bricks=3, grips=(4, 2, None), stays=(None, None, None), regrips=0, step=4, ages=())
     """
 
     bricks: int
@@ -44,10 +47,15 @@ class Site:
     stays: Grips = ()
     regrips: int = 0
     step: int = -1
+    ages: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         if self.step < 0:
             object.__setattr__(self, "step", int(self.bricks != 0))
+        ages = tuple(finite("site: age", age, 0.0) for age in self.ages)
+        if len(ages) > max(self.bricks, 0):
+            raise StepError(f"site: {len(ages)} ages of {self.bricks} bricks; give one for each")
+        object.__setattr__(self, "ages", ages)
 
     @classmethod
     def after(cls, steps: Sequence[Step], count: int) -> Site:
@@ -70,6 +78,11 @@ class Site:
             return cls(0)
         free = (lasts.get(r) if node is None else None for r, node in enumerate(done[-1].grips))
         return cls(done[-1].bricks, done[-1].grips, tuple(free), regrips, done[-1].number)
+
+    @property
+    def placed(self) -> list[float]:
+        """When the bricks that stand were in their places, s: nobody has waited yet."""
+        return [-age for age in self.ages] + [0.0] * (self.bricks - len(self.ages))
 
     @property
     def held(self) -> int:

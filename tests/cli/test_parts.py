@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from pathlib import Path
 
 import pytest
 
@@ -45,6 +46,33 @@ def test_a_build_goes_on_from_a_step_and_reads_back(capsys, folder, tmp_path):
         assert said.splitlines()[1].startswith("5,")
     status, said, _ = run(capsys, "optimize", scene, *FREE, "--from", "2", "--to", "3")
     assert status == 0
+
+
+@pytest.mark.slow
+def test_time_goes_on_from_a_step_and_mortar_is_as_old_as_is_said(capsys, tmp_path):
+    scene, out, state = (str(tmp_path / name) for name in ("arch.json", "timed", "state.json"))
+    save_scene(small_arch(4), Path(scene))
+    timed = (*FREE, "--durations", "fetch=30,place=10,approach=10,grip=5,release=5")
+    timed += ("--aim", "makespan", "--robots", "rob1,rob2", "--rule", "least_grips=1")
+    cures = ("--stands", "epoxy", "--curing", "5min=1")
+    status, *_ = run(capsys, "optimize", scene, *timed, *cures, "--out", out)
+    assert status == 0
+    status, said, _ = run(capsys, "replan", out, "--at", "2", "--no-stability", *cures)
+    assert status == 0
+    was, new = re.findall(r"makespan (\d+)", said)  # all three robots take part from there on
+    assert float(new) < float(was)
+    held = read_plan(load_scene(scene), Path(out) / "plan.csv")[1].grips
+    told = {"bricks": [1, 2], "grips": {"rob1": held[0], "rob2": held[1]}, "step": 2}
+    took = []
+    for begin, ages in ((f"{out}:2", {}), (state, {}), (state, {"1": 1e6, "2": 1e6})):
+        Path(state).write_text(json.dumps({**told, "ages": ages}))
+        status, said, _ = run(capsys, "optimize", scene, *timed, *cures, "--from", begin)
+        assert status == 0
+        took.append(float(re.search(r"makespan (\d+)", said)[1]))
+    assert took[1] >= took[0] == float(was) > took[2]  # just placed, as in the plan, old
+    Path(state).write_text(json.dumps({"bricks": [1], "ages": {"2": 5}}))
+    status, _, said = run(capsys, "optimize", scene, *timed, "--from", state)
+    assert (status, "ages {'2': 5}; give seconds by brick" in said) == (2, True)
 
 
 def test_a_state_is_read_from_a_file(capsys, folder, tmp_path):

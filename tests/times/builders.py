@@ -42,6 +42,7 @@ def least_makespan(engine, rules=RULES, most=np.inf, regrips=None):
     """The least makespan of any plan below a worst ratio, by all orders of named robots.
 
     Of two ways to the same grips by the same robots one goes on if the other is nowhere later.
+    They begin where rules say, with robots that are free from then on.
     """
     scene, book, worst = (
         engine.network.scene,
@@ -49,13 +50,13 @@ def least_makespan(engine, rules=RULES, most=np.inf, regrips=None):
         worsts(engine, rules),
     )
     robots, tick = scene.robots, count()
-    none = (None,) * len(robots)
-    heap = [(0.0, next(tick), (0, none, 0), (0.0,) * len(robots), none, 0)]
+    state, last = begun(scene, rules)
+    heap = [(0.0, next(tick), state, (0.0,) * len(robots), last, 0)]
     kept = {}
     while heap:
         end, _, state, since, last, taken = heapq.heappop(heap)
         bricks, grips, regripped = state
-        if book.ends(bricks, grips) and bricks:
+        if book.ends(bricks, grips) and bricks and end:
             return end
         key = (end, *since, taken)
         own = kept.setdefault((state, last), [])
@@ -72,6 +73,19 @@ def least_makespan(engine, rules=RULES, most=np.inf, regrips=None):
             follows = (after_bricks, after, counted if rules.regrips is not None else 0)
             heapq.heappush(heap, (then, next(tick), follows, free, where, more))
     return np.inf
+
+
+def begun(scene, rules):
+    """Bricks, grips and regrips where a build begins, and where robots hold or held last."""
+    none = (None,) * len(scene.robots)
+    site = rules.begin
+    if site is None:
+        return (0, none, 0), none
+    holds = site.holds(scene)
+    speeds = [robot.durations.speed for robot in scene.robots]
+    pairs = zip(holds, site.stays or none, speeds, strict=True)
+    last = tuple((stay if node is None else node) if speed else None for node, stay, speed in pairs)
+    return (site.bricks, holds, site.regrips if rules.regrips is not None else 0), last
 
 
 def acted(scene, kind, states, label):

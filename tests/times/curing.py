@@ -14,7 +14,7 @@ from seqopt.contact.mortar import EPOXY
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.steps import StepKind
 from seqopt.stability.assessment import Verdict, verdict
-from tests.times.builders import worsts
+from tests.times.builders import begun, worsts
 
 
 def stands_with(network, mortar=EPOXY):
@@ -50,10 +50,13 @@ def least_cured_makespan(engine, rules, words, most=np.inf):
     book, tick = RuleBook(engine.network, rules), count()
     worst, stands = worsts(engine, rules), stands_with(engine.network)
     curing, none = _find_curing(words), (None,) * len(engine.network.scene.robots)
-    heap, seen = [(0.0, next(tick), (0, none), (0.0,) * len(none), ())], set()
+    (first, grips, _), _ = begun(engine.network.scene, rules)
+    ages = () if rules.begin is None else rules.begin.ages
+    placed = (*(-age for age in ages), *[0.0] * (first - len(ages)))
+    heap, seen = [(0.0, next(tick), (first, grips), (0.0,) * len(none), placed)], set()
     while heap:
         end, _, (bricks, grips), since, placed = heapq.heappop(heap)
-        if book.ends(bricks, grips) and bricks:
+        if book.ends(bricks, grips) and bricks and end:
             return end
         key = (bricks, grips, round(end, 6), tuple(np.round(since, 6)), tuple(np.round(placed, 6)))
         if key in seen:

@@ -226,3 +226,29 @@ def test_what_is_not_modeled_says_so():
     problem = seqopt.pose(engine, ALONE, ONES, "makespan", stands=Standing("epoxy", curing="1h"))
     with pytest.raises(ProblemError, match="makespan_flow: it does not know mortar that cures"):
         seqopt.solve(problem, "makespan_flow")
+
+
+@pytest.mark.slow
+def test_the_dry_arch_takes_two_more_steps_and_is_the_limit_of_no_bond():
+    """52 steps for 50, where the worst ratio counts first; proven, with as little on both sides."""
+    engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
+    demands = ["dry", Standing("epoxy", curing="never"), Standing("epoxy", curing="0s=1"), "epoxy"]
+    plans = [
+        seqopt.solve(seqopt.pose(engine, FreeRules(), CRITERION, "minmax,steps", stands=stands))
+        for stands in demands
+    ]
+    assert [len(plan.steps) for plan in plans] == [52, 52, 50, 50]
+    assert [plan.regrips for plan in plans] == [2, 2, 1, 1]
+    assert [plan.status for plan in plans] == [Status.OPTIMAL] * 4
+    assert plans[1].steps == plans[0].steps
+
+
+@pytest.mark.parametrize("aim", ["minmax,steps", "steps,minmax"])
+def test_mortar_that_never_cures_is_none(aim):
+    engine = engine_of(4, 3)
+    dry, never = (
+        seqopt.solve(seqopt.pose(engine, FreeRules(), ONES, aim, stands=stands))
+        for stands in ("dry", Standing("epoxy", curing="never"))
+    )
+    assert never.steps == dry.steps
+    assert never.certificate.values == dry.certificate.values

@@ -87,7 +87,7 @@ def test_without_labels_it_is_claimed(plan):
     liar = Formulation("liar", "says so", FormulationKind.EXACT, None, told, on=On.TIMES)
     found = seqopt.solve(plan.problem, liar)
     assert found.status is Status.CLAIMED
-    assert found.certificate.gap == np.inf
+    assert 0 < found.certificate.gap < 1  # what counts of grips prove
 
 
 def test_other_grips_than_those_of_the_states_are_refused(plan):

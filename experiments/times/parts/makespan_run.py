@@ -5,6 +5,7 @@ a row as JSON; ``ROBOTS`` is equal or unequal.
 """
 
 import json
+import math
 import resource
 import sys
 import time
@@ -34,8 +35,8 @@ def run(bricks: int, robots: str, formulation: str, seconds: float) -> dict[str,
     )
     spent = time.process_time() - start
     proof = plan.certificate
-    claimed = plan.selection.bound[1]
-    proven = proof.bounds[1] if proof is not None else None
+    proven = proof.bounds[1] if proof is not None else -math.inf
+    claimed = max(plan.selection.bound[1], proven)
     reassigned = seqopt.GivenSequence(plain.engine, plain.reassigned()).makespan
     row = {"bricks": bricks, "robots": robots, "formulation": formulation}
     row |= {"kind": plan.formulation.kind.value, "planned": plain.makespan}

@@ -338,7 +338,8 @@ def _time_notes(plan: Plan) -> tuple[str, ...]:
     """Return how long a plan takes where that is known, and no aim."""
     if plan.makespan is None or "makespan" in plan.goals:
         return ()
-    return (f"time: the build takes {plan.makespan:.6g} s; --aim makespan makes it short",)
+    what = "the build" if plan.steps[0].number == 1 else "what is left"
+    return (f"time: {what} takes {plan.makespan:.6g} s; --aim makespan makes it short",)
 
 
 def _said(found: Found) -> str:

@@ -15,6 +15,8 @@ from seqopt._cli.answer import Answer
 from seqopt._cli.arguments import parser
 from seqopt._cli.commands import optimize
 from seqopt._cli.options import (
+    CURING,
+    DURATIONS,
     LIMIT,
     RULE,
     STANDING,
@@ -75,7 +77,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     declare(basic, {"--out DIR": "folder to write the new plan to"})
     declare(command.add_argument_group("what has changed"), CHANGES)
     asked = command.add_argument_group("what is asked, if not as before")
-    declare(asked, AIM | LIMIT | RULE | STANDING)
+    declare(asked, AIM | LIMIT | RULE | STANDING | CURING)
+    declare(asked, DURATIONS)
     form_options(command, strict=True, builds=True)
     criterion_options(command)
     engine_options(command)

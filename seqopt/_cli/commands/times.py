@@ -5,10 +5,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 
+import pandas as pd
+
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import (
     asked_scene,
     asked_steps,
+    exceeded,
     idle_notes,
     in_seconds,
     scene_facts,
@@ -27,13 +30,19 @@ from seqopt._cli.options import (
 from seqopt._cli.outputs import figure_notes, require_out, time_files, write_outputs
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_standing
+from seqopt._files import csv_text
+from seqopt.contact.curing import _find_curing
 from seqopt.engines.registry import USUAL, make_engine
-from seqopt.errors import ProblemError, StepError
+from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.network.build import build_network
+from seqopt.plan._aged import SHARE, aged_table
 from seqopt.plan._times import busy_table
 from seqopt.plan.build import GivenSequence
 from seqopt.plan.judge._mortar.check import check_cured
 from seqopt.problem.standing import Standing
+from seqopt.responses.table import force_column
+from seqopt.scene.scene import Scene
+from seqopt.sequence._timing import step_times
 
 DESCRIPTION = (
     "Say how long a build takes and who does what when. A robot that holds nothing prepares what "
@@ -52,13 +61,20 @@ REASSIGN = {
 }
 
 
+STIFFENS = {
+    "--stiffens WORDS ...": "which share of its stiffness a joint has at an age, in the words of "
+    "--curing, from 0 s on, as 0s=0.05,15min=1: responses of every step with joints as stiff as "
+    "they are when it begins, beside the payloads"
+}
+
+
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``times``."""
     basic = command.add_argument_group("which build")
     scene_options(basic)
     steps_options(basic)
     declare(basic, DURATIONS | REASSIGN)
-    declare(command.add_argument_group("mortar that cures"), STANDING | CURING)
+    declare(command.add_argument_group("mortar that cures"), STANDING | CURING | STIFFENS)
     declare(basic, {"--out DIR": "folder to write plan.csv, times.csv and a chart to"})
     form_options(command)
 
@@ -80,7 +96,9 @@ def run(options: argparse.Namespace) -> Answer:
     if options.reassign:
         build = GivenSequence(build.engine, build.reassigned(), standing=standing)
         least = build.times()["end_s"].iloc[-1]
-    written = write_outputs(options, lambda: time_files(build))
+    aged = _aged(options, build)
+    files = {} if aged is None else {"aged.csv": csv_text(aged)}
+    written = write_outputs(options, lambda: time_files(build) | files)
     busy = busy_table(scene, build.steps, build._waits)
     if build.standing is not None:
         starts = build.times()["start_s"].tolist()
@@ -91,11 +109,13 @@ def run(options: argparse.Namespace) -> Answer:
             f"{what} {row[f'{what}_s']:.6g} s" for what in ("prepares", "acts", "holds", "idle")
         )
         lines.append(f"  {row['robot']}: {', '.join(spent)}")
+    lines += [] if aged is None else _softer(scene, build.responses(), aged)
     if written:
-        lines.append(f"written to {options.out}: plan.csv, times.csv")
+        lines.append(f"written to {options.out}: {', '.join(('plan.csv', 'times.csv', *files))}")
     else:
         lines.append("--out DIR writes when every step happens, and a chart of it")
     facts = {"makespan_s": given, "reassigned_s": least, "robots": busy, "steps": build.times()}
+    facts |= {} if aged is None else {"aged": aged}
     return Answer(
         facts={"scene": scene_facts(scene), **facts},
         text="\n".join(map(wrapped, lines)),
@@ -110,6 +130,39 @@ def _standing(options: argparse.Namespace) -> Standing | None:
     if standing is not None and not options.curing:
         raise ProblemError("--stands: it goes with --curing here; seqopt assess says what stands")
     return standing
+
+
+def _aged(options: argparse.Namespace, build: GivenSequence) -> pd.DataFrame | None:
+    """Return the responses of a build with joints as stiff as they are, where that is asked."""
+    if not options.stiffens:
+        return None
+    network = build.engine.network
+    times = step_times(network.scene, build.steps, build._waits)
+    try:
+        return aged_table(network, build.steps, times, _find_curing(options.stiffens))
+    except SceneError as error:
+        raise SceneError(f"--stiffens: {error}") from None
+
+
+def _softer(scene: Scene, full: pd.DataFrame, aged: pd.DataFrame) -> Iterator[str]:
+    """Yield what a build comes to with joints as stiff as they are, beside full stiffness."""
+    softest = 100 * aged[SHARE].min()
+    yield (
+        f"with joints as stiff as they are when each step begins, from {softest:.3g} % on, beside "
+        "full stiffness:"
+    )
+    columns = {"D_max_1e-3mm": "displacements up to", "F_max_N": "tension up to"}
+    columns |= {force_column(robot): f"{robot.name} holds up to" for robot in scene.robots}
+    for column, what in columns.items():
+        was, now = (table.set_index("step")[column].abs() for table in (full, aged))
+        if now.notna().any():
+            unit = "µm" if column.startswith("D_") else "N"
+            most = f"{now.max():.4g} {unit} in step {now.idxmax()}"
+            yield f"  {what} {most}, not {was.max():.4g} {unit}"
+    over = exceeded(scene, aged)
+    yield from (f"  payload exceeded: {each}" for each in over)
+    if not over:
+        yield "  no payload is exceeded"
 
 
 def _said(name: str, steps: int, given: float, least: float | None) -> Iterator[str]:

@@ -14,9 +14,11 @@ from seqopt.problem.requirements import overloads
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene, in_order
 from seqopt.sequence._rule_check import check_free
+from seqopt.sequence._timing import step_times
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step
+from seqopt.stability._aging.builds import CuringBuilds
 
 
 def without(
@@ -47,7 +49,8 @@ def without(
     before, after = _while_missing(scene, {*stands, *again}, rest)
     order = (*stands, *again, *before, *last, *after)
     made = scene if order == scene.build_order else in_order(scene, order)
-    return made, replace(site, bricks=len(stands), grips=held)
+    ages = tuple(a for n, a in zip(stood, site.ages, strict=False) if n not in missing)
+    return made, replace(site, bricks=len(stands), grips=held, ages=ages)
 
 
 def _while_missing(
@@ -82,9 +85,19 @@ def goes_on(states: States, steps: Sequence[Step]) -> dict[str, float]:
         over = overloads(states.network.scene, analyze(states.engine, steps))
         if over:
             raise StepError(f"payload exceeded: {over[0]}")
-    values = plan_values(states, steps)
+    values = plan_values(states, steps, starts=_starts(states, steps))
     pairs = zip(states.goals, states.names, values, strict=False)
     return {name: goal.shown(value) for goal, name, value in pairs}
+
+
+def _starts(states: States, steps: Sequence[Step]) -> tuple[float, ...]:
+    """Return when steps that go on start at the earliest, s, where they wait for mortar."""
+    standing = states.standing
+    if standing is None or standing.curing is None:
+        return ()
+    waits = CuringBuilds(states.network, standing.mortar, standing.curing).waits
+    times = step_times(states.network.scene, steps, waits, states.rules.begin)
+    return tuple(time.start for time in times)
 
 
 def compared(plan: Plan, old: Sequence[Step]) -> dict[str, object]:

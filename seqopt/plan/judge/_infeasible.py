@@ -13,11 +13,12 @@ import numpy as np
 
 from seqopt.engines.registry import recipe_of
 from seqopt.errors import InfeasibleError, SeqoptError, SolverError
+from seqopt.graph._counted import least_by_counts
 from seqopt.graph._explore import Explorer
 from seqopt.graph.layers._arcs import array_by_array, where_allowed
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
-from seqopt.graph.paths import distances, least_peak
+from seqopt.graph.paths import distances, least_peak, tied
 from seqopt.graph.scenarios import engine_for
 from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import States
@@ -113,14 +114,18 @@ def confirmed(problem: States, name: str, seconds: float = np.inf) -> SeqoptErro
 def _over_budget(problem: States, found: Explorer, name: str) -> SeqoptError:
     """Return the error that names what each budget needs at least, where plans exist without."""
     graph, states = found.graph()
-    words = []
+    words, proven = [], False
     for k, cap in enumerate(problem.budgets, start=len(problem.aims)):
-        if problem.goals[k].measure is Measure.MAKESPAN:  # what it is at least takes a search
+        if problem.goals[k].measure is Measure.MAKESPAN:  # what it is at best takes a search
+            if (least := least_by_counts(problem.network, problem.rules)) > tied(cap):
+                proven = True
+                words.append(f"makespan is at least {least:.6g} s, and {cap:g} s are allowed")
+                continue
             words.append(f"{cap:g} s of makespan are allowed; --aim makespan finds the least")
             continue
         least = distances(graph, graph.amounts[:, k])[graph.ends].min()
         words.append(f"{problem.goals[k]} is at least {least:.6g}, and {cap:g} is allowed")
-    proven = Proof(problem, {level: rows for level, _, rows in states}).is_impossible()
+    proven = proven or Proof(problem, {level: rows for level, _, rows in states}).is_impossible()
     claim = "" if proven else f"claimed by {name}, and not proven: "
     return InfeasibleError(
         f"{claim}{problem.title}: no plan is within all budgets; {', '.join(words)}"

@@ -315,7 +315,7 @@ class Proof:
         grips = [passable.held_by(rows) for rows in levels.states]
         cured = cured_rows(passable.problem, bricks, grips, claim.motions)
         while True:
-            own = passable.tables, levels.states, graph, fallen, cured
+            own = passable.tables, levels.states, levels.levels, graph, fallen, cured
             states = TimedStates(passable.problem, *own)
             proofs = GoalProofs(states, claim)
             out = (*values[:k], *proofs.bounds(k))

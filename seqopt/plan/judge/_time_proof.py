@@ -22,26 +22,29 @@ from seqopt.graph.graph import Graph
 from seqopt.graph.paths import TIED
 from seqopt.plan.judge._mortar.floors import CuredRows
 from seqopt.scene.scene import Scene
+from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, StepKind
 
 BETTER = 1e-9  # over a value: a build must be better by more than this
 BLOCK = 400_000  # acts that are looked at together
 
 
-def makespan(scene: Scene, steps: Sequence[Step]) -> float:
+def makespan(scene: Scene, steps: Sequence[Step], begin: Site | None = None) -> float:
     """Return when the last of some steps ends, s: the longest way through what waits for what."""
-    return ([0.0, *step_ends(scene, steps)])[-1]
+    return ([0.0, *step_ends(scene, steps, begin=begin)])[-1]
 
 
 def step_ends(
-    scene: Scene, steps: Sequence[Step], starts: Sequence[float] = ()
+    scene: Scene, steps: Sequence[Step], starts: Sequence[float] = (), begin: Site | None = None
 ) -> tuple[float, ...]:
     """Return when steps end, s, at the earliest, or where they start at some times.
 
+    ``begin``: where the build begins, with robots that are free from then on.
+
     Raises `SolverError` if one starts before the one before it ends, or its robot is ready.
     """
-    ends, let_go, held = [0.0], dict[int, int](), dict[int, int]()
-    grips: Sequence[int | None] = (None,) * len(scene.robots)
+    ends, let_go = [0.0], dict[int, int]()
+    grips, held = _at_first(scene, begin)
     for i, step in enumerate(steps, start=1):
         waits, acts = [ends[-1]], 0.0
         for r, (robot, old, new) in enumerate(zip(scene.robots, grips, step.grips, strict=True)):
@@ -68,6 +71,15 @@ def step_ends(
         ends.append(start + acts)
         grips = step.grips
     return tuple(ends[1:])
+
+
+def _at_first(scene: Scene, begin: Site | None) -> tuple[Sequence[int | None], dict[int, int]]:
+    """Return what robots hold where a build begins, and where they hold or held last."""
+    if begin is None:
+        return (None,) * len(scene.robots), {}
+    grips = begin.holds(scene)
+    lasts = (begin.stays or (None,) * len(grips), grips)
+    return grips, {r: n for nodes in lasts for r, n in enumerate(nodes) if n is not None}
 
 
 class Team(NamedTuple):
@@ -251,6 +263,8 @@ class Closed:
         order = np.lexsort((values[useful, 0], state[useful]))
         known = state[useful][order], values[useful][order]
         first = np.zeros((1, values.shape[1]))
+        if self._moves.cured is not None:
+            first[:, first.shape[1] - len(self._moves.cured.placed) :] = self._moves.cured.placed
         start = np.zeros(1, dtype=np.int64)
         missing = [start[self._lacks(known, start, first)]]
         for block in _blocks(known[0], graph):

@@ -30,13 +30,15 @@ Fallen = Callable[[int, Ints], Bools]
 class TimedStates:
     """The states that a better build could pass, by level, and the moves between them.
 
-    ``levels``: of rows (n, c), numbered one level after the other; ``fallen``: which rows (k,) of a
+    ``levels``: of rows (n, c), numbered one level after the other; ``which``: their levels, of
+    which the first may come twice, as where the build begins; ``fallen``: which rows (k,) of a
     level are proven to fall; ``cured``: what all of them ask of mortar, where it cures.
     """
 
     problem: States
     tables: RuleTables | ScheduleTables
     levels: Sequence[Ints]
+    which: Sequence[int]
     graph: Graph
     fallen: Fallen
     cured: CuredRows | None = None
@@ -49,7 +51,7 @@ class TimedStates:
     def moves(self, graph: Graph) -> TimedMoves:
         """Return what moves of a graph of these states take of the time of robots."""
         rows = np.concatenate([each[:, : self.tables.robots] for each in self.levels])
-        level = np.repeat(np.arange(len(self.levels)), [*map(len, self.levels)])
+        level = np.repeat(self.which, [*map(len, self.levels)])
         places = level[graph.target] > level[graph.source]
         rules = self.problem.rules
         if isinstance(rules, Schedule):
@@ -96,8 +98,8 @@ class TimedStates:
             sort = np.lexsort((times, -own), axis=1)
             values[:, [1 + c for c in group]] = np.take_along_axis(times, sort, axis=1)
         entries = self.tables.in_order(entries.astype(self.tables.start().dtype))
-        numbers = np.full(len(entries), -1)
-        for level, (rows, first) in enumerate(zip(self.levels, self.starts, strict=True)):
+        numbers, labels = [np.zeros(0, dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+        for level, rows, first in zip(self.which, self.levels, self.starts, strict=True):
             own = np.flatnonzero(proof.states[:, 0] == level)
             if len(own) and len(rows):
                 codes = self.tables.codes(rows)
@@ -105,16 +107,19 @@ class TimedStates:
                 wanted = self.tables.codes(entries[own])
                 at = np.searchsorted(codes, wanted, sorter=sort).clip(max=len(rows) - 1)
                 found = codes[sort[at]] == wanted
-                numbers[own[found]] = first + sort[at[found]]
-        known = (numbers >= 0) & np.isfinite(values).all(axis=1)
-        return numbers[known], values[known]
+                numbers.append(first + sort[at[found]])
+                labels.append(own[found])
+        number, label = np.concatenate(numbers), np.concatenate(labels)
+        known = np.isfinite(values[label]).all(axis=1)
+        return number[known], values[label[known]]
 
     def all_fallen(self, states: Ints) -> Bools:
         """Return which states of some numbers are proven to fall."""
         out = np.zeros(len(states), dtype=bool)
-        for level, (rows, first) in enumerate(zip(self.levels, self.starts, strict=True)):
+        every = zip(self.which, self.levels, self.starts, strict=True)
+        for level, rows, first in [*every][1:]:  # in the first one it begins, whatever it takes
             own = np.flatnonzero((states >= first) & (states < first + len(rows)))
-            if len(own) and level:
+            if len(own):
                 out[own] = self.fallen(level, rows[states[own] - first])
         return out
 

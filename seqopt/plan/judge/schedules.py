@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.errors import SolverError, StepError
+from seqopt.graph._counted import least_by_counts
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.judge._mortar.check import check_cured
@@ -59,8 +60,10 @@ def judge_schedule(
     values = _as_claimed(problem, selection, steps)
     if problem.is_timed and np.isfinite(selection.bound).any():
         return _in_time(problem, selection, values, hint)
-    if selection.stopped:  # its bounds are claimed, not proven
-        return Certificate(values, (-np.inf,) * len(values), np.inf, np.inf)
+    if selection.stopped:  # its bounds are claimed, not proven; how long builds take is counted
+        bounds = _counted(problem, values, (-np.inf,) * len(values))
+        gap = _gap(problem.aims, values, bounds)
+        return Certificate(values, bounds, gap, gap)
     if problem.totals:
         return _over_totals(problem, selection, values[0], hint)
     proof = Proof(problem, hint)
@@ -88,10 +91,24 @@ def _in_time(
     bounds = (*margins, *proof.timed_bounds(claim)[len(margins) :])
     pairs = list(zip(bounds, values, strict=False))
     bounds = tuple(v if b >= v - BELOW * abs(v) else b for b, v in pairs)
+    bounds = _counted(problem, values, bounds)
     said = zip(bounds, selection.bound, values, strict=False)
     claimed = [min(v, max(b, other)) for b, other, v in said]
     gap, left = (_gap(problem.goals, values, each) for each in (bounds, claimed))
     return Certificate(values, (*bounds, *values[aims:]), gap, left, {}, proof.states)
+
+
+def _counted(
+    problem: States, values: Sequence[float], bounds: Sequence[float]
+) -> tuple[float, ...]:
+    """Return bounds of first goals, those on makespans no less than what all builds take."""
+    if not problem.is_timed:
+        return tuple(bounds)
+    least = least_by_counts(problem.network, problem.rules)
+    return tuple(
+        max(bound, min(least, value)) if goal.measure is Measure.MAKESPAN else bound
+        for goal, value, bound in zip(problem.goals, values, bounds, strict=False)
+    )
 
 
 def _gap(goals: Sequence[Goal], values: Sequence[float], bounds: Sequence[float]) -> float:
@@ -235,11 +252,11 @@ def plan_values(
 
 def _makespan(problem: States, steps: Sequence[Step], starts: Sequence[float]) -> float:
     """Return how long a build takes, s, and require that no step comes before its mortar holds."""
-    standing, scene = problem.standing, problem.network.scene
+    standing, scene, begin = problem.standing, problem.network.scene, problem.rules.begin
     if standing is None or standing.curing is None:
-        return makespan(scene, steps)
-    check_cured(problem.network, steps, standing, starts)
-    return step_ends(scene, steps, starts)[-1]
+        return makespan(scene, steps, begin)
+    check_cured(problem.network, steps, standing, starts, begin)
+    return step_ends(scene, steps, starts, begin)[-1]
 
 
 def _in_all(

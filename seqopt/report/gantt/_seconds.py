@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence._timing import StepTime, Waits, step_times
 from seqopt.sequence.schedule import Hold, holds
+from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step
 
 PER_STEP, NARROWEST, WIDEST = 0.15, 7.0, 30.0  # inches
@@ -37,24 +39,29 @@ def seconds_picture(
     responses: pd.DataFrame,
     shown: tuple[int | None, int | None] = (None, None),
     waits: Waits | None = None,
+    begin: Site | None = None,
 ) -> Figure:
     """Return the grips of a build over seconds, a lane per robot, shaded by their forces.
 
-    ``waits``: as of `step_times`, where mortar cures: such waits are marked behind all lanes.
+    ``waits``: as of `step_times`, where mortar cures: such waits are marked behind all lanes;
+    ``begin``: where a part of a build begins.
     """
-    first, last = shown[0] or 1, len(steps) if shown[1] is None else shown[1]
-    if not 1 <= first <= last <= len(steps):
-        raise StepError(f"steps {first} to {last}: the build has steps 1 to {len(steps)}")
-    times = step_times(scene, steps, waits)
-    begin, end = 0.0 if first == 1 else times[first - 2].end, times[last - 1].end
+    before = steps[0].number - 1
+    own = range(before + 1, before + len(steps) + 1)
+    first, last = (own[end] if s is None else s for s, end in zip(shown, (0, -1), strict=True))
+    if not own[0] <= first <= last <= own[-1]:
+        raise StepError(f"steps {first} to {last}: the build has steps {own[0]} to {own[-1]}")
+    times = step_times(scene, steps, waits, begin)
+    first, last = first - before, last - before
+    start, end = 0.0 if first == 1 else times[first - 2].end, times[last - 1].end
     width = float(np.clip(PER_STEP * (last - first + 1) + BESIDE, NARROWEST, WIDEST))
     figure = new_picture(width, 0.62 * len(scene.robots) + 1.3)
     axes = figure.add_subplot()
     forces = responses[[force_column(robot) for robot in scene.robots]].to_numpy(float)
     shade = ScalarMappable(Normalize(0.0, np.nanmax(forces, initial=0.0) or 1.0), colormaps[SHADES])
     colors = shade.to_rgba(forces)
-    inch = (width - BESIDE) / (end - begin or 1.0)
-    for hold in holds(scene, steps):
+    inch = (width - BESIDE) / (end - start or 1.0)
+    for hold in holds(scene, [replace(step, number=step.number - before) for step in steps]):
         if hold.last >= first and hold.first <= last:
             stops = _stops(times, hold)
             _bar(axes, hold, stops, colors[hold.first - 1 : hold.last, hold.robot])
@@ -66,7 +73,7 @@ def seconds_picture(
     spans = [span for end, time in pairs if (span := _cured(end, time)) is not None]
     for span in spans:
         axes.axvspan(*span, fc=CURES, lw=0, zorder=0, gid="cures")
-    _frame(axes, scene, (begin, end), cures=bool(spans))
+    _frame(axes, scene, (start, end), cures=bool(spans))
     figure.colorbar(shade, ax=axes, label="grip force, N", pad=0.01)
     return figure
 
@@ -111,7 +118,8 @@ def _frame(axes: Axes, scene: Scene, span: tuple[float, float], *, cures: bool) 
 
 def _stops(times: Sequence[StepTime], hold: Hold) -> list[tuple[float, float]]:
     """Return from when to when a grip lasts in each of its steps, up to when it is let go, s."""
-    out = [(times[hold.first - 1].start, times[hold.first - 1].end)]
+    taken = times[hold.first - 1]
+    out = [(taken.start if hold.robot in taken.robots else 0.0, taken.end)]  # who held at first
     out += [(times[n - 2].end, times[n - 1].end) for n in range(hold.first + 1, hold.last + 1)]
     if hold.last < len(times):
         out[-1] = (out[-1][0], times[hold.last].end)

@@ -14,6 +14,7 @@ from seqopt.errors import SolverError
 from seqopt.network.network import Network
 from seqopt.plan.judge._time_proof import step_ends
 from seqopt.problem.standing import Standing
+from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability.assessment import Verdict, verdict
 
@@ -22,21 +23,28 @@ CLOSE = 1e-9  # of a time: what rounding may take from an age
 
 
 def check_cured(
-    network: Network, steps: Sequence[Step], standing: Standing, starts: Sequence[float]
+    network: Network,
+    steps: Sequence[Step],
+    standing: Standing,
+    starts: Sequence[float],
+    begin: Site | None = None,
 ) -> None:
     """Require that the state of every step stands with what its joints have when it starts.
 
-    ``starts``: of the steps, s; what is changed is in its place when the step ends. Verdicts are of
+    ``starts``: of the steps, s; what is changed is in its place when the step ends; ``begin``:
+    where the build begins; what stands there is as old as it says. Verdicts are of
     the cone program, one by one. Raises `SolverError` for a step that starts before its robot is
     ready, or is not proven to stand.
     """
     curing = standing.curing
     if len(starts) != len(steps):
         raise SolverError(f"{len(starts)} starts for {len(steps)} steps")
-    ends = step_ends(network.scene, steps, starts)
+    ends = step_ends(network.scene, steps, starts, begin)
     if curing is None:
         return
-    known, placed, found = Contacts(network), dict[int, float](), dict[object, Verdict]()
+    known, found = Contacts(network), dict[object, Verdict]()
+    placed = dict.fromkeys(range(0 if begin is None else begin.bricks), 0.0)
+    placed |= {k: -age for k, age in enumerate(() if begin is None else begin.ages)}
     for step, start, end in zip(steps, starts, ends, strict=True):
         whole = step_assembly(network, step.bricks, step.grips, known)
         bond = tuple(

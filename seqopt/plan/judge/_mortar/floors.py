@@ -78,13 +78,15 @@ class Floors:
 class CuredRows(NamedTuple):
     """What rows of states ask of mortar that cures.
 
-    ``floors``: under waits; ``bricks`` (n,): that stand; ``held``, ``payload`` (n, r): grips.
+    ``floors``: under waits; ``bricks`` (n,): that stand; ``held``, ``payload`` (n, r): grips;
+    ``placed`` (b,): when bricks came that stand at first, s, zero of others.
     """
 
     floors: Floors
     bricks: Ints
     held: Ints
     payload: Floats
+    placed: Floats
 
     def starts(self, state: Ints, placed: Floats, start: Floats) -> Floats:
         """Return from when on, no sooner than times (k,), s, states may begin; see `Floors`."""
@@ -108,4 +110,8 @@ def cured_rows(
         return None
     held, payload = (np.concatenate([each[k] for each in grips]) for k in (0, 1))
     count = np.repeat(bricks, [len(each) for each, _ in grips])
-    return CuredRows(Floors(problem.network, standing, motions), count, held, payload)
+    begin, floors = problem.rules.begin, Floors(problem.network, standing, motions)
+    placed = np.zeros(len(floors.full))
+    for k, age in enumerate(() if begin is None else begin.ages):
+        placed[k] = -age
+    return CuredRows(floors, count, held, payload, placed)

@@ -1,0 +1,75 @@
+"""A bound on all builds by counts of grips: below every build, and exact where one robot works."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import seqopt
+from seqopt.errors import InfeasibleError
+from seqopt.graph._counted import least_by_counts
+from seqopt.plan._status import Status
+from seqopt.plan.judge.schedules import judge_schedule
+from seqopt.sequence._timing import step_times
+from seqopt.sequence.rules import FreeRules, with_robots
+from tests.brute_force import ONES
+from tests.builders import small_arch
+from tests.times.builders import RULES, WORDS, engine_of, least_makespan
+
+SECONDS = st.floats(0.0, 100.0)
+ALONE = FreeRules(least_grips=1)
+
+
+@pytest.mark.parametrize("words", [(), ("rob3:slower=2.5",), ("speed=0.01",)])
+@pytest.mark.parametrize("rules", [RULES, FreeRules(ending="one-by-one"), FreeRules()])
+def test_no_build_takes_less_than_counts_say(words, rules):
+    engine = engine_of(3, 3, *words)
+    least = least_makespan(engine, rules)
+    assert 0.5 * least < least_by_counts(engine.network, rules) <= least * (1 + 1e-9)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.tuples(*[SECONDS] * 5), st.floats(0.2, 5.0))
+def test_given_builds_take_no_less(seconds, slower):
+    names = ("fetch", "place", "approach", "grip", "release")
+    words = ",".join(f"{name}={value}" for name, value in zip(names, seconds, strict=True))
+    scene = seqopt.load_scene("arch25").with_durations(words, f"rob2:slower={slower}")
+    network = seqopt.build_network(scene)
+    took = step_times(scene, seqopt.cantilever(network))[-1].end
+    least = least_by_counts(network, FreeRules(newest="free"))
+    assert least <= took * (1 + 1e-9)
+    assert least >= 25 * (min(1.0, slower) * seconds[1]) * (1 - 1e-9)  # one places after the other
+
+
+def test_a_robot_that_does_all_alone_is_known_exactly():
+    scene = with_robots(small_arch(1), 1).with_durations(WORDS)
+    network = seqopt.build_network(scene)
+    assert least_by_counts(network, ALONE) == pytest.approx(30 + 10 + 5)
+    assert least_by_counts(network, replace(ALONE, ending="held")) == pytest.approx(30 + 10)
+
+
+def test_a_search_that_ends_before_it_knows_anything_leaves_a_proven_bound():
+    plan = seqopt.solve(seqopt.pose(engine_of(4, 3), RULES, ONES, "makespan"))
+    early = replace(plan.selection, bound=(-np.inf,), proofs=(), stopped="time")
+    proof = judge_schedule(replace(plan.graph), early, plan.steps)
+    assert 0 < proof.bounds[0] < plan.makespan
+    assert proof.gap == pytest.approx(1 - proof.bounds[0] / plan.makespan)
+    found = replace(plan, selection=early, certificate=proof)
+    assert (found.status, found.gap) == (Status.FEASIBLE, proof.gap)
+    assert found.summary()["bound"] == {"makespan": proof.bounds[0]}
+
+
+@pytest.mark.parametrize(
+    ("share", "said"), [(0.9, r"^free.* at least .* s, and"), (1.1, "^claimed")]
+)
+def test_a_budget_below_what_counts_say_is_proven_to_be_too_small(share, said):
+    engine = engine_of(3, 3)
+    cap = share * least_by_counts(engine.network, RULES)
+    assert cap < least_makespan(engine, RULES)
+    problem = seqopt.pose(engine, RULES, ONES, "minmax", budgets=f"makespan={cap}s")
+    with pytest.raises(InfeasibleError, match=said):
+        seqopt.solve(problem)
