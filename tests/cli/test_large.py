@@ -170,7 +170,10 @@ def test_an_interrupt_names_what_was_chosen(tmp_path, workers):
 @posix
 def test_a_killed_worker_is_replaced(tmp_path):
     """By the slow engine: most of the work is still to be done when the first answer is there."""
-    words = [*WORDS, "cascade", "--no-proof", "--engine", "frame", "--candidates", "near:4"]
+    scene = tmp_path / "scene.json"
+    save_scene(small_arch(13), scene)
+    words = [*WORDS, "cascade", str(scene), "--no-proof", "--engine", "frame"]
+    words += ["--candidates", "near:6"]
     run = start(
         *words, "--out", tmp_path / "out", "--workers", "2", "--cache", tmp_path / "answers"
     )
