@@ -137,7 +137,7 @@ def holds(rest: pd.DataFrame, loss: pd.DataFrame) -> bool:
 
 def experiment(options: Options) -> Finding:
     engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
-    every = 30 if options.quick else 1
+    every = 45 if options.quick else 1
     rest, loss = (pd.DataFrame(each(engine, every)) for each in (rests, losses))
     for name, rows in rest.groupby("plan", sort=False):
         gain = (1 - rows["anew"] / rows["planned"]).max()
