@@ -265,20 +265,41 @@ def is_linear(engine: Engine) -> bool:
 def each_tolerance(engine: Engine, steps: Sequence[_Held]) -> Floats:
     """Return how far grips may be off in every step, m.
 
-    All steps of a brick count with as many grips are solved at once, equal ones once.
+    All steps with as many grips are asked at once, equal ones once.
     """
     asked: dict[tuple[int, int, tuple[int, ...]], list[int]] = {}
     for place, (_, bricks, held) in enumerate(steps):
-        asked.setdefault((bricks, len(held), held), []).append(place)
+        asked.setdefault((len(held), bricks, held), []).append(place)
     out = np.full(len(steps), np.inf)
-    for (bricks, _), same in groupby(sorted(asked), key=itemgetter(0, 1)):
+    for count, same in groupby(sorted(asked), key=itemgetter(0)):
         mine = [*same]
-        found = misfits(engine, bricks, np.array([held for *_, held in mine], dtype=np.int64))
+        found = _misfits_of(engine, mine) if count else np.zeros(len(mine))
         for key, misfit in zip(mine, found.tolist(), strict=True):
             out[asked[key]] = (
                 np.inf if misfit == 0 else 0.0 if misfit >= NO_TOLERANCE else 1 / misfit
             )
     return out
+
+
+def _misfits_of(engine: Engine, keys: Sequence[tuple[int, int, tuple[int, ...]]]) -> Floats:
+    """Return what `misfits` does of grip sets of all brick counts, with as many grips each."""
+    out, rows = np.zeros(len(keys)), [np.arange(0)]
+    groups: list[_Group] = []
+    for bricks, same in groupby(range(len(keys)), key=lambda i: keys[i][1]):
+        mine = np.array([*same])
+        grips = np.array([keys[i][2] for i in mine], dtype=np.int64)
+        tied = _tied(engine, bricks, grips)
+        out[mine[tied]] = NO_TOLERANCE
+        if not tied.all():
+            left = grips[~tied]
+            payload = _payloads(engine.network, left)
+            groups += _groups(engine, bricks, left, payload, ROBOTS_ALONE)
+            rows.append(mine[~tied])
+    if groups:
+        each = zip(*((group.own, group.change, group.most) for group in groups), strict=True)
+        rates, _ = _Group("payload", *map(np.concatenate, each)).rates()
+        out[np.concatenate(rows)] = rates.max(axis=1)
+    return np.minimum(out, NO_TOLERANCE)
 
 
 _SOFTEST, _STIFFEST = 1e2, 1e12  # N/m, between which a stiffness is sought
