@@ -44,5 +44,6 @@ nitpicky = True
 nitpick_ignore_regex = [("py:class", r"(numpy|collections)\..*")]  # they have pages elsewhere
 
 autodoc_member_order = "bysource"
+autodoc_use_type_comments = False  # there are none, and the search for them takes long
 autodoc_typehints = "none"  # the numpydoc sections carry shapes and units
 numpydoc_show_class_members = False

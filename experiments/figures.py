@@ -233,6 +233,7 @@ def free_front(engine: Engine) -> Figure:
     return front_figure(fronts[0], method_tables(engine)[0], {"three-robot loop": fronts[1].table})
 
 
+SEARCHED = "free_front.png"
 PICTURES: dict[str, Callable[[Engine], Figure]] = {
     "twisting_step.png": twisting_step,
     "network.png": network_picture,
@@ -242,7 +243,7 @@ PICTURES: dict[str, Callable[[Engine], Figure]] = {
     "vault338.png": vault,
     "library.png": library,
     "words.png": scenes_in_words,
-    "free_front.png": free_front,
+    SEARCHED: free_front,
 }
 
 
@@ -263,9 +264,13 @@ def unlike(drawn: Floats, stored: Floats) -> float:
 
 
 def differing(engine: Engine, *, store: bool) -> dict[str, float]:
-    """Return how far every picture differs from the stored one, which it then may replace."""
+    """Return how far every picture differs from the stored one, which it then may replace.
+
+    Where nothing is stored, the picture whose search takes longer than all others is left out.
+    """
     out = {}
-    for name, draw in PICTURES.items():
+    for name in PICTURES if store else PICTURES.keys() - {SEARCHED}:
+        draw = PICTURES[name]
         figure, path, buffer = draw(engine), FIGURES / name, io.BytesIO()
         figure.savefig(buffer, dpi=DPI, format="png")
         buffer.seek(0)
@@ -283,7 +288,7 @@ def experiment(options: Options) -> Finding:
     return Finding(max(far.values()) <= ALIKE)
 
 
-CLAIM = Claim(experiment, quick="all pictures, nothing written")
+CLAIM = Claim(experiment, quick="all pictures but the Pareto sets, nothing written")
 
 if __name__ == "__main__":
     CLAIM.main()

@@ -20,7 +20,7 @@ def plugins(group: str) -> dict[str, EntryPoint]:
     >>> sorted(plugins("seqopt.limit_analysis"))
     ['lp', 'socp']
     """
-    return {entry.name: entry for entry in _read(_places()).select(group=group)}
+    return dict(_of_group(_places(), group))
 
 
 def _places() -> _Places:
@@ -39,6 +39,11 @@ def _changed(place: str) -> int:
 def _read(places: _Places) -> EntryPoints:  # noqa: ARG001  # what is read follows from them
     found: EntryPoints = entry_points()  # type: ignore[assignment]  # typed as of Python 3.9
     return found
+
+
+@lru_cache(maxsize=8)
+def _of_group(places: _Places, group: str) -> dict[str, EntryPoint]:
+    return {entry.name: entry for entry in _read(places).select(group=group)}
 
 
 class SeqoptError(Exception):

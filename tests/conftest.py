@@ -30,6 +30,22 @@ settings.register_profile(
 settings.load_profile("seqopt")
 
 
+LONGEST = "test_the_site_builds_strictly"
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Leave out files without a slow test where no others are asked for; loading takes long."""
+    slow_alone = config.option.markexpr.startswith("slow")
+    if slow_alone and collection_path.name.startswith("test_"):
+        return True if "slow" not in collection_path.read_text(encoding="utf-8") else None
+    return None
+
+
+def pytest_collection_modifyitems(items):
+    """Start with the test that takes longest, so that no worker waits for it at the end."""
+    items.sort(key=lambda item: item.name != LONGEST)
+
+
 @pytest.fixture(scope="session")
 def arch25():
     return load_scene("arch25")

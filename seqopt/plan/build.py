@@ -79,7 +79,7 @@ class ShownBuild(Shown):
     def _within(self) -> LinearRange:
         return LinearRange(self.engine)
 
-    @property
+    @cached_property
     def enough(self) -> Enough:
         """Which model was enough for the steps, what others would change, what is left out."""
         return what_was_enough(self._within, {"": self.responses()})

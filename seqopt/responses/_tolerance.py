@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain, groupby
+from itertools import groupby
 from operator import itemgetter
 
 import numpy as np
@@ -123,13 +123,6 @@ class _Group:
         return float(proven_rates(*self._flat, direction.reshape(-1, 3))[1].max())
 
 
-def _joined(groups: Sequence[_Group]) -> _Group:
-    """Return vectors of one kind and as many grips as of one group."""
-    parts = ("own", "change", "most")
-    own, change, most = (np.concatenate([getattr(each, p) for each in groups]) for p in parts)
-    return _Group(groups[0].what, own, change, most)
-
-
 class _Tensions(_Group):
     """Axial forces, the first component of the three, which may be as low as they will."""
 
@@ -193,21 +186,16 @@ def misfits(engine: Engine, bricks: int, grips: Ints, allowed: Allowed = ROBOTS_
     ``grips`` (S, r): numbers, as of `seqopt.Scene.grip_numbers`.
     """
     held, payload = grips.shape[1], _payloads(engine.network, grips)
-    out = _misfits_known(engine, bricks, grips)
-    rows = np.flatnonzero(out == 0) if held and bricks else np.arange(0)
+    if not bricks:  # the empty site: nobody holds
+        return np.zeros(len(grips))
+    out = np.where(_tied(engine, bricks, grips), NO_TOLERANCE, 0.0)
+    rows = np.flatnonzero(out == 0) if held else np.arange(0)
     step = max(1, _AT_ONCE // (3 * held + 1))
     for start in range(0, len(rows), step):
         part = rows[start : start + step]
         groups = _groups(engine, bricks, grips[part], payload[part], allowed)
         out[part] = np.max([group.rates()[0].max(axis=1) for group in groups], axis=0)
     return np.asarray(np.minimum(out, NO_TOLERANCE))
-
-
-def _misfits_known(engine: Engine, bricks: int, grips: Ints) -> Floats:
-    """Return `NO_TOLERANCE` for sets (S,) with two rigid grips on a brick, and zero for others."""
-    if not bricks:  # the empty site: nobody holds
-        return np.zeros(len(grips))
-    return np.where(_tied(engine, bricks, grips), NO_TOLERANCE, 0.0)
 
 
 def _payloads(network: Network, grips: Ints) -> Floats:
@@ -277,33 +265,41 @@ def is_linear(engine: Engine) -> bool:
 def each_tolerance(engine: Engine, steps: Sequence[_Held]) -> Floats:
     """Return how far grips may be off in every step, m.
 
-    All steps of a brick count with as many grips are solved at once, equal ones once; the worst
-    directions of all with as many grips are sought at once.
+    All steps with as many grips are asked at once, equal ones once.
     """
     asked: dict[tuple[int, int, tuple[int, ...]], list[int]] = {}
     for place, (_, bricks, held) in enumerate(steps):
-        asked.setdefault((bricks, len(held), held), []).append(place)
-    misfit = np.zeros(len(steps))
-    rates: dict[int, list[tuple[_Group, list[list[int]]]]] = {}
-    for (bricks, count), same in groupby(sorted(asked), key=itemgetter(0, 1)):
+        asked.setdefault((len(held), bricks, held), []).append(place)
+    out = np.full(len(steps), np.inf)
+    for count, same in groupby(sorted(asked), key=itemgetter(0)):
         mine = [*same]
-        grips = np.array([held for *_, held in mine], dtype=np.int64)
-        known = _misfits_known(engine, bricks, grips)
-        for key, value in zip(mine, known.tolist(), strict=True):
-            misfit[asked[key]] = value
-        free = np.flatnonzero(known == 0) if count and bricks else np.arange(0)
-        if len(free):
-            sets = grips[free]
-            payload = _payloads(engine.network, sets)
-            (group,) = _groups(engine, bricks, sets, payload, ROBOTS_ALONE)
-            rates.setdefault(count, []).append((group, [asked[mine[i]] for i in free.tolist()]))
-    for found in rates.values():
-        groups, places = zip(*found, strict=True)
-        worst = _joined(groups).rates()[0].max(axis=1)
-        for where, rate in zip(chain.from_iterable(places), worst.tolist(), strict=True):
-            misfit[where] = rate
-    out = np.divide(1, misfit, out=np.full(len(steps), np.inf), where=misfit > 0)
-    return np.where(misfit >= NO_TOLERANCE, 0.0, out)
+        found = _misfits_of(engine, mine) if count else np.zeros(len(mine))
+        for key, misfit in zip(mine, found.tolist(), strict=True):
+            out[asked[key]] = (
+                np.inf if misfit == 0 else 0.0 if misfit >= NO_TOLERANCE else 1 / misfit
+            )
+    return out
+
+
+def _misfits_of(engine: Engine, keys: Sequence[tuple[int, int, tuple[int, ...]]]) -> Floats:
+    """Return what `misfits` does of grip sets of all brick counts, with as many grips each."""
+    out, rows = np.zeros(len(keys)), [np.arange(0)]
+    groups: list[_Group] = []
+    for bricks, same in groupby(range(len(keys)), key=lambda i: keys[i][1]):
+        mine = np.array([*same])
+        grips = np.array([keys[i][2] for i in mine], dtype=np.int64)
+        tied = _tied(engine, bricks, grips)
+        out[mine[tied]] = NO_TOLERANCE
+        if not tied.all():
+            left = grips[~tied]
+            payload = _payloads(engine.network, left)
+            groups += _groups(engine, bricks, left, payload, ROBOTS_ALONE)
+            rows.append(mine[~tied])
+    if groups:
+        each = zip(*((group.own, group.change, group.most) for group in groups), strict=True)
+        rates, _ = _Group("payload", *map(np.concatenate, each)).rates()
+        out[np.concatenate(rows)] = rates.max(axis=1)
+    return np.minimum(out, NO_TOLERANCE)
 
 
 _SOFTEST, _STIFFEST = 1e2, 1e12  # N/m, between which a stiffness is sought

@@ -19,6 +19,7 @@ nowhere above the largest of its values at these over the distance of their plan
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -102,7 +103,7 @@ def _search(vectors: _Vectors) -> tuple[Floats, Floats]:
 
     Elsewhere from several, and where no proof is close yet, by triangles.
     """
-    sphere = np.unique(_triangles(2).reshape(-1, 3).round(12), axis=0)
+    sphere = _sphere()
     every = np.broadcast_to(sphere, (len(vectors.own), *sphere.shape))
     starts = sphere[np.argsort(-vectors.rates(every), axis=1, kind="stable")[:, :_BEST]]
     rate, direction = _climb(vectors, starts[:, 0])
@@ -241,6 +242,12 @@ def _quartered(triangles: Floats) -> Floats:
     ab, bc, ca = middle
     parts = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
     return np.concatenate([np.stack(part, axis=1) for part in parts])
+
+
+@cache
+def _sphere() -> Floats:
+    """Return unit vectors (v, 3) in all directions."""
+    return np.unique(_triangles(2).reshape(-1, 3).round(12), axis=0)
 
 
 def _triangles(times: int) -> Floats:

@@ -184,7 +184,8 @@ class LinearRange:
         lever = lengths(self._limits.assembly.corner - springs.position[face])
         strain = (shift[face] + turn[face] * lever) / self._thickness[face]
         excess = self._limits.excess(fields.joint_wrench)[0]
-        return np.array([turned, strain.max(), excess.max(), excess.argmax()])
+        first = np.isclose(excess, excess.max(), rtol=1e-9, atol=0.0).argmax()  # of those that tie
+        return np.array([turned, strain.max(), excess.max(), first])
 
 
 def builds_in_words(departures: Mapping[str, Sequence[Departure]]) -> tuple[str, ...]:

@@ -90,11 +90,10 @@ class _Processes:
             context = multiprocessing.get_context("spawn")  # threads and fork do not go together
             end, self._leash = context.Pipe(duplex=False)
             self._pool = ProcessPoolExecutor(self.workers, context, _follow, (end,))
-        before = [] if self._started else multiprocessing.active_children()
-        with _deaf():
+        before = multiprocessing.active_children()
+        with _deaf():  # it starts a process at a time
             future = self._pool.submit(function, *arguments)
-        if not self._started:
-            self._started = [p for p in multiprocessing.active_children() if p not in before]
+        self._started += [p for p in multiprocessing.active_children() if p not in before]
         return future
 
     def drop(self, calls: Iterable[Future[Any]]) -> None:

@@ -77,6 +77,7 @@ def test_armadillo_on_its_true_faces():
     assert mine.verdict is Verdict.STANDS
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_faces_of_the_armadillo_are_found_where_the_file_has_them():
     """Its blocks are warped; two thirds of them touch within a millimeter, nearly all within 3."""

@@ -46,12 +46,20 @@ def posed(engine, criterion, limits=()):
 
 
 QUICK = {("overlap_dp", CONDITIONAL), ("minimax", WORST_RATIO), ("overlap_dp", OWN)}
+SLOW = {("overlap_dp", WEIGHTED), ("minimax", CONDITIONAL), ("overlap_mip", WORST_RATIO)}
+
+
+def marks(case):
+    """Quick, slow or for a release; every formulation and every criterion is quick or slow."""
+    if case in QUICK:
+        return []
+    return [pytest.mark.slow] if case in SLOW else [pytest.mark.slow, pytest.mark.long]
 
 
 @pytest.mark.parametrize(
     ("name", "criterion"),
     [
-        pytest.param(name, criterion, marks=() if (name, criterion) in QUICK else pytest.mark.slow)
+        pytest.param(name, criterion, marks=marks((name, criterion)))
         for name in ("overlap_dp", "minimax", "overlap_mip")
         for criterion in (CONDITIONAL, WEIGHTED, WORST_RATIO, OWN)
     ],

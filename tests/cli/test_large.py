@@ -21,7 +21,7 @@ from seqopt.scene.scene_file import save_scene
 from tests.builders import ROOT, small_arch
 from tests.commands import beside_models
 
-WORDS = ["optimize", "--formulation"]
+WORDS = ["optimize", "--no-stability", "--formulation"]
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX")
 
 
@@ -125,7 +125,7 @@ def test_a_run_under_a_memory_limit_ends_in_a_line(tmp_path, workers, limits):
     import resource  # noqa: PLC0415  # POSIX has it alone
 
     scene = tmp_path / "scene.json"
-    save_scene(small_arch(45), scene)
+    save_scene(small_arch(25), scene)
     words = [*WORDS, "overlap_dp", scene, "--workers", workers]
     statuses = set()
     for mebibytes in limits:
@@ -170,7 +170,10 @@ def test_an_interrupt_names_what_was_chosen(tmp_path, workers):
 @posix
 def test_a_killed_worker_is_replaced(tmp_path):
     """By the slow engine: most of the work is still to be done when the first answer is there."""
-    words = [*WORDS, "cascade", "--no-proof", "--engine", "frame", "--candidates", "near:6"]
+    scene = tmp_path / "scene.json"
+    save_scene(small_arch(13), scene)
+    words = [*WORDS, "cascade", str(scene), "--no-proof", "--engine", "frame"]
+    words += ["--candidates", "near:6"]
     run = start(
         *words, "--out", tmp_path / "out", "--workers", "2", "--cache", tmp_path / "answers"
     )
@@ -231,7 +234,7 @@ def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tm
             signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr("seqopt._cli.commands.optimize.within", lambda tell, seconds: interrupt)
-    words = ["optimize", "--formulation", name, "--budget", "travel=0.8"]
+    words = [*WORDS, name, "--budget", "travel=0.8"]
     assert main([*words, "--out", str(tmp_path / "out")]) == 130
     out, err = capsys.readouterr()
     assert err == "seqopt: interrupted; the plan is the best that was met\n"

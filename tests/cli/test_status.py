@@ -45,11 +45,8 @@ def shell(line):
         ("seqopt --help | true", 0, ""),
         ("seqopt analyze --method sequential >/dev/full", 2, "No space left on device"),
         ("seqopt --help >/dev/full", 2, "No space left on device"),
-        ("seqopt scene >/dev/full", 2, "No space left on device"),
         ("seqopt analyze --method sequential >&-", 2, "standard output is closed"),
-        ("seqopt scene >&-", 2, "standard output is closed"),
         ("seqopt scene arch52 2>&-", 2, ""),
-        ("seqopt scene arch52 2>/dev/full", 2, ""),
         ("seqopt scene arch52 >&- 2>&- <&-", 2, ""),
         ("PYTHONIOENCODING=ascii seqopt assess --help", 0, ""),
     ],
@@ -160,7 +157,7 @@ def test_statuses():
         ((*ANALYZE,), 0),
         ((*ANALYZE, "--strict"), 1),  # rob2 would hold 406 N of 392 N
         (("analyze", "--method", "cantilever", "--strict"), 1),
-        (("compare", "--strict"), 1),
+        (("compare", "--strict", "--no-stability"), 1),
     ],
 )
 def test_strict_asks_for_payloads(capsys, words, status):
@@ -170,10 +167,9 @@ def test_strict_asks_for_payloads(capsys, words, status):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("limits", "status"), [((), 0), (("--limit", "F_largest=300"), 0)])
-def test_strict_is_content_where_payloads_hold(capsys, tmp_path, limits, status):
+def test_strict_is_content_where_payloads_hold(capsys, tmp_path):
     words = ("optimize", "--formulation", "overlap_dp", "--strict", "--out", str(tmp_path / "o"))
-    assert main([*words, *limits]) == status
+    assert main([*words, "--limit", "F_largest=300"]) == 0
 
 
 def test_a_mechanism_has_no_answer(capsys, tmp_path):

@@ -65,9 +65,11 @@ def build_page(folder, text):
 @pytest.mark.parametrize(
     ("flaw", "said"),
     [
-        ("[lost](nowhere.md)\n\n{term}`gone`", ["index.md", "nowhere.md", "gone"]),
+        (
+            "[lost](nowhere.md)\n\n{term}`gone`\n\n" + r"$\frac{1}$",
+            ["index.md", "nowhere.md", "gone", "cannot become MathML"],
+        ),
         ("```{code-cell}\nassert 1 == 2\n```", ["index.md"]),
-        (r"$\frac{1}$", ["cannot become MathML"]),
     ],
 )
 def test_a_flaw_fails_the_build(tmp_path, flaw, said):

@@ -43,12 +43,36 @@ def told():
             yield pytest.param(text, id=path.stem)
 
 
+LONG = (
+    "--order search",
+    "seqopt pareto arch25",
+    "--bases",
+)  # commands that take as long as all others
+
+
+def shown(name, *, long):
+    """Blocks of a page that take long, or all others, which need nothing of these."""
+    text = (DOCS / f"{name}.md").read_text(encoding="utf-8")
+    return [b for b in blocks(text) if any(word in b.code for word in LONG) == long]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PAGES)
 def test_pages_show_what_is_printed(name, tmp_path):
+    check_printed(shown(name, long=False), tmp_path)
+
+
+@pytest.mark.long
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in PAGES if shown(name, long=True)])
+def test_pages_show_what_is_printed_after_a_while(name, tmp_path):
+    check_printed(shown(name, long=True), tmp_path)
+
+
+def check_printed(some, tmp_path):
     furnish(tmp_path)
     names = {}
-    for block in blocks((DOCS / f"{name}.md").read_text(encoding="utf-8")):
+    for block in some:
         printed, well = run(block, tmp_path, names)
         if block.printed is None:
             assert well, f"{block.code}\n{printed}"

@@ -12,13 +12,14 @@ import io
 import os
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from unittest.mock import patch
 
+from seqopt._cli.main import main
 from tests.builders import ROOT
 
 DOCS = ROOT / "docs"
@@ -106,19 +107,16 @@ def _python(code: str, folder: Path, names: dict[str, object]) -> str:
 
 
 def _command(line: str, folder: Path) -> tuple[str, int]:
-    words = [sys.executable, "-m", *line.split()]
-    paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
-    surroundings = os.environ | {"COLUMNS": "80", "PYTHONPATH": os.pathsep.join(paths)}
-    done = subprocess.run(
-        words,
-        cwd=folder,
-        env=surroundings,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-    )
-    return done.stdout, done.returncode
+    """Run a command in this process: a program would load the same libraries for every line."""
+    printed = io.StringIO()
+    with (
+        contextlib.chdir(folder),
+        patch.dict(os.environ, COLUMNS="80"),
+        contextlib.redirect_stdout(printed),
+        contextlib.redirect_stderr(printed),
+    ):
+        status = main(line.split()[1:])
+    return printed.getvalue(), status
 
 
 def refresh(name: str) -> None:

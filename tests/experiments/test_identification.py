@@ -31,7 +31,8 @@ def test_variants_of_the_identification_start_from_one_scene(name):
 
 
 @pytest.mark.slow
-def test_a_few_iterations_improve_the_start():
+def test_a_few_iterations_improve_the_start(monkeypatch):
+    monkeypatch.setattr("experiments.calibration.identify_arch25.SOFTENING", (0.1,))
     groups = VARIANTS["line in a plane"]
     wanted = target([printed_steps("sequential")])
     before = np.abs(residuals(scene_of(start_of(groups), groups), wanted))

@@ -31,7 +31,6 @@ from experiments.stability.witnesses import (
 )
 from seqopt.network.network import GROUND
 from seqopt.stability.assessment import Verdict
-from tests.commands import run
 
 
 @pytest.fixture(scope="module")
@@ -50,12 +49,6 @@ def changed(table, case, **values):
     for column, value in values.items():
         out.loc[out["case"] == case, column] = value
     return out
-
-
-@pytest.mark.slow
-def test_a_quick_run_holds_by_one_witness():
-    verdict = run("witnesses", "--quick").splitlines()[-1]
-    assert verdict.startswith("verdict: the claim holds, by one witness")
 
 
 def test_the_largest_sample_is_read_as_published():

@@ -184,7 +184,7 @@ def counted_front(graph, start, worst):
 
 @pytest.mark.slow
 @given(build=free_builds(most_bricks=4, most_robots=4))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=6, deadline=None)
 def test_steps_and_regrips_in_one_set_equal_brute_force(build):
     scene, rules = build
     engine = ComplianceEngine(build_network(scene))

@@ -38,8 +38,8 @@ from seqopt.stability.limit_analysis import GAP
 from tests.builders import small_arch
 from tests.strategies import free_builds
 
-slow = pytest.mark.slow
-TILTS = pytest.param("tilt,minmax", marks=(slow, pytest.mark.long))
+slow, long = pytest.mark.slow, (pytest.mark.slow, pytest.mark.long)
+TILTS = pytest.param("tilt,minmax", marks=long)
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
 
 
@@ -104,7 +104,7 @@ def check(scene, rules, mortar="dry"):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("least", [1, pytest.param(2, marks=slow)])
+@pytest.mark.parametrize("least", [pytest.param(1, marks=pytest.mark.long), 2])
 def test_a_small_arch_equals_brute_force(least):
     check(small_arch(4), FreeRules(least_grips=least))
 
@@ -153,7 +153,8 @@ def test_a_better_plan_that_stands_is_seen(dry):
 
 
 @pytest.mark.parametrize(
-    "aim", ["bond", *(pytest.param(a, marks=slow) for a in ("bond,steps", "friction")), TILTS]
+    "aim",
+    ["bond", pytest.param("bond,steps", marks=slow), pytest.param("friction", marks=long), TILTS],
 )
 def test_a_margin_is_the_best_to_its_width(dry, aim):
     """With the value that was found a plan exists; past the bound none does."""
@@ -312,8 +313,10 @@ def test_pareto_sets_with_a_margin(dry):
     assert front.table["bond"].is_monotonic_decreasing
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_arch_is_built_dry(engine25):
+    """Three robots can, as the README says and a test of its commands finds, but not two."""
     criterion = seqopt.CRITERIA["worst-ratio-published"]
     problem = build_states(engine25, FreeRules(), criterion, "steps,minmax", stands="dry")
     plan = seqopt.solve(problem, "schedule_search")

@@ -100,7 +100,9 @@ def exactly_within(problem):
     }
 
 
-@pytest.mark.parametrize("draws", [60, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "draws", [60, pytest.param(200, marks=(pytest.mark.slow, pytest.mark.long))]
+)
 @pytest.mark.parametrize("name", TAKERS)
 def test_none_is_within_only_where_enumeration_finds_none(name, draws):
     """Prices may rise without end where costs tie; rounding must not decide what is possible."""

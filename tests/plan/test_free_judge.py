@@ -158,7 +158,7 @@ def test_a_set_that_lacks_a_point_is_seen(front_of):
     whole = front_of(lambda found: found)
     assert whole.complete
     assert len(whole.table) > 2
-    for lost in range(len(whole.table)):
+    for lost in {0, len(whole.table) // 2, len(whole.table) - 1}:
         keep = [i for i in range(len(whole.table)) if i != lost]
         with pytest.raises(SolverError, match="the set lacks a point below"):
             front_of(

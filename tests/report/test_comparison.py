@@ -14,8 +14,9 @@ from tests.builders import small_arch
 
 
 @pytest.mark.slow
-def test_all_methods_and_formulations_are_rows(engine25):
-    result = compare(engine25, EQUATIONS)
+@pytest.mark.xdist_group("comparison")
+def test_all_methods_and_formulations_are_rows(compared25):
+    result = compared25
     assert {"sequential", "cantilever", "published", "modified-sequential"} <= set(
         result.table.index
     )
@@ -33,13 +34,14 @@ def test_without_weight_nothing_is_above_the_best():
 
 
 @pytest.mark.slow
-def test_the_free_schedule_is_compared_by_the_criterion_that_is_asked_for(engine25):
+@pytest.mark.xdist_group("comparison")
+def test_the_free_schedule_is_compared_by_the_criterion_that_is_asked_for(engine25, compared25):
     """No figure of the row is above the least of the closed rows and the published plan."""
     published = CRITERIA["worst-ratio-published"]
     asked = compare(engine25, published)
     assert asked.table.loc["free", "objective"] == pytest.approx(0.840088, rel=1e-5)
     assert asked.criteria["free"] == published
-    ranks = compare(engine25, CRITERIA["equations-2-3"])
+    ranks = compared25
     for table in (asked.table, ranks.table):
         others = table.loc[["sequential", "cantilever", "published"], [*LARGEST]]
         assert (table.loc["free", [*LARGEST]] <= others.min()).all()

@@ -21,7 +21,6 @@ from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
 from seqopt.report import page
 from seqopt.report._pages import OVER, comparison_page, plan_page
-from seqopt.report.comparison import compare
 from seqopt.report.page import LARGEST, Build, Scatter, _build_data, _structure_data, report_page
 from seqopt.responses.table import analyze
 from seqopt.scene.boxes import block_brick
@@ -30,7 +29,6 @@ from seqopt.scene.library.common import MASONRY
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.two_robots import cantilever, sequential
-from seqopt.study.published import CRITERIA
 from seqopt.workflow import optimize
 from tests.blocks import L_SHAPE, prism
 from tests.browser import BROWSER, browsed
@@ -260,9 +258,10 @@ def test_large_numbers_are_readable(engine25, builds):
 
 
 @pytest.mark.slow
-def test_the_free_schedule_is_seen_in_the_table_of_a_comparison(engine25):
+@pytest.mark.xdist_group("comparison")
+def test_the_free_schedule_is_seen_in_the_table_of_a_comparison(engine25, compared25):
     """Of all formulations it would be the last row, below what is seen at once."""
-    text = comparison_page(engine25, compare(engine25, CRITERIA["equations-2-3"]))
+    text = comparison_page(engine25, compared25)
     assert [row[0] for row in tables_of(text)[:4]][1:] == ["sequential", "cantilever", "free"]
 
 

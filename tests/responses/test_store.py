@@ -245,13 +245,14 @@ import sys
 from seqopt._cli.main import main
 if __name__ == "__main__":
     words = ["optimize", sys.argv[1], "--formulation", "cascade", "--tables", "all"]
+    words += ["--no-stability"]
     sys.exit(main([*words, "--out", sys.argv[2], "--cache", sys.argv[3], *sys.argv[4:]]))
 """
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-@pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.parametrize("workers", [pytest.param("1", marks=pytest.mark.long), "2"])
 def test_a_run_that_was_killed_goes_on(tmp_path, workers):
     """Killed without warning while answers come in; then run again, with others at work beside."""
     script = tmp_path / "run.py"

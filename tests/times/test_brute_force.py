@@ -26,7 +26,9 @@ CASES = [
         marks=pytest.mark.slow,
     ),
     pytest.param(6, 3, ("rob3:slower=2.5",), RULES, marks=pytest.mark.slow),
-    pytest.param(6, 4, ("rob4:fetch=75,approach=25",), RULES, marks=pytest.mark.slow),
+    pytest.param(
+        *(6, 4, ("rob4:fetch=75,approach=25",), RULES), marks=(pytest.mark.slow, pytest.mark.long)
+    ),
 ]
 
 

@@ -12,63 +12,21 @@ import time
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
 from functools import partial
 
-import numpy as np
 import pytest
 
 from seqopt.errors import SolverError, WorkerError
 from seqopt.work import Progress, hire, map_ordered
 from seqopt.work._workers import _Processes
 from tests.builders import ROOT
-
-
-def square(number):
-    time.sleep(0.01 * (number % 3))  # later ones may be ready first
-    return number * number
-
-
-def square_or_fail(number):
-    if number in (3, 5):
-        time.sleep(0.1 * (number == 3))  # the later error comes first
-        raise SolverError(f"no square of {number}")
-    return number * number
-
-
-def die_once(folder, number):
-    """End the process as the system does where memory is short, the first time."""
-    mark = folder / f"died at {number}"
-    if number in (2, 7) and not mark.exists():
-        mark.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return number * number
-
-
-def die_while_sending(folder, number):
-    """End the process the first time, most likely amid an answer of 200 MB."""
-    mark = folder / f"died at {number}"
-    if number == 1 and not mark.exists():
-        mark.touch()
-        threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGKILL)).start()
-    return np.full(25_000_000, float(number))
-
-
-def die(number):
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def own_error(number):
-    class OddError(Exception):
-        """One that cannot be sent."""
-
-    raise OddError(number)
-
-
-class Task(int):
-    """A number that belongs to a lane."""
-
-    @property
-    def lane(self):
-        return int(self) % 2
-
+from tests.work.tasks import (
+    Task,
+    die,
+    die_once,
+    die_while_sending,
+    own_error,
+    square,
+    square_or_fail,
+)
 
 TASKS = [Task(number) for number in range(12)]
 WANTED = [number * number for number in range(12)]
