@@ -35,7 +35,7 @@ settings.register_profile(
     "seqopt",
     derandomize=True,
     deadline=None,
-    max_examples=int(os.environ.get("EXAMPLES", "25")),  # more for a release
+    max_examples=int(os.environ.get("EXAMPLES", "15")),  # more for a release
     suppress_health_check=[HealthCheck.too_slow],  # on a busy machine everything is
 )
 settings.load_profile("seqopt")
