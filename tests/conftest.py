@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gc
 import os
 import signal
 
@@ -20,11 +21,21 @@ from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS
 
+# modules and tests stay until the end: the collector need not look at them again and again
+gc.disable()
+
+
+def pytest_collection_finish():
+    gc.collect()
+    gc.freeze()
+    gc.enable()
+
+
 settings.register_profile(
     "seqopt",
     derandomize=True,
     deadline=None,
-    max_examples=int(os.environ.get("EXAMPLES", "25")),  # more for a release
+    max_examples=int(os.environ.get("EXAMPLES", "15")),  # more for a release
     suppress_health_check=[HealthCheck.too_slow],  # on a busy machine everything is
 )
 settings.load_profile("seqopt")

@@ -33,6 +33,9 @@ def engines(network):
             continue
 
 
+pytestmark = pytest.mark.xdist_group("prompt")  # what all look at is made once
+
+
 @pytest.fixture(scope="module")
 def met(problem25):
     """What a user may meet, of every kind."""

@@ -407,9 +407,9 @@ class Problem(Shown):
     Examples
     --------
     >>> import seqopt
-    >>> problem = seqopt.optimize("arch25", "free", aim="minmax,steps").problem
+    >>> problem = seqopt.optimize("chain:bricks=7", "free", aim="minmax,steps").problem
     >>> problem
-    Problem('arch25', 'free', criterion 'worst-ratio', minmax, steps)
+    Problem('chain 7', 'free', criterion 'worst-ratio', minmax, steps)
     >>> seqopt.solve(problem.but(budgets="regrips=3")).status
     <Status.OPTIMAL: 'optimal'>
     """

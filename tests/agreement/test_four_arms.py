@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -66,7 +67,13 @@ def test_a_spoiled_plan_is_no_plan(build):
 
 def test_scenes_are_those_that_are_generated(build, tmp_path):
     name, scene, _ = build
-    assert scene == SCENES[name]()
+    made = SCENES[name]()
+    assert replace(scene, joints=made.joints) == made
+    for ours, theirs in zip(
+        scene.joints, made.joints, strict=True
+    ):  # processors round their own way
+        assert ours.position == pytest.approx(theirs.position, abs=1e-14)
+        assert replace(ours, position=theirs.position) == theirs
     (tmp_path / "again.json").write_text(dump_scene(scene), encoding="utf-8")
     assert load_scene(tmp_path / "again.json") == scene
 

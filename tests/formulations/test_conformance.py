@@ -65,7 +65,7 @@ def brute_force(problem, aim):
 
 @every
 @given(problem=problems())
-@settings(max_examples=25)
+@settings(max_examples=15)
 def test_answers_are_certified_or_refused_as_infeasible(name, problem):
     best = brute_force(problem, ALL[name].aim)
     if not np.isfinite(best):
@@ -102,7 +102,7 @@ def test_a_beam_never_does_worse_than_the_cascade(problem, width):
 
 @every
 @given(problem=problems(), data=st.data())
-@settings(max_examples=15)
+@settings(max_examples=8)
 def test_renumbering_candidates_keeps_the_value_of_exact_ones(name, problem, data):
     formulation = ALL[name]
     heuristic = formulation.kind is FormulationKind.HEURISTIC
@@ -165,7 +165,7 @@ def test_budgets_are_kept_or_refused(name):
 
 @timely
 @given(problem=st.one_of(problems(), budgeted()), limit=st.integers(0, 60))
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, limit):
     """On a clock that moves on whenever it is looked at."""
     formulation = ALL[name]
@@ -312,7 +312,7 @@ def test_exact_ones_agree_on_the_reference_arch(engine25, criterion, method):
     assert solve(problem, ALL["minimax"]).certificate.gap <= 1e-9
 
 
-@pytest.mark.parametrize("count", [5, 6, 7, 8])
+@pytest.mark.parametrize("count", [5, 8])
 @pytest.mark.parametrize("criterion", CRITERIA.values(), ids=CRITERIA)
 def test_all_exact_ones_equal_brute_force_on_small_arches(count, criterion):
     engine = ComplianceEngine(build_network(small_arch(count)))

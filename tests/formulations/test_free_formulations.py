@@ -43,7 +43,8 @@ AIMS = ("minmax", "minmax,steps", "sum", "steps,minmax", "regrips,sum(T_max)", "
 slow = pytest.mark.slow
 every = pytest.mark.parametrize("name", ALL)
 CASES = [
-    *((size, aim) for size in ((4, 2), (4, 3)) for aim in AIMS),
+    *(((4, 2), aim) for aim in AIMS[1::2]),
+    *(((4, 3), aim) for aim in AIMS[::2]),
     *(pytest.param((7, 2), aim, marks=slow) for aim in AIMS[::2]),
     *(pytest.param((6, 3), aim, marks=slow) for aim in AIMS[1::2]),
 ]

@@ -33,6 +33,7 @@ from seqopt.work.progress import Stage
 from tests.builders import from_both_sides, small_arch
 from tests.strategies import free_builds
 
+TWO = FreeRules(robots=("rob1", "rob2"), least_grips=1)
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0), ("D_max", 1e-5)))
 
 
@@ -94,7 +95,7 @@ def test_it_equals_brute_force(build):
     ("aim", "bricks", "robots"),
     [
         *((aim, 3, 2) for aim in ("steps", "regrips,minmax", "travel", "sum", "sum(T_max)")),
-        ("regrips,minmax", 4, 2),
+        pytest.param("regrips,minmax", 4, 2, marks=pytest.mark.slow),
         pytest.param("travel", 4, 3, marks=pytest.mark.slow),
     ],
 )
@@ -115,12 +116,13 @@ TAKE_ORDERS = [name for name, found in seqopt.formulations().items() if On.ORDER
 
 
 @once
-@pytest.mark.parametrize("aim", ["minmax", "sum"])
+@pytest.mark.parametrize(("aim", "bricks"), [("minmax", 4), ("sum", 3)])
 @pytest.mark.parametrize("name", TAKE_ORDERS)
-def test_formulations_of_states_find_the_best_order_too(name, aim):
-    rules = FreeRules(robots=("rob1", "rob2"), least_grips=1)
-    found = seqopt.solve(posed(small_arch(4), rules, aim), name)
-    least = min(known(4, rules, aim).values())
+def test_formulations_of_states_find_the_best_order_too(name, aim, bricks):
+    worths = known(bricks, TWO, aim).values()
+    found = seqopt.solve(posed(small_arch(bricks), TWO, aim), name)
+    least = min(worths)
+    assert max(worths) > 1.1 * least
     exact = find_formulation(name).kind is FormulationKind.EXACT
     assert found.order.selection.objective >= least * (1 - 1e-9)
     if exact:
@@ -145,10 +147,12 @@ def test_another_order_is_found_where_the_own_one_has_no_plan():
 
 
 @once
-@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_the_worst_of_scenarios_equals_brute_force(workers):
+@pytest.mark.parametrize(
+    ("workers", "bricks"), [(1, 3), pytest.param(2, 4, marks=pytest.mark.slow)]
+)
+def test_the_worst_of_scenarios_equals_brute_force(workers, bricks):
     """Another order is the best where the worst of some scenarios counts, and it is found."""
-    scene = small_arch(4)
+    scene = small_arch(bricks)
     some = seqopt.scenarios(scene, count=3, density=0.9, seed=5)
     nominal = posed(scene)
     problem = replace(nominal, states=over_scenarios(nominal.states, some.scenes))
@@ -156,7 +160,7 @@ def test_the_worst_of_scenarios_equals_brute_force(workers):
     found = seqopt.solve(sharing(problem, Resources(workers=workers)), FORMULATION)
     assert found.status == "optimal"
     assert found.order.selection.objective == pytest.approx(min(worths.values()), rel=1e-8)
-    assert found.order.selection.objective > 1.01 * min(known(4).values())
+    assert found.order.selection.objective > 1.01 * min(known(bricks).values())
 
 
 @pytest.mark.parametrize(
@@ -165,8 +169,8 @@ def test_the_worst_of_scenarios_equals_brute_force(workers):
 def test_totals_over_scenarios_equal_brute_force(aim, bricks):
     """By every formulation; a bound is proven where weights leave nothing open, else claimed."""
     scene = small_arch(bricks)
-    some = seqopt.scenarios(scene, count=3, density=0.9, seed=5)
-    nominal = posed(scene, aim="sum")
+    some = seqopt.scenarios(scene, count=bricks - 1, density=0.9, seed=5)
+    nominal = posed(scene, TWO, "sum")
     problem = replace(nominal, states=over_scenarios(nominal.states, some.scenes, aim))
     worths = brute_force(problem)
     for name in formulation_names(On.ORDERS, On.STATES):
@@ -181,7 +185,7 @@ def test_totals_over_scenarios_equal_brute_force(aim, bricks):
         if able.kind is FormulationKind.EXACT:
             assert found.objective == pytest.approx(min(worths.values()), rel=1e-8)
             assert plan.order.proven or plan.order.status is not Status.OPTIMAL
-    alone = replace(found, weights=(1.0, 0.0))
+    alone = replace(found, weights=(1.0,))
     with pytest.raises(SolverError, match="no weight for every scenario"):
         _proven("x", problem, replace(alone, bound=found.objective), np.inf)
 
@@ -240,7 +244,7 @@ def test_orders_within_budgets_equal_brute_force(aim):
         seqopt.solve(little, FORMULATION)
 
 
-@given(build=free_builds(most_bricks=4, most_robots=3))
+@given(build=free_builds(most_bricks=3, most_robots=3))
 @settings(max_examples=4, deadline=None)
 def test_the_proof_knows_the_best_of_all_orders(build):
     """It finds a plan below any value above the least one, and none below that, in any order."""

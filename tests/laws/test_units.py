@@ -41,9 +41,9 @@ def plain(arch25):
 
 @pytest.fixture(scope="module")
 def verdicts(arch25):
-    """Five steps about the crown, each with its verdict."""
+    """Three steps about the crown, each with its verdict."""
     net = build_network(arch25)
-    steps = cantilever(net)[26:31]
+    steps = cantilever(net)[26:31:2]
     return [(s, assess(step_assembly(net, s.bricks, s.grips), DRY)) for s in steps]
 
 

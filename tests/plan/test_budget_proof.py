@@ -38,7 +38,7 @@ def within(problem, budgets=None):
 
 @pytest.mark.parametrize("most", [1, 5_000])
 @given(problem=budgeted(), price=st.floats(0, 5))
-@settings(max_examples=60)
+@settings(max_examples=30)
 def test_no_choice_costs_less_than_is_proven(problem, price, most):
     found = within(problem)
     claimed = {budget.name: price for budget in problem.budgets}
@@ -52,7 +52,7 @@ def test_no_choice_costs_less_than_is_proven(problem, price, most):
 
 
 @given(problem=budgeted())
-@settings(max_examples=60)
+@settings(max_examples=30)
 def test_the_smallest_conflict(problem):
     if not within(problem, ()):
         return
@@ -101,7 +101,7 @@ def exactly_within(problem):
 
 
 @pytest.mark.parametrize(
-    "draws", [60, pytest.param(200, marks=(pytest.mark.slow, pytest.mark.long))]
+    "draws", [30, pytest.param(200, marks=(pytest.mark.slow, pytest.mark.long))]
 )
 @pytest.mark.parametrize("name", TAKERS)
 def test_none_is_within_only_where_enumeration_finds_none(name, draws):

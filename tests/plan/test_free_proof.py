@@ -20,7 +20,7 @@ from seqopt.sequence.steps import StepKind
 from tests.strategies import free_builds
 
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0), ("D_max", 1e-5)))
-few = settings(max_examples=5, deadline=None)
+few = settings(max_examples=3, deadline=None)
 
 
 def told(book, tables, bricks, state):

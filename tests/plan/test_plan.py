@@ -118,9 +118,8 @@ def test_a_plan_of_costs_alone_has_a_choice_and_no_steps():
 
 
 @pytest.mark.parametrize("name", seqopt.formulations(On.LAYERS))
-def test_budgets_are_refused_by_those_that_do_not_take_them(engine25, name):
-    problem = candidate_layers(engine25, seqopt.three_robot_loop(engine25.network), WORST)
-    problem = replace(problem, budgets=(travel(problem, 1e3),))
+def test_budgets_are_refused_by_those_that_do_not_take_them(problem25, name):
+    problem = replace(problem25, budgets=(travel(problem25, 1e3),))
     formulation = seqopt.formulations()[name]
     if formulation.takes_budgets:
         assert seqopt.solve(problem, name).certificate.spent

@@ -105,7 +105,7 @@ def tail(each, aim):
 
 @every
 @given(layers=many())
-@settings(max_examples=30)
+@settings(max_examples=15)
 def test_plans_agree_with_brute_force(aim, layers):
     found = values(layers, aim)
     if not found:
@@ -139,7 +139,7 @@ def test_plans_agree_with_the_program(aim, layers):
 
 @pytest.mark.parametrize("aim", AIMS[1:], ids=str)
 @given(layers=many(), width=st.integers(1, 3))
-@settings(max_examples=25)
+@settings(max_examples=12)
 def test_a_narrow_search_still_has_a_valid_bound(aim, layers, width):
     found = values(layers, aim)
     if found:
@@ -150,7 +150,7 @@ def test_a_narrow_search_still_has_a_valid_bound(aim, layers, width):
 
 @every
 @given(layers=many())
-@settings(max_examples=15)
+@settings(max_examples=8)
 def test_a_plan_that_has_no_time_is_feasible_and_its_bound_valid(aim, layers):
     found = values(layers, aim)
     if found:
@@ -162,7 +162,7 @@ def test_a_plan_that_has_no_time_is_feasible_and_its_bound_valid(aim, layers):
 
 
 @given(layers=many())
-@settings(max_examples=15)
+@settings(max_examples=8)
 def test_aims_are_ordered(layers):
     """The mean is at most any mean of the worst, and these at most the worst."""
     if values(layers, WORST_TOTAL):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pandas as pd
@@ -42,6 +43,7 @@ NAMES = [
     "a=b",
     "]",
 ]
+ALSO = ("F_move", "F_largest", "T_max", "M_sup")
 EVERY = replace(EQUATIONS, before=(("F_each", 1.0),), after=(("F_each", 1.0),))
 
 
@@ -57,13 +59,22 @@ def posed(scene, criterion, **more):
     return candidate_layers(ComplianceEngine(network), three_robot_loop(network), criterion, **more)
 
 
+@cache
+def tabled(name):
+    network = build_network(called(name, "two", "three"))
+    return analyze(ComplianceEngine(network), sequential(network))
+
+
+@cache
+def plainly(criterion):
+    """The problem and its plan where names are not odd."""
+    problem = posed(called("one", "two", "three"), criterion, also=ALSO)
+    return problem, solve(problem, "overlap_dp")
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_name_changes_no_number(name):
-    plain, odd = called("one", "two", "three"), called(name, "two", "three")
-    tables = []
-    for scene in (plain, odd):
-        network = build_network(scene)
-        tables.append(analyze(ComplianceEngine(network), sequential(network)))
+    tables = [tabled("one"), tabled(name)]
     assert len(tables[0].columns) == len(set(tables[1].columns))
     for first, second in zip(tables[0], tables[1], strict=True):
         pd.testing.assert_series_equal(tables[0][first], tables[1][second], check_names=False)
@@ -73,20 +84,19 @@ def test_a_name_changes_no_number(name):
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("criterion", [EVERY, EQUATIONS, WORST_RATIO], ids=lambda c: c.name)
 def test_a_name_changes_no_choice(name, criterion):
-    also = ("F_move", "F_largest", "T_max", "M_sup", "F_sup", "F_min", "F_avg")[:4]
-    scenes = called("one", "two", "three"), called("one", name, "three")
-    plain, odd = (posed(scene, criterion, also=also) for scene in scenes)
+    plain, chosen = plainly(criterion)
+    odd = posed(called("one", name, "three"), criterion, also=ALSO)
     for first, second in zip(plain.sums.single, odd.sums.single, strict=True):
         np.testing.assert_array_equal(first, second)
     for first, second in zip(plain.evaluation.steps, odd.evaluation.steps, strict=True):
-        for response in also:
+        for response in ALSO:
             np.testing.assert_array_equal(first.responses[response], second.responses[response])
-    chosen = solve(plain, "overlap_dp"), solve(odd, "overlap_dp")
-    assert chosen[0].selection == chosen[1].selection
-    assert len(chosen[0].alternatives().columns) == len(chosen[1].alternatives().columns)
+    other = solve(odd, "overlap_dp")
+    assert chosen.selection == other.selection
+    assert len(chosen.alternatives().columns) == len(other.alternatives().columns)
 
 
-@pytest.mark.parametrize("name", ["sup_6", "max", "largest", "a,b", "]"])
+@pytest.mark.parametrize("name", ["sup_6", "a,b"])
 def test_a_name_hides_no_overload(name):
     scene = called("one", name, "three")
     notes = compare(ComplianceEngine(build_network(scene)), EQUATIONS).notes

@@ -145,7 +145,7 @@ def test_many_at_a_time_and_one_after_the_other_agree(build):
 
 def test_a_rule_less_is_seen():
     """The negative control of the test above."""
-    network = build_network(small_arch(4))
+    network = build_network(small_arch(3))
     strict = all_of_space(free_space(network, FreeRules()))
     loose = all_of_book(network, FreeRules(least_grips=1))
     assert strict[0] < loose[0]

@@ -25,6 +25,9 @@ from seqopt.stability.assessment import Verdict, assess, verdict
 FLAT = "arch:span=2,rise=0.8,pattern=VLR"
 
 
+pytestmark = pytest.mark.xdist_group("builds")  # what all look at is made once
+
+
 @pytest.fixture(scope="module")
 def flat():
     return seqopt.build_network(seqopt.load_scene(FLAT))

@@ -24,6 +24,9 @@ from seqopt.stability.failure_map import _brick_map, failure_map
 FRICTIONS = (0.15, 0.45)
 
 
+pytestmark = pytest.mark.xdist_group("failure_map")  # what all look at is made once
+
+
 @pytest.fixture(scope="module")
 def network():
     return seqopt.build_network(seqopt.load_scene("arch:span=1,rise=0.4,pattern=VLR"))

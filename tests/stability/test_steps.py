@@ -31,10 +31,16 @@ def steps(network):
     return seqopt.cantilever(network)[24:28]
 
 
+@pytest.fixture(scope="module")
+def wholes(network, steps):
+    """What is known of every step, with all margins."""
+    return [assess(step_assembly(network, step.bricks, step.grips), DRY) for step in steps]
+
+
+@pytest.mark.xdist_group("steps with all margins")  # which are found once
 @pytest.mark.parametrize("margin", MARGINS)
-def test_a_margin_is_found_alone_as_with_all_others(network, steps, margin):
-    for step, found in zip(steps, assess_steps(network, steps, DRY, [margin]), strict=True):
-        whole = assess(step_assembly(network, step.bricks, step.grips), DRY)
+def test_a_margin_is_found_alone_as_with_all_others(network, steps, wholes, margin):
+    for whole, found in zip(wholes, assess_steps(network, steps, DRY, [margin]), strict=True):
         assert found.verdict is whole.verdict
         for name, number in NUMBERS.items():
             own, other = getattr(found, number), getattr(whole, number)

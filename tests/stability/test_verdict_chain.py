@@ -103,7 +103,7 @@ def test_parts_cut_from_the_whole_are_those_built_alone(name):
 @pytest.mark.parametrize("name", SCENES)
 def test_verdicts_are_those_of_the_cone_program(name, mortar):
     network = build_network(SCENES[name]())
-    steps = random_steps(network, 10, 3)
+    steps = random_steps(network, 7, 3)
     expected = one_by_one(network, steps, MORTARS[mortar])
     assert step_verdicts(network, steps, MORTARS[mortar]) == expected
     back = step_verdicts(network, steps[::-1], MORTARS[mortar])
@@ -122,7 +122,7 @@ CHAINS = st.builds(
 STACKS = st.builds(running_bond, st.just(1), st.integers(2, 5))
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(st.one_of(CHAINS, walls(), STACKS), st.integers(0, 999), st.sampled_from([*MORTARS]))
 def test_verdicts_of_random_scenes_are_those_of_the_cone_program(scene, seed, mortar):
     """Held anyhow; where one is open it says nothing."""
@@ -219,7 +219,7 @@ def nonsense(assembly, seed):
     yield Answer(Claim.SOLVED, 0.0, *(np.ones(shape) for shape in shapes[:2]), down)
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def arch():
     network = build_network(six_bricks())
     steps = random_steps(network, 14, 8)

@@ -68,9 +68,9 @@ def compile_instance(
     Examples
     --------
     >>> import seqopt
-    >>> problem = seqopt.optimize("arch25", "free", aim="minmax,steps").problem
+    >>> problem = seqopt.optimize("chain:bricks=7", "free", aim="minmax,steps").problem
     >>> seqopt.compile_instance(problem, below=40.0)
-    <Instance 'arch25': 71035 nodes, 247081 arcs, minmax, steps>
+    <Instance 'chain 7': 1613 nodes, 6405 arcs, minmax, steps>
     """
     name = name or problem.engine.network.scene.name
     told = {"seqopt": version("seqopt"), **(facts or {})}

@@ -44,7 +44,7 @@ def written(scene, form, folder, change=None):
 
 
 @pytest.mark.filterwarnings("ignore::seqopt.errors.SceneWarning")  # bricks in one place, say
-@settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(scene=scenes_with_all())
 def test_an_assembly_is_the_scene(tmp_path, scene):
     assert import_scene(written(scene, "compas_assembly", tmp_path)) == scene
