@@ -22,7 +22,8 @@ from tests.builders import from_both_sides, six_bricks, small_arch
 from tests.limit_scenes import chain, loosened
 
 needs_numba = pytest.mark.skipif(not _extremes.can_compile(), reason="no numba")
-WAYS = [False, pytest.param(True, marks=needs_numba)]
+once = pytest.mark.xdist_group("compiled loops")  # which one worker compiles
+WAYS = [False, pytest.param(True, marks=[needs_numba, once])]
 SOME = [Want.RESPONSES, Want.EDGES, Want.DISPLACEMENTS, Want.SUPPORT, Want(0)]
 NONE, MANY = np.empty((1, 0), dtype=np.int64), np.empty((500, 0), dtype=np.int64)
 CLOSE = 1e-12  # of what is largest
