@@ -75,6 +75,9 @@ MADE = {
     "wall-12": f"wall:columns=4,courses=3 {FREE} --aim minmax,steps",
     "free-25": f"arch25 {FREE} --aim minmax,steps",
     "free-25-sum": f"arch25 {FREE} --aim sum(T_max) --budget regrips=6",
+    "free-25-two": f"arch25 {FREE} --aim sum(T_max) --budget regrips=1 --budget sum(M_sup)=262",
+    "free-145-pair-two": f"{CHAIN}145 {PAIR} {HEAVY} --aim sum(T_max) --budget regrips=4 "
+    "--budget sum(M_sup)=199200",
     "free-49": f"{CHAIN}49 {FREE} {NEAR}2 --aim minmax,sum(T_max) --below 1.001",
     "wall-48": f"wall:columns=8,courses=6 {FREE} {NEAR}2 --aim minmax,steps --below 1.001",
     "free-145": f"{CHAIN}145 {FREE} {ONCE} --aim minmax,sum(T_max) --below 0.8",
