@@ -12,6 +12,7 @@ from experiments.instances.parts.tables import instance_tables
 from experiments.placement.parts.speed_points import speed_tables
 from seqopt.plan.calling.formulation import On, formulations
 
+INSTANCES = ("instance_library", "instance_contest", "instance_large")
 UNNEEDED = "not needed without budgets"
 FREE = {
     "overlap_dp": "the least sum (the default)",
@@ -95,7 +96,7 @@ def stated() -> dict[str, str]:
         | {f"{name}_table": _on_graphs(stored(name)) for name in GRAPHS}
         | {"classical_table": _classical(stored("classical"))}
         | {"makespan_table": _makespans(stored("makespan"), stored("makespan_large"))}
-        | instance_tables(stored("instance_library"), stored("instance_contest"))
+        | instance_tables(*map(stored, INSTANCES))
     )
 
 

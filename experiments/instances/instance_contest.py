@@ -12,14 +12,17 @@ are of the processor, reading and writing of files included. The best paths are 
 ``known.json``, a better one that was known before stays.
 
 Inputs: ``experiments/instances/library``. Command: ``python -m
-experiments.instances.instance_contest [--quick]``.
+experiments.instances.instance_contest [--quick] [--only-of NAME,NAME]``.
 """
 
 import json
+from collections.abc import Sequence
 
 import pandas as pd
 
-from experiments.harness.claim import Claim, Extra, Finding, Options, Times, on_this_run
+from experiments.harness.claim import Claim, Extra, Finding, Option, Options, Times, on_this_run
+from experiments.harness.results import drawn, stored
+from experiments.instances.parts.contest_chart import chart
 from experiments.instances.parts.contest_run import OUTSIDE, run, solvers
 from experiments.instances.parts.library import KNOWN, MADE, instance, known
 from seqopt import judge_instance
@@ -47,8 +50,12 @@ def holds(table: pd.DataFrame, library: pd.DataFrame) -> bool:
 
 
 def experiment(options: Options) -> Finding:
+    asked = options.only_of.split(",") if options.only_of else [*MADE]
+    names = QUICK if options.quick else asked
+    if unknown := set(names) - set(MADE):
+        raise SystemExit(f"--only-of: there is no instance {min(unknown)!r}; give names of MADE")
     rows, best = [], {} if options.quick else known()
-    for name in QUICK if options.quick else MADE:
+    for name in names:
         for solver in solvers(instance(name)):
             if solver in SLOW or (options.quick and solver in OUTSIDE):
                 continue
@@ -58,10 +65,20 @@ def experiment(options: Options) -> Finding:
             _keep(best, row)
     if not options.quick:
         KNOWN.write_text(_lines(best), "utf-8")
-    table = pd.DataFrame(rows)
-    library = pd.DataFrame([_listed(name, each) for name, each in best.items()])
-    found = {"instance_contest": table, "instance_library": library}
-    return on_this_run(holds=holds(table, library), **found)
+    listed = [_listed(name, best[name]) for name in names if name in best]
+    found = {"instance_contest": pd.DataFrame(rows), "instance_library": pd.DataFrame(listed)}
+    if not options.quick:
+        found = {table: _joined(own, table, names) for table, own in found.items()}
+    return on_this_run(holds=holds(*found.values()), **found)
+
+
+def _joined(rows: pd.DataFrame, name: str, names: Sequence[str]) -> pd.DataFrame:
+    """Return rows, and those that are stored of other instances, in the library's order."""
+    before = stored(name)
+    others = before[before["instance"].isin(set(MADE) - set(names))]
+    place = {each: k for k, each in enumerate(MADE)}
+    every = pd.concat([others, rows], ignore_index=True)
+    return every.sort_values("instance", key=lambda of: of.map(place), kind="stable")
 
 
 def _lines(best: dict[str, dict]) -> str:
@@ -134,7 +151,9 @@ CLAIM = Claim(
     experiment,
     quick="three instances, our formulations alone, nothing written",
     times=Times.SHOWN,
+    options=(Option("--only-of", "these instances alone, as free-7,wall-6; others stay", ""),),
     needs=(Extra("ortools", "pip install 'seqopt[instances]'"),),
+    pictures={"instance_contest.png": drawn(chart, "instance_contest", "instance_library")},
     digits=9,
 )
 

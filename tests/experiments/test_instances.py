@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 import seqopt
-from experiments.instances.parts.library import HOME, MADE, instance, known, made
+from experiments.harness.results import stored
+from experiments.instances.parts.library import HOME, LARGE, MADE, instance, known, made
 from seqopt.errors import SolverError
 from tests.builders import ROOT
 
@@ -15,7 +16,10 @@ KNOWN = known()
 def test_it_is_whole():
     assert len(MADE) >= 40
     assert {path.stem for path in HOME.glob("*.npz")} == set(MADE) == set(KNOWN)
-    assert sum(path.stat().st_size for path in HOME.glob("*.npz")) < 5_000_000
+    sizes = [path.stat().st_size for path in HOME.glob("*.npz")]
+    assert max(sizes) <= 1_500_000
+    assert sum(sizes) < 12_000_000
+    assert set(stored("instance_large")["instance"]) == set(LARGE)
 
 
 @pytest.mark.parametrize("name", MADE)

@@ -2,7 +2,7 @@
 
 Command: ``python -m experiments.instances.parts.library [NAME ...]`` makes all of them anew, or
 those that are named, and says which files change. Large ones (`LARGE`) are made only where they are
-named: neither their files are stored nor anything that is known of them.
+named, into the folder in which the command is given; what is stored of them is how large they are.
 """
 
 import hashlib
@@ -12,6 +12,9 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import pandas as pd
+
+from experiments.harness.results import RESULTS, save_table, stored
 from seqopt import read_instance
 from seqopt._cli.main import main
 from seqopt.graph.instances.instance import Instance
@@ -23,6 +26,10 @@ TIMES = "--durations fetch=30,place=10,approach=10,grip=5,release=5"
 SLOWER = f"{TIMES} --durations rob3:fetch=75,approach=25"
 SLOWEST = f"{TIMES} --durations rob4:fetch=75,approach=25"
 CHAIN = "chain:bricks="
+PAIR = f"{FREE} --robots 2 --rule least_grips=1"  # while one of two moves the other one holds
+ONCE = "--rule regrips=0 --rule newest=placing"  # who lets go places next
+HEAVY = "--rule payload=ignored"  # of chains: two robots alone are too weak for them
+NEAR = "--rule candidates=near:"
 MADE = {
     # open grips of a fixed schedule: a level for every move
     "chain-8": f"{CHAIN}8",
@@ -36,6 +43,8 @@ MADE = {
     "chain-25-weighted": "arch25 --criteria weighted",
     "pair-25": "arch25 --schedule two-robot",
     "pair-25-peak": "arch25 --schedule two-robot --formulation minimax --criteria worst-ratio",
+    "pair-145": f"{CHAIN}145 --schedule two-robot",
+    "chain-145": f"{CHAIN}145 --candidates near:4",
     # the same within budgets
     "chain-12-way": f"{CHAIN}12 --budget travel=0.8",
     "chain-17-way": f"{CHAIN}17 --budget travel=0.7",
@@ -44,6 +53,7 @@ MADE = {
     "chain-25-two": "arch25 --budget travel=0.8 --budget steps_over:M_sup=20:30",
     "chain-25-weighted-way": "arch25 --criteria weighted --budget travel=0.5",
     "chain-40-way": f"{CHAIN}40 --budget travel=0.6",
+    "chain-145-way": f"{CHAIN}145 --candidates near:4 --budget travel=0.6",
     # over scenarios
     "chain-12-cvar": f"{CHAIN}12 --criteria weighted --robust cvar=0.75 --scenarios 8",
     "chain-12-total": f"{CHAIN}12 --criteria weighted --robust worst-total --scenarios 8",
@@ -63,10 +73,32 @@ MADE = {
     "free-12-regrips": f"{CHAIN}12 {FREE} --aim sum(F_largest) --budget regrips=3",
     "wall-6": f"wall:columns=3,courses=2 {FREE} --aim minmax,steps",
     "wall-12": f"wall:columns=4,courses=3 {FREE} --aim minmax,steps",
+    "free-25": f"arch25 {FREE} --aim minmax,steps",
+    "free-25-sum": f"arch25 {FREE} --aim sum(T_max) --budget regrips=6",
+    "free-25-two": f"arch25 {FREE} --aim sum(T_max) --budget regrips=1 --budget sum(M_sup)=262",
+    "free-145-pair-two": f"{CHAIN}145 {PAIR} {HEAVY} --aim sum(T_max) --budget regrips=4 "
+    "--budget sum(M_sup)=199200",
+    "free-49": f"{CHAIN}49 {FREE} {NEAR}2 --aim minmax,sum(T_max) --below 1.001",
+    "wall-48": f"wall:columns=8,courses=6 {FREE} {NEAR}2 --aim minmax,steps --below 1.001",
+    "free-145": f"{CHAIN}145 {FREE} {ONCE} --aim minmax,sum(T_max) --below 0.8",
+    # the same by two robots, and by five
+    "wall-12-pair": f"wall:columns=4,courses=3 {PAIR} --aim minmax,steps",
+    "wall-24-pair": f"wall:columns=6,courses=4 {PAIR} --aim sum(T_max),steps",
+    "free-25-pair": f"{CHAIN}25 {PAIR} {HEAVY} --aim minmax,steps",
+    "free-25-pair-way": f"{CHAIN}25 {PAIR} {HEAVY} --aim sum(M_sup) --budget travel=9m",
+    "free-25-pair-total": f"{CHAIN}25 {PAIR} {HEAVY} --aim sum(T_max) --robust worst-total "
+    "--scenarios 8",
+    "wall-24-pair-two": f"wall:columns=6,courses=4 {PAIR} {HEAVY} --aim sum(M_sup) "
+    "--budget travel=10.5m --budget regrips=1",
+    "free-49-pair-two": f"{CHAIN}49 {PAIR} {HEAVY} --aim sum(T_max) --budget regrips=6 "
+    "--budget sum(M_sup)=8200",
+    "free-145-pair": f"{CHAIN}145 {PAIR} {HEAVY} --aim minmax,steps",
+    "wall-6-five": f"wall:columns=3,courses=2 {FREE} --robots 5 --aim minmax,steps",
     # orders of the bricks
     "order-7": f"{CHAIN}7 {FREE} --order search --aim minmax,steps",
     "order-7-sum": f"{CHAIN}7 {FREE} --order search --aim sum(T_max)",
     "order-wall-6": f"wall:columns=3,courses=2 {FREE} --order search --aim minmax,steps",
+    "order-wall-9-pair": f"wall:columns=3,courses=3 {PAIR} --order search --aim minmax,steps",
     # how long a build takes
     "time-7": f"{CHAIN}7 {FREE} --aim makespan {TIMES}",
     "time-7-unequal": f"{CHAIN}7 {FREE} --aim makespan {SLOWER}",
@@ -80,9 +112,11 @@ MADE = {
     "stand-wall-6": f"wall:columns=3,courses=2 {FREE} --stands dry --aim minmax,steps",
 }
 LARGE = {
-    "free-25": f"arch25 {FREE} --aim minmax,steps",
     "free-25-way": f"arch25 {FREE} --aim minmax,travel --below 1.2",
-    "free-25-sum": f"arch25 {FREE} --aim sum(T_max) --budget regrips=6",
+    "free-145-regrip": f"{CHAIN}145 {FREE} {NEAR}1 --rule regrips=1 --rule newest=placing "
+    "--aim minmax,steps --below 0.8",
+    "free-9-five": f"{CHAIN}9 {FREE} --robots 5 {NEAR}1 --aim minmax,steps",
+    "free-12-five": f"{CHAIN}12 {FREE} --robots 5 {NEAR}2 --aim minmax,steps",
     "time-11-unequal": f"{CHAIN}11 {FREE} --robots 4 --aim minmax,makespan --below 1.5 {SLOWEST}",
 }
 
@@ -117,12 +151,22 @@ def run(names: list[str]) -> None:
     for name in names or MADE:
         with TemporaryDirectory() as folder:
             content = made(name, Path(folder))
-        path = HOME / f"{name}.npz"
+        path = (Path() if name in LARGE else HOME) / f"{name}.npz"
         checksum = hashlib.sha256(content).hexdigest()
         same = path.exists() and path.read_bytes() == content
         print(f"{name}: {len(content)} bytes, {'as it was' if same else 'new'}, sha256 {checksum}")
-        if name in MADE or name in names:
-            path.write_bytes(content)
+        path.write_bytes(content)
+        if name in LARGE:
+            _store_size(name, read_instance(path), len(content))
+
+
+def _store_size(name: str, one: Instance, size: int) -> None:
+    """Store how large an instance is that is made by its command alone."""
+    row = {"instance": name, "nodes": one.nodes, "arcs": one.arcs, "size_MB": size / 1e6}
+    before = stored("instance_large") if (RESULTS / "instance_large.csv").exists() else None
+    table = pd.concat([before, pd.DataFrame([row])]).drop_duplicates("instance", keep="last")
+    known = table[table["instance"].isin(LARGE)]
+    save_table(known.sort_values("instance"), "instance_large", 3)
 
 
 if __name__ == "__main__":

@@ -4,11 +4,14 @@ import numpy as np
 import pandas as pd
 
 from experiments.harness.results import markdown, two
+from experiments.instances.parts.library import command
 
 CLOSED = 1e-6  # of a value: a gap that is none
 
 
-def instance_tables(library: pd.DataFrame, contest: pd.DataFrame) -> dict[str, str]:
+def instance_tables(
+    library: pd.DataFrame, contest: pd.DataFrame, large: pd.DataFrame
+) -> dict[str, str]:
     """Return the tables by the names under which pages have them."""
     still = library[library["gap"] > CLOSED]
     named = [
@@ -26,7 +29,28 @@ def instance_tables(library: pd.DataFrame, contest: pd.DataFrame) -> dict[str, s
             ]
         ),
         "instance_ways": _ways(contest, library),
+        "instance_large": _large(large),
     }
+
+
+def _large(large: pd.DataFrame) -> str:
+    """Return a row per instance that is made by its command alone: its size, and the command."""
+    rows = []
+    for row in large.itertuples():
+        size = f"{row.nodes:,} / {row.arcs:,}"
+        rows.append(
+            [f"`{row.instance}`", size, f"{row.size_MB:.1f} MB", f"`{command(row.instance)}`"]
+        )
+    return markdown(["instance", "nodes / arcs", "file", "command"], rows)
+
+
+def with_gaps(contest: pd.DataFrame, library: pd.DataFrame) -> pd.DataFrame:
+    """Return runs with their gaps, whether the best known was found, and closed by the run."""
+    best = contest["instance"].map(library.set_index("instance")["value"])
+    off = (contest["value"] - best).abs() <= 1e-5 * best.abs()
+    size = contest["value"].abs().replace(0.0, 1.0)
+    gap = ((contest["value"] - contest["bound"]) / size).clip(lower=0.0)
+    return contest.assign(best=off, gap=gap, closed=off & (gap <= 1e-4))
 
 
 def _library(library: pd.DataFrame) -> str:
@@ -43,11 +67,7 @@ def _library(library: pd.DataFrame) -> str:
 
 def _ways(contest: pd.DataFrame, library: pd.DataFrame) -> str:
     """Return a row per way to solve: what it was given, found and closed, its times and gaps."""
-    best = contest["instance"].map(library.set_index("instance")["value"])
-    off = (contest["value"] - best).abs() <= 1e-5 * best.abs()
-    size = contest["value"].abs().replace(0.0, 1.0)
-    gap = ((contest["value"] - contest["bound"]) / size).clip(lower=0.0)
-    table = contest.assign(best=off, gap=gap, closed=off & (gap <= 1e-4))
+    table = with_gaps(contest, library)
     rows = []
     for name, own in table.groupby("solver", sort=False):
         left = own["gap"].replace(np.inf, np.nan).dropna()
