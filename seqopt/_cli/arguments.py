@@ -12,6 +12,7 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from seqopt._cli.answer import Status
+from seqopt._cli.screens import ALL, HelpAll, first_screen
 from seqopt._cli.terminal import columns, complain, show, wrapped
 from seqopt.errors import did_you_mean
 
@@ -24,7 +25,8 @@ EXAMPLES = """Three examples:
   seqopt optimize arch:span=2,rise=0.8 --formulation overlap_dp --out mine
       where to hold an arch of your own
 
-seqopt --help names all commands, seqopt COMMAND --help what each can do.
+seqopt --help names all commands, seqopt COMMAND --help what each is for, and
+seqopt COMMAND --help-all what it can do.
 """
 WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
 UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
@@ -124,8 +126,11 @@ class _Parser(argparse.ArgumentParser):
         self.given = args or ()
         return super().parse_known_args(args, namespace)
 
+    def format_help(self) -> str:
+        return super().format_help().replace("?:\n", "?\n")  # titles that are questions
+
     def print_help(self, file: object = None) -> None:
-        show(self.format_help())
+        show(first_screen(self))
 
     def error(self, message: str) -> NoReturn:
         own = tuple(self._option_string_actions)
@@ -145,7 +150,8 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
         prog="seqopt",
         formatter_class=_layout,
         description="Where should each robot hold a half-built structure, over the whole build?",
-        epilog="seqopt COMMAND --help has the options of a command, and examples.",
+        epilog="seqopt COMMAND --help has what a first use of a command needs, and examples;\n"
+        "seqopt COMMAND --help-all has all of its options.",
     )
     whole.add_argument("--version", action="version", version=f"seqopt {version('seqopt')}")
     whole.color = False  # signs of color would be printed as codes
@@ -169,6 +175,8 @@ def _fill(command: argparse.ArgumentParser, module: ModuleType) -> None:
         command.usage = "\n       ".join(f"{command.prog} {usage}" for usage in usages)
     lines = "\n".join(f"  {example}" for example in module.EXAMPLES)
     command.description = wrapped(module.DESCRIPTION)
+    about = "show every option of the command, and exit"
+    command.add_argument(ALL, action=HelpAll, nargs=0, default=argparse.SUPPRESS, help=about)
     command.epilog = f"example{'s' * (len(module.EXAMPLES) > 1)}:\n{lines}"
     module.add_arguments(command)
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from seqopt._cli.screens import question
 from seqopt.engines.registry import ENGINES
 from seqopt.problem.criteria import Among, Ranked
 from seqopt.scene.scene import ORDERS
@@ -18,6 +19,10 @@ from seqopt.workflow import Defaults
 Takes: TypeAlias = argparse._ActionsContainer  # a parser, or a group of its arguments
 PATHS = ("FILE", "DIR", "FOLDER", "PLAN_DIR")
 MANY, AGAIN = " ...", "; may be repeated"
+BUILT, MOVES = "What is built, and by whom?", "Which steps may a build have?"
+BEST, HOLDS = "What counts as best?", "What must hold?"
+COMPUTED, WRITTEN = "How are responses computed?", "What is written and printed?"
+PROVES = "Who chooses and proves, and how long?"
 
 
 def declare(takes: Takes, about: Mapping[str, str], **more: Any) -> None:
@@ -39,11 +44,11 @@ def declare(takes: Takes, about: Mapping[str, str], **more: Any) -> None:
 
 
 LIMIT = {
-    "--limit LIMIT ...": "no step may exceed it, whether or not a grip is open in it: payload (of "
-    "every robot), or RESPONSE=VALUE in SI units, as F_largest=300"
+    "--limit LIMIT ...": "what no step may exceed: payload (of every robot), or RESPONSE=VALUE in "
+    "SI units, as F_largest=300; also where no grip is open"
 }
 RULE = {
-    "--rule NAME=VALUE ...": "what robots may do: least_grips=N (2; from the second brick on), "
+    "--rule NAME=VALUE ...": "what robots may do: least_grips=N (2, from the second brick on), "
     "newest=either|placing|free (where the newest brick is held), regrips=N|any (between two "
     "bricks), placers=NAME,NAME|any, payload=kept|ignored, ending=held|released|one-by-one (how "
     "robots leave the finished structure), candidates=near:JOINTS|within:METERS|all (as "
@@ -77,10 +82,10 @@ STRICT = {
 }
 DURATIONS = {
     "--durations WORDS ...": "how long robots take, s: "
-    "fetch=30,place=10,approach=10,grip=5,release=5 (to bring the next brick, to place it, to come "
-    "to one that stands, to grip it, to let go; who is free fetches and approaches while others "
-    "act), speed=0.2 (m/s, of ways between grips); of one robot with its name before, as "
-    "rob3:fetch=75 or rob3:slower=2.5 (default: as the scene says)"
+    "fetch=30,place=10,approach=10,grip=5,release=5 or speed=0.2 (m/s, of ways between grips); "
+    "that is to bring the next brick, to place it, to come to one that stands, to grip it, to let "
+    "go; who is free fetches and approaches while others act; of one robot with its name before, "
+    "as rob3:fetch=75 or rob3:slower=2.5 (default: as the scene says)"
 }
 STEPS_USAGE = (
     "[SCENE] --method NAME [--out FILE] [other options]",
@@ -99,7 +104,7 @@ CSV_OUT = {"--out FILE": "CSV file to write (default: standard output)"}
 def scene_options(takes: Takes) -> None:
     """Add what says what is built, and in which order."""
     known = f"a built-in scene ({', '.join(builtin_scenes())}), a JSON file, or a few words such "
-    how = "as arch:span=2,rise=0.8 (seqopt scene --list shows all; default: %(default)s)"
+    how = "as arch:span=2,rise=0.8 (default: %(default)s); seqopt scene --list shows all"
     declare(takes, {"scene SCENE": known + how}, nargs="?", default="arch25")
     order = (
         "in which order bricks are placed, if not in the scene's own: "
@@ -123,7 +128,7 @@ def scene_options(takes: Takes) -> None:
 
 def engine_options(command: argparse.ArgumentParser) -> Takes:
     """Return the group of what says what computes responses, added to a command."""
-    takes = command.add_argument_group("how responses are computed (advanced)")
+    takes = question(command, COMPUTED)
     takes.add_argument(
         "--engine",
         choices=tuple(ENGINES),
@@ -148,7 +153,7 @@ def form_options(
 
     ``strict``, ``builds``: whether ``--strict`` is taken, and ``--no-stability``.
     """
-    takes = command.add_argument_group("what is printed")
+    takes = question(command, WRITTEN)
     declare(takes, STABILITY if builds else {})
     declare(takes, STRICT if strict else {})
     forms = {
@@ -169,10 +174,12 @@ def robots_option(takes: Takes, whose: str) -> None:
 
 def criterion_options(command: argparse.ArgumentParser) -> None:
     """Add what says what a step costs."""
-    takes = command.add_argument_group("what a step costs (advanced)")
+    takes = question(command, BEST)
     about = {
-        "--criteria NAME": f"what a step costs: {', '.join(CRITERIA)}, or responses to rank with "
-        "weights, as T_max,M_sup=2,F_move (default: equations (2) and (3) of Bruun et al.)",
+        "--criteria NAME": "what a step costs: equations-2-3 (of Bruun et al.), worst-ratio (over "
+        "the least worst of fixed methods), or responses to rank with weights, as "
+        f"T_max,M_sup=2,F_move; all names: {', '.join(CRITERIA)} (default: equations-2-3; with "
+        "--aim, --stands or --schedule free worst-ratio)",
         "--crown BRICKS": "for criteria of ranks: how many bricks are placed at the crown of an "
         "arch, or none (default: derived from the scene)",
     }

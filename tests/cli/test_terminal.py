@@ -182,16 +182,3 @@ def test_what_is_compared_fits_eighty_columns(capsys, monkeypatch):
     assert wide == []
     assert "406.1 (406.0)!" in out  # the paper's figure beside, and a payload exceeded
     assert "114.6 (114.4)" in out
-
-
-@pytest.mark.parametrize(
-    "command",
-    ["compare", "optimize", "pareto", "analyze", "assess", "report", "scene", "import", "export"],
-)
-def test_help_fits_eighty_columns_and_shows_examples(capsys, monkeypatch, command):
-    monkeypatch.setenv("COLUMNS", "80")
-    assert main([command, "--help"]) == 0
-    out = capsys.readouterr().out
-    assert max(map(len, out.splitlines())) <= 80
-    assert f"\n  seqopt {command} " in out[out.index("\nexample") :]
-    assert "what is printed:" in out

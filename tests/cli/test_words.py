@@ -108,8 +108,9 @@ def test_every_option_stands_in_a_group_with_a_title():
         titles = [group.title for group in command._action_groups if group._group_actions]
         if command.prog != "seqopt completion":
             assert len(titles) >= 3, command.prog
+            assert all(title.endswith("?") for title in titles[1:] if title), command.prog
         loose = [a.dest for a in command._optionals._group_actions]
-        assert loose == ["help"], command.prog
+        assert loose == ["help", "help_all"], command.prog
 
 
 HEAVY = ("numpy", "pandas", "scipy", "networkx", "tqdm", "shtab")

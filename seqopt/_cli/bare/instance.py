@@ -9,8 +9,9 @@ from pathlib import Path
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.commands import optimize
-from seqopt._cli.options import declare
+from seqopt._cli.options import WRITTEN, declare
 from seqopt._cli.posing import asked_problem
+from seqopt._cli.screens import question
 from seqopt._cli.values import number_word
 from seqopt._files import require_apart
 from seqopt.errors import ProblemError
@@ -47,7 +48,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--below VALUE": "leave out states of which the first aim, a worst step, takes more; "
         "plans that are better than this stay",
     }
-    declare(command.add_argument_group("the instance"), about)
+    declare(question(command, WRITTEN), about)
 
 
 def run(options: argparse.Namespace) -> Answer:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.options import declare, form_options
+from seqopt._cli.screens import question
 from seqopt.errors import SolverError
 from seqopt.graph.instances._files import read_instance
 from seqopt.graph.instances.instance import Instance
@@ -27,7 +28,7 @@ EXAMPLES = (
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``judge``."""
-    takes = command.add_argument_group("what is judged")
+    takes = question(command, "What is judged?")
     takes.add_argument("instance", metavar="INSTANCE", type=Path, help="file of seqopt instance")
     takes.add_argument(
         "solution",

@@ -21,9 +21,12 @@ from seqopt._cli.asked import (
     strictly,
 )
 from seqopt._cli.options import (
+    BUILT,
     CSV_OUT,
+    MOVES,
     POSTURES,
     STEPS_USAGE,
+    WRITTEN,
     declare,
     engine_options,
     form_options,
@@ -31,6 +34,7 @@ from seqopt._cli.options import (
     steps_options,
 )
 from seqopt._cli.outputs import keep_apart, put_table
+from seqopt._cli.screens import question
 from seqopt._cli.values import length_word, parse_time_limit
 from seqopt._files import write_bytes
 from seqopt._interrupts import ending
@@ -66,10 +70,8 @@ UNITS = "in the name of each column: N, Nm, 1e-3mm"
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``analyze``."""
-    basic = command.add_argument_group("what is analyzed")
-    scene_options(basic)
-    steps_options(basic)
-    declare(basic, CSV_OUT)
+    scene_options(question(command, BUILT))
+    steps_options(question(command, MOVES))
     how = engine_options(command)
     how.add_argument(
         "--staged",
@@ -92,7 +94,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "archive (.npz)",
         "--time-limit SECONDS": "stop after it, with the steps that were computed by then",
     }
-    declare(how, about | POSTURES)
+    declare(how, POSTURES)
+    declare(question(command, WRITTEN), CSV_OUT | about)
     form_options(command, strict=True)
 
 

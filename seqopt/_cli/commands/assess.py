@@ -12,9 +12,21 @@ from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
 from seqopt._cli.loading import LOADS, answer_load_factor
 from seqopt._cli.mapping import MAP, answer_map
-from seqopt._cli.options import STEPS_USAGE, declare, form_options, scene_options, steps_options
+from seqopt._cli.options import (
+    BUILT,
+    HOLDS,
+    MOVES,
+    PROVES,
+    STEPS_USAGE,
+    WRITTEN,
+    declare,
+    form_options,
+    scene_options,
+    steps_options,
+)
 from seqopt._cli.outputs import keep_apart, put_table
 from seqopt._cli.rows import Rows
+from seqopt._cli.screens import question
 from seqopt._cli.values import MOST_WORKERS, asked_mortar, count_word
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.registry import versions
@@ -51,25 +63,28 @@ HOW = {
     "--margins NAMES": f"margins beside the verdicts: {', '.join(MARGINS)} or all, with commas "
     "between them; each takes several times as long (default: none; with --steps: all)",
     "--steps FROM:TO": "steps of which margins are found, as 40:60 (default: all)",
-    "--workers N": "processes to share the steps among (default: 1)",
-    "--out FILE": "CSV file to write (default: standard output); with --map a folder",
 }
+WORKERS = {"--workers N": "processes to share the steps among (default: 1)"}
+OUT = {"--out FILE": "CSV file to write (default: standard output); with --map a folder"}
+OF_HOLDS = "With --map, --holds says what is in the joints."
+OF_ASKED = "One of: --margins with --steps, --load-factor, and --map with --holds."
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``assess``."""
-    basic = command.add_argument_group("what is assessed")
-    scene_options(basic)
-    steps_options(basic, required=False)
-    basic.add_argument(
+    scene_options(question(command, BUILT))
+    steps_options(question(command, MOVES, "--map goes without these too."), required=False)
+    holds = question(command, HOLDS, OF_HOLDS)
+    holds.add_argument(
         "--mortar",
         default="epoxy",
         help="what is in the joints: the epoxy of Bruun et al. (25°, 3 MPa, 2 MPa), dry (nothing), "
         "or bond=STRENGTH (Pa) (default: %(default)s)",
     )
-    declare(basic, {**HOW, **LOADS})
-    declare(command.add_argument_group("where builds fail"), MAP)
-    declare(command.add_argument_group("a mortar of your own (advanced)"), STRENGTH)
+    declare(holds, STRENGTH)
+    declare(question(command, "What is asked beside verdicts?", OF_ASKED), HOW | LOADS | MAP)
+    declare(question(command, PROVES), WORKERS)
+    declare(question(command, WRITTEN), OUT)
     form_options(command)
 
 

@@ -23,6 +23,7 @@ from seqopt._cli.asked import (
     strictly,
 )
 from seqopt._cli.options import (
+    BUILT,
     POSTURES,
     criterion_options,
     declare,
@@ -40,6 +41,7 @@ from seqopt._cli.outputs import (
     speed_files,
     write_outputs,
 )
+from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import _parse_grip_range, asked_criterion, parse_robots, speed_seconds
 from seqopt.arms.reach import find_postures
@@ -103,7 +105,7 @@ MODIFIED = "modified-sequential"
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``compare``."""
-    basic = command.add_argument_group("what is compared")
+    basic = question(command, BUILT)
     scene_options(basic)
     robots_option(basic, "all methods, each of which takes as many as it needs")
     declare(basic, WRITTEN)

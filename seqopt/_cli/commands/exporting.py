@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import scene_facts
-from seqopt._cli.options import declare, form_options
+from seqopt._cli.options import WRITTEN, declare, form_options
+from seqopt._cli.screens import question
 from seqopt._cli.values import number_word
 from seqopt._files import require_apart, write_text
 from seqopt.arms.reach import find_postures
@@ -44,13 +45,13 @@ SOURCE = {
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``export``."""
-    basic = command.add_argument_group("what is written")
+    basic = question(command, "Which plan, and in which format?")
     declare(basic, {"folder PLAN_DIR": "folder of a plan"})
     said = f"what to write: {', '.join(EXPORTS)}"
     basic.add_argument("--format", choices=EXPORTS, required=True, metavar="NAME", help=said)
-    declare(basic, {"--out FILE": "file to write"}, required=True)
     declare(basic, SOURCE)
     declare(basic, DISTANCE | POSTURES)
+    declare(question(command, WRITTEN), {"--out FILE": "file to write"}, required=True)
     form_options(command)
 
 

@@ -7,6 +7,7 @@ import argparse
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import scene_facts, size_line
 from seqopt._cli.options import declare, form_options
+from seqopt._cli.screens import question
 from seqopt._cli.values import count_word, number_word
 from seqopt._files import require_apart, write_text
 from seqopt.errors import ProblemError
@@ -43,21 +44,21 @@ JOINTS = {
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``import``."""
-    basic = command.add_argument_group("what is read and written")
+    basic = question(command, "What is read and written?")
     declare(basic, {"file FILE": "what to read"})
     declare(basic, {"--out FILE": "scene to write, JSON"}, required=True)
     basic.add_argument(
         "--format", choices=FORMATS, help="what the file is (default: what it looks like)"
     )
     basic.add_argument("--name", help="of the scene (default: that of the file)")
-    said = command.add_argument_group("what the file does not say")
+    said = question(command, "What does the file not say?")
     said.add_argument("--unit", choices=UNITS, help="unit of length, where the file has none")
     said.add_argument("--up", choices=UPS, default="z", help="axis that is up (default: z)")
     declare(said, KEYS)
     declare(
         said, {"--robots N": "mobile robots that reach all (default: those of the file, else 3)"}
     )
-    declare(command.add_argument_group("joints (advanced)"), JOINTS)
+    declare(question(command, "Which joints are made?"), JOINTS)
     form_options(command)
 
 

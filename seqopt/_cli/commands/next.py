@@ -6,6 +6,7 @@ import argparse
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.options import declare, form_options
+from seqopt._cli.screens import question
 from seqopt._cli.words.where import read_place
 from seqopt.errors import StepError
 from seqopt.plan.policy import FILE, Advice, Policy
@@ -26,7 +27,7 @@ POLICY = {"--policy DIR": "folder that optimize --policy wrote"}
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``next``."""
-    basic = command.add_argument_group("where the build stands")
+    basic = question(command, "Where does the build stand?")
     declare(basic, PLACE)
     declare(basic, POLICY, required=True)
     form_options(command)

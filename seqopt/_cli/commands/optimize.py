@@ -24,12 +24,18 @@ from seqopt._cli.asked import (
     waits_said,
 )
 from seqopt._cli.options import (
+    BEST,
+    BUILT,
     CURING,
     DURATIONS,
+    HOLDS,
     LIMIT,
+    MOVES,
+    PROVES,
     RULE,
     STANDING,
     WHERE,
+    WRITTEN,
     criterion_options,
     declare,
     engine_options,
@@ -39,6 +45,7 @@ from seqopt._cli.options import (
 )
 from seqopt._cli.outputs import ALWAYS, TABLES, plan_files, require_out, write_outputs, written_to
 from seqopt._cli.posing import Asked, asked_problem
+from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import parse_options, parse_size, parse_time_limit
 from seqopt._cli.words.bases import asked_places
@@ -47,9 +54,17 @@ from seqopt._cli.words.optimizing import (
     BASES,
     BUDGET,
     FEWEST,
+    FORMULATION,
     MEMORY,
+    OF_BEST,
+    OF_BUILT,
+    OF_HOLDS,
+    OF_MOVES,
+    OF_PROVING,
+    OF_SCENARIOS,
     POLICY,
     ROBUST,
+    SCHEDULE,
     SEARCH,
     TIME,
     WORKERS,
@@ -59,7 +74,7 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.states.states import States
 from seqopt.plan._other.bases import FoundBases, choose_bases
 from seqopt.plan._other.fewest_props import FoundProps, fewest_props
-from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation, formulation_names
+from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.out_of_sample import Trial, judge_unseen, worst_values
 from seqopt.plan.plan import Plan
@@ -69,10 +84,8 @@ from seqopt.problem._arms import faults_in_words
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import OWN
 from seqopt.responses._tolerance import value_text
-from seqopt.sequence.rules import FREE
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
-from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.study.published import paper_models
 from seqopt.work.progress import within
@@ -89,54 +102,35 @@ USAGE = (
 )
 EXAMPLES = (
     "seqopt optimize arch25 --out best",
-    "seqopt optimize arch25 --schedule free --out free",
-    "seqopt optimize wall:columns=6,courses=4 --schedule free --out wall",
-    "seqopt optimize my.json --formulation minimax --limit payload --out mine",
-    "seqopt optimize arch25 --robust worst-peak --out robust",
-    "seqopt optimize timed.json --schedule free --aim minmax,makespan --out soon",
+    "seqopt optimize arch25 --schedule free --aim minmax,steps --out free",
+    "seqopt optimize wall:columns=4,courses=3 --schedule free --stands dry",
+    "seqopt optimize my.json --criteria worst-ratio --limit payload --out mine",
 )
 INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``optimize``, those of a first use before those of an expert."""
-    _basic(command)
-    declare(command.add_argument_group("a part of a build"), WHERE)
-    declare(command.add_argument_group("what is allowed"), LIMIT | BUDGET)
-    form_options(command, strict=True, builds=True)
-    states = "what plans are compared by, state after state, with any schedule"
-    declare(command.add_argument_group(states), AIM | FEWEST | STANDING | CURING)
-    declare(command.add_argument_group("with --schedule free"), RULE | BASES | POLICY)
+    built, moves = question(command, BUILT, OF_BUILT), question(command, MOVES, OF_MOVES)
+    scene_options(built)
+    declare(moves, SCHEDULE)
+    robots_option(built, "a loop, or a schedule that is named")
+    declare(built, DURATIONS | BASES)
+    declare(moves, RULE | WHERE)
+    declare(question(command, BEST, OF_BEST), AIM | FEWEST)
     criterion_options(command)
+    declare(question(command, HOLDS, OF_HOLDS), LIMIT | BUDGET | STANDING | CURING)
+    declare(question(command, "In which scenarios is it good?", OF_SCENARIOS), ROBUST)
+    proves = question(command, PROVES, OF_PROVING)
+    declare(proves, FORMULATION | SEARCH | TIME)
+    declare(proves, WORKERS, default="1")
+    declare(proves, MEMORY)
     engine_options(command)
-    declare(command.add_argument_group("how far the search goes (advanced)"), SEARCH)
-    scenarios = "a plan that is good in many scenarios (advanced)"
-    declare(command.add_argument_group(scenarios), ROBUST)
-    means = command.add_argument_group("time and memory (advanced)")
-    declare(means, TIME)
-    declare(means, WORKERS, default="1")
-    declare(means, MEMORY)
-
-
-def _basic(command: argparse.ArgumentParser) -> None:
-    takes = command.add_argument_group("what is built, and how grips are chosen")
-    about = {
-        "--formulation NAME": "which mathematical program chooses: "
-        f"{', '.join(formulation_names())} (default: overlap_dp, which is exact and the fastest, "
-        "labels with --budget, minimax with --robust worst-peak, scenario_search with other aims "
-        "over scenarios; schedule_search with --aim, --stands or --schedule free, makespan_labels "
-        "where a makespan counts, order_search with --order search)",
-        "--schedule NAME|FILE": f"which sequence has the open grips: {', '.join(SCHEDULES)} (of "
-        "all robots), a CSV file of steps in which open grips are marked ?, or "
-        f"{FREE}: any robot may release, hold or place next (default: the loop of three robots, or "
-        "of two where there is no third)",
-    }
-    scene_options(takes)
-    declare(takes, about)
-    robots_option(takes, "a loop, or a schedule that is named")
-    declare(takes, {"--out DIR": "folder to write plan, tables, summary and page to"})
-    declare(takes, TABLES, choices=("plan", "all"), default="plan")
-    declare(takes, DURATIONS)
+    written = question(command, WRITTEN)
+    declare(written, {"--out DIR": "folder to write plan, tables, summary and page to"})
+    declare(written, TABLES, choices=("plan", "all"), default="plan")
+    declare(written, POLICY)
+    form_options(command, strict=True, builds=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,10 +11,16 @@ import pandas as pd
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import asked_prover, level_notes, marked, refused, scene_facts
 from seqopt._cli.options import (
+    BEST,
+    BUILT,
+    HOLDS,
     LIMIT,
+    MOVES,
+    PROVES,
     RULE,
     STANDING,
     WHERE,
+    WRITTEN,
     declare,
     engine_options,
     form_options,
@@ -22,6 +28,7 @@ from seqopt._cli.options import (
 )
 from seqopt._cli.outputs import figure_notes, write_outputs, written_to
 from seqopt._cli.posing import asked_problem
+from seqopt._cli.screens import question
 from seqopt._cli.values import parse_numbers
 from seqopt._files import csv_text, require_folder
 from seqopt.engines.interface import Engine
@@ -69,24 +76,29 @@ CHOICE = {
     "--under BOUND ...": "for --pick: only plans below it: NAME=VALUE (SI units), or a method that "
     "is to be beaten in everything: sequential, cantilever, published",
 }
+OF_MOVES = (
+    f"--rule and --direction go with --schedule {FREE} alone, --keep with --direction take-down "
+    "and not with --to."
+)
+OF_HOLDS = "--friction and --tilt go with --stands."
 SECONDS = {"--seconds S": "end the search after so long"}
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``pareto``."""
-    basic = command.add_argument_group("what is built, and what is to be small")
-    scene_options(basic)
-    declare(basic, AIM, default=FOUR)
-    declare(basic, SCHEDULE, default=FREE)
-    declare(basic, ROBOTS, default="")
-    declare(basic, LIMIT | WHERE)
-    declare(basic, {"--out DIR": "folder to write"}, required=True)
-    choice = command.add_argument_group("which plan is picked, and when the search ends")
-    declare(choice, CHOICE)
-    declare(choice, SECONDS, default="inf", type=float)
-    form_options(command, builds=True)
-    declare(command.add_argument_group("with --schedule free"), RULE | STANDING)
+    built, moves = question(command, BUILT), question(command, MOVES, OF_MOVES)
+    scene_options(built)
+    declare(built, ROBOTS, default="")
+    declare(moves, SCHEDULE, default=FREE)
+    declare(moves, RULE | WHERE)
+    best = question(command, BEST, "--under goes with --pick.")
+    declare(best, AIM, default=FOUR)
+    declare(best, CHOICE)
+    declare(question(command, HOLDS, OF_HOLDS), LIMIT | STANDING)
+    declare(question(command, PROVES), SECONDS, default="inf", type=float)
     engine_options(command)
+    declare(question(command, WRITTEN), {"--out DIR": "folder to write"}, required=True)
+    form_options(command, builds=True)
     command.set_defaults(criteria=None, crown=None)
 
 

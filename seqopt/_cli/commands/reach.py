@@ -9,8 +9,9 @@ import pandas as pd
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import asked_scene, scene_facts
-from seqopt._cli.options import POSTURES, declare, form_options, scene_options
+from seqopt._cli.options import BUILT, POSTURES, declare, form_options, scene_options
 from seqopt._cli.outputs import figure_notes, require_out, write_outputs
+from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
 from seqopt.arms._listing import find_table, reach_table
@@ -27,7 +28,7 @@ WRITTEN = {"--out DIR": "folder to write reach.csv, postures.csv and a picture t
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``reach``."""
-    basic = command.add_argument_group("which scene")
+    basic = question(command, BUILT)
     scene_options(basic)
     declare(basic, WRITTEN | POSTURES)
     form_options(command)

@@ -15,16 +15,22 @@ from seqopt._cli.answer import Answer
 from seqopt._cli.arguments import parser
 from seqopt._cli.commands import optimize
 from seqopt._cli.options import (
+    BEST,
     CURING,
     DURATIONS,
+    HOLDS,
     LIMIT,
+    MOVES,
+    PROVES,
     RULE,
     STANDING,
+    WRITTEN,
     criterion_options,
     declare,
     engine_options,
     form_options,
 )
+from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import number_word
 from seqopt._cli.words.optimizing import AIM, TIME
@@ -48,7 +54,7 @@ DESCRIPTION = (
     "carries less or is new, a brick is missing. Any robot may release, hold or place next; aims, "
     "criterion and rules are those of the plan, if nothing else is said."
 )
-USAGE = ("PLAN_DIR --at STEP [what has changed] [--out DIR] [other options]",)
+USAGE = ("PLAN_DIR --at STEP [changes] [--out DIR] [other options]",)
 EXAMPLES = (
     "seqopt replan free --at 12 --lost rob3 --rule least_grips=1",
     "seqopt replan free --at 12 --payload rob1=250 --out weaker",
@@ -66,23 +72,24 @@ CHANGES = {
     "an assembly of COMPAS",
     "--to PLAN:STEP|STATE|N": "where the build ends, as of optimize",
 }
+OF_HOLDS = "--friction, --tilt and --curing go with --stands."
 ASKED = ("aim", "criteria", "limit", "rule", "stands", "friction", "tilt")
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``replan``."""
-    basic = command.add_argument_group("which plan, and where it stands")
+    basic = question(command, "Which plan, and where does it stand?")
     declare(basic, PLACE)
     declare(basic, {"--at STEP": "number of the last step that was done"}, required=True)
-    declare(basic, {"--out DIR": "folder to write the new plan to"})
-    declare(command.add_argument_group("what has changed"), CHANGES)
-    asked = command.add_argument_group("what is asked, if not as before")
-    declare(asked, AIM | LIMIT | RULE | STANDING | CURING)
-    declare(asked, DURATIONS)
-    form_options(command, strict=True, builds=True)
+    declare(question(command, "What has changed?"), CHANGES)
+    declare(question(command, MOVES), RULE | DURATIONS)
+    declare(question(command, BEST, "As before, where nothing is said."), AIM)
     criterion_options(command)
+    declare(question(command, HOLDS, OF_HOLDS), LIMIT | STANDING | CURING)
+    declare(question(command, PROVES), TIME)
     engine_options(command)
-    declare(command.add_argument_group("time"), TIME)
+    declare(question(command, WRITTEN), {"--out DIR": "folder to write the new plan to"})
+    form_options(command, strict=True, builds=True)
 
 
 def run(options: argparse.Namespace) -> Answer:

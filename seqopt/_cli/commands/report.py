@@ -7,8 +7,9 @@ from pathlib import Path
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import asked_engine, asked_prover, asked_scene, scene_facts
-from seqopt._cli.options import declare, engine_options, form_options, scene_options
+from seqopt._cli.options import BUILT, WRITTEN, declare, engine_options, form_options, scene_options
 from seqopt._cli.outputs import figure_notes, keep_apart
+from seqopt._cli.screens import question
 from seqopt._files import require_folder, write_folder, write_text
 from seqopt.network.build import build_network
 from seqopt.report._pages import PAGE, folder_builds, folder_page
@@ -25,8 +26,8 @@ EXAMPLES = (
 )
 
 
+FOLDER = {"folder DIR": "folder that holds plans as CSV"}
 SHOWN = {
-    "folder DIR": "folder that holds plans as CSV",
     "--out FILE": f"page to write (default: {PAGE} in DIR)",
     "--figures FOLDER": "also write figures there as PNG and SVG: steps, who holds what when, and "
     "responses along the build (needs matplotlib)",
@@ -35,10 +36,11 @@ SHOWN = {
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``report``."""
-    basic = command.add_argument_group("what is shown")
+    basic = question(command, BUILT)
     scene_options(basic)
-    declare(basic, SHOWN)
+    declare(basic, FOLDER)
     engine_options(command)
+    declare(question(command, WRITTEN), SHOWN)
     form_options(command, builds=True)
 
 

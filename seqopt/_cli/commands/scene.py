@@ -10,8 +10,9 @@ import numpy as np
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import asked_scene, scene_facts, size_line
-from seqopt._cli.options import declare, form_options, scene_options
+from seqopt._cli.options import BUILT, declare, form_options, scene_options
 from seqopt._cli.outputs import keep_apart
+from seqopt._cli.screens import question
 from seqopt._files import write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
@@ -40,7 +41,7 @@ WHAT = {
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``scene``."""
-    basic = command.add_argument_group("which scene")
+    basic = question(command, BUILT)
     scene_options(basic)
     declare(basic.add_mutually_exclusive_group(), WHAT)
     form_options(command)

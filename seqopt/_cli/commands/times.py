@@ -18,16 +18,21 @@ from seqopt._cli.asked import (
     waits_said,
 )
 from seqopt._cli.options import (
+    BUILT,
     CURING,
     DURATIONS,
+    HOLDS,
+    MOVES,
     STANDING,
     STEPS_USAGE,
+    WRITTEN,
     declare,
     form_options,
     scene_options,
     steps_options,
 )
 from seqopt._cli.outputs import figure_notes, require_out, time_files, write_outputs
+from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_standing
 from seqopt._files import csv_text
@@ -51,8 +56,7 @@ DESCRIPTION = (
 )
 USAGE = tuple(usage.replace("--out FILE", "--out DIR") for usage in STEPS_USAGE)
 EXAMPLES = (
-    "seqopt times arch25 --method cantilever "
-    "--durations fetch=30,place=10,approach=10,grip=5,release=5",
+    "seqopt times timed.json --method cantilever --durations rob3:slower=2.5",
     "seqopt times my.json --plan plan.csv --reassign --out faster",
 )
 REASSIGN = {
@@ -70,12 +74,16 @@ STIFFENS = {
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``times``."""
-    basic = command.add_argument_group("which build")
-    scene_options(basic)
-    steps_options(basic)
-    declare(basic, DURATIONS | REASSIGN)
-    declare(command.add_argument_group("mortar that cures"), STANDING | CURING | STIFFENS)
-    declare(basic, {"--out DIR": "folder to write plan.csv, times.csv and a chart to"})
+    built = question(command, BUILT)
+    scene_options(built)
+    declare(built, DURATIONS)
+    moves = question(command, MOVES)
+    steps_options(moves)
+    declare(moves, REASSIGN)
+    cures = question(command, HOLDS, "--stands, --friction and --tilt go with --curing alone.")
+    declare(cures, STANDING | CURING | STIFFENS)
+    out = {"--out DIR": "folder to write plan.csv, times.csv and a chart to"}
+    declare(question(command, WRITTEN), out)
     form_options(command)
 
 

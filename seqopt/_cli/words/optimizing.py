@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from seqopt.plan.calling.formulation import formulation_names
+from seqopt.sequence.rules import FREE
+from seqopt.sequence.three_robots import SCHEDULES
+
 BUDGET = {
     "--budget BUDGET ...": "cap on a total over the build, with the formulations labels, "
     "lagrangian, overlap_mip and overlap_lp: travel=0.8 (of what the optimum without budgets "
@@ -10,12 +14,12 @@ BUDGET = {
     "free: steps=N, regrips=N, travel=3.5m, makespan=600s or sum(RESPONSE)=VALUE"
 }
 AIM = {
-    "--aim NAME,NAME": "what is to be as small as possible, the most important first: props (how "
-    "many are needed, at which nodes), minmax (the worst step by the criterion, by default "
-    "worst-ratio), sum, steps, regrips, travel, makespan (how long the build takes, with "
-    "--durations), bond, friction, tilt, a response, or sum(RESPONSE) (free: by default minmax; "
-    "other schedules: by default the total of what their moves cost); with --order search, the "
-    "best order of the bricks is found too"
+    "--aim NAME,NAME": "what is to be as small as possible, the most important first: minmax (the "
+    "worst step), sum, steps, regrips, travel, makespan (time), a response, as T_max, and others; "
+    "these are props (how many are needed, at which nodes), bond, friction, tilt, and "
+    "sum(RESPONSE); the worst step is by the criterion, by default worst-ratio, and a makespan "
+    "needs --durations (default: minmax with --schedule free; with others the total of what their "
+    "moves cost); with --order search the best order of the bricks is found too"
 }
 SEARCH = {
     "--option NAME=VALUE ...": "option of the formulation, as horizon=2 or width=10",
@@ -66,3 +70,34 @@ MEMORY = {
     "--max-memory SIZE": "what responses and costs may take, as 500MB or 2GB (default: four fifths "
     "of what is free); of a free schedule states and moves, with a bound where it ends",
 }
+FORMULATION = {
+    "--formulation NAME": "which mathematical program chooses: "
+    f"{', '.join(formulation_names())} (default: overlap_dp, which is exact and the fastest, "
+    "labels with --budget, minimax with --robust worst-peak, scenario_search with other aims over "
+    "scenarios; schedule_search with --aim, --stands or --schedule free, makespan_labels where a "
+    "makespan counts, order_search with --order search)"
+}
+SCHEDULE = {
+    "--schedule NAME|FILE": f"{FREE}: any robot may release, hold or place next, or a sequence "
+    f"with open grips: {', '.join(SCHEDULES)} (of all robots), or a CSV file of steps; open grips "
+    "are marked ? in it (default: the loop of three robots, or of two where there is no third)"
+}
+OF_BUILT = (
+    f"--bases goes with --schedule {FREE} and not with --order. A number of robots goes with "
+    f"--schedule {FREE} alone."
+)
+OF_MOVES = (
+    f"--rule and --direction go with --schedule {FREE} alone, --keep with --direction take-down "
+    "and not with --to."
+)
+OF_BEST = (
+    f"With --aim, --stands, --order search or --schedule {FREE} states of the build are chosen: "
+    "--ranked, --among and criteria of ranks do not go with these. --props-among goes with --aim "
+    "props alone, and that with neither --bases nor --props."
+)
+OF_HOLDS = (
+    "--friction, --tilt and --curing go with --stands. Budgets on steps, regrips, makespan and "
+    f"sums go with --aim or --schedule {FREE}, those on steps_over and robot_use without."
+)
+OF_SCENARIOS = "--scenarios, --unseen, --seed and --vary go with --robust alone."
+OF_PROVING = "--no-proof goes with cascade and rank_search, --lazy with exact formulations."

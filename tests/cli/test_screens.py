@@ -1,0 +1,131 @@
+"""Help in two lengths: what a first use needs on one screen, and every option by question."""
+
+from __future__ import annotations
+
+import argparse
+
+import pytest
+
+from seqopt._cli import screens
+from seqopt._cli.arguments import COMMANDS, parser
+from seqopt._cli.main import main
+from seqopt._cli.screens import LINES, first_screen, question
+
+
+@pytest.fixture
+def printed(capsys, monkeypatch):
+    """What a command prints on a terminal of 80 columns."""
+    monkeypatch.setenv("COLUMNS", "80")
+
+    def run(*words):
+        assert main(words) == 0
+        return capsys.readouterr().out
+
+    return run
+
+
+def command_of(name):
+    """The parser of one command."""
+    commands = next(
+        a for a in parser(name)._actions if isinstance(a, argparse._SubParsersAction)
+    ).choices
+    return commands[name]
+
+
+def defined(text):
+    """The words that begin a line of a list of options, and whatever stands in its place."""
+    begins = (line[2:] for line in text.splitlines() if line[:2] == "  " and line[2:3] > " ")
+    return [line.split()[0].rstrip(",") for line in begins]
+
+
+def flags(command):
+    """The options and arguments of a command, as help lists them."""
+    named = (action.option_strings or [action.metavar] for action in command._actions)
+    return [names[0] for names in named if names[0] is not None]
+
+
+@pytest.mark.parametrize("name", ["", *COMMANDS])
+def test_help_fits_one_screen_and_shows_examples(printed, name):
+    out = printed(*([name] if name else []), "--help")
+    assert len(out.splitlines()) <= LINES == 40
+    assert max(map(len, out.splitlines())) <= 80
+    assert all(text.count("(") == text.count(")") for text in out.split("\n\n"))
+    if name:
+        for example in COMMANDS[name].load().EXAMPLES:
+            assert f"\n  {example}\n" in out
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_all_help_has_every_option_once(printed, name):
+    out = printed(name, "--help-all")
+    assert max(map(len, out.splitlines())) <= 80
+    command = command_of(name)
+    about = "\n".join(group.description or "" for group in command._action_groups)
+    said = {line.strip() for line in about.splitlines()}
+    kept = [line for line in out.splitlines() if line.strip() not in said]
+    body = defined("\n".join(kept).partition("\nexample")[0])
+    for flag in flags(command):
+        assert body.count(flag) == 1, flag
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_screen_has_what_must_be_given_and_what_examples_use(printed, name):
+    out, command = printed(name, "--help"), command_of(name)
+    shown = defined(out.partition("\nexample")[0])
+    assert len(shown) == len({*shown})
+    for action in command._actions:
+        if action.required and action.option_strings:
+            assert action.option_strings[0] in shown
+    used = {word for example in COMMANDS[name].load().EXAMPLES for word in example.split()}
+    assert {word for word in used if word in flags(command)} <= {*shown}
+    if "--help-all has" in out:
+        more = int(out.rpartition("--help-all has ")[2].split()[0])
+        assert more == len({*flags(command)} - {*shown} - {"-h", "--help-all"})
+    else:
+        assert out == printed(name, "--help-all")
+
+
+def test_what_one_needs_first_of_optimize(printed):
+    shown = defined(printed("optimize", "--help"))
+    assert {"SCENE", "--schedule", "--aim", "--criteria", "--stands", "--out"} <= {*shown}
+
+
+def test_a_question_is_asked_once(monkeypatch):
+    command = argparse.ArgumentParser()
+    first = question(command, "Why?", "One or the other.")
+    assert question(command, "Why?") is first
+    assert question(command, "How?") is not first
+    monkeypatch.setattr(screens, "LINES", 0)  # a screen is too small for anything
+    first.add_argument("--reason", help="what for; and more")
+    first.add_argument("--needed", required=True, help="this; and this")
+    text = first_screen(command)
+    assert "this" in text
+    assert "--reason" not in text
+    assert "and this" not in text
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ("--schedule free --criteria equations-2-3", "it ranks the choices of a move"),
+        ("--aim steps --ranked pairs", "leave it out"),
+        ("--stands dry --among all", "leave it out"),
+        ("--rule least_grips=1", "give --schedule free"),
+        ("--direction take-down", "--schedule free"),
+        ("--keep 1..3", "--direction take-down"),
+        ("--bases grid", "--schedule free"),
+        ("--props-among all", "--aim props"),
+        ("--aim props --props 3", "without --bases or props"),
+        ("--friction 0.5", "--stands"),
+        ("--schedule free --tilt 1", "--stands"),
+        ("--curing 15min", "--stands"),
+        ("--budget steps=40", "with an aim"),
+        ("--aim minmax --budget steps_over:F_largest=250:10", "does not exist"),
+        ("--seed 3", "--robust"),
+        ("--lazy --formulation beam", "exact"),
+        ("--no-proof", "cascade or rank_search"),
+    ],
+)
+def test_what_help_says_does_not_go_together_does_not(capsys, words, why):
+    assert main(["optimize", "chain:bricks=7", *words.split()]) == 2
+    assert why in capsys.readouterr().err
