@@ -27,7 +27,7 @@ SLOWER = f"{TIMES} --durations rob3:fetch=75,approach=25"
 SLOWEST = f"{TIMES} --durations rob4:fetch=75,approach=25"
 CHAIN = "chain:bricks="
 PAIR = f"{FREE} --robots 2 --rule least_grips=1"  # while one of two moves the other one holds
-ONCE = "--rule regrips=0 --rule newest=placing"  # who lets go places next
+ONCE = "--rule regrips=0 --rule newest=placing"  # grips are taken to place alone
 HEAVY = "--rule payload=ignored"  # of chains: two robots alone are too weak for them
 NEAR = "--rule candidates=near:"
 MADE = {
