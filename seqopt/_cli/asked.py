@@ -10,7 +10,7 @@ import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_robots
+from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_payload, parse_robots
 from seqopt._cli.words.props import parse_props
 from seqopt.contact.mortar import Mortar
 from seqopt.engines._auto import AutoEngine
@@ -25,6 +25,7 @@ from seqopt.report.comparison import idle_note
 from seqopt.responses.table import OUTSIDE, REMEDY
 from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.rules import with_robots
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import AnyStep, Step
 from seqopt.sequence.two_robots import METHODS
@@ -60,6 +61,10 @@ def asked_scene(options: argparse.Namespace, *, ranged: bool = False) -> Scene:
             "--order search: only the free schedule has it; give optimize --schedule free"
         )
     scene = in_order(load_scene(options.scene), options.order)
+    for text in options.payload:
+        scene = parse_payload(text, scene)
+    if getattr(options, "robots", "").isdecimal():
+        scene = with_robots(scene, int(options.robots))
     if options.props is not None:
         scene = scene.with_props(*parse_props(options.props, scene))
     own = options.grips is None or (ranged and ".." in options.grips)
@@ -92,7 +97,7 @@ def asked_steps(options: argparse.Namespace, network: Network) -> tuple[Step, ..
     a plan.
     """
     scene, robots = network.scene, parse_robots(options.robots)
-    if robots and options.method not in METHODS:
+    if options.robots and options.method not in METHODS:
         raise StepError(
             f"--robots {options.robots}: a plan says itself who holds; leave it out, or give "
             f"--method {' or '.join(METHODS)}"

@@ -122,8 +122,12 @@ def scene_options(takes: Takes) -> None:
         "a colon if they are not rigid, as every:1e6; then push for such as only push up, and "
         "capacity=N"
     )
+    payload = (
+        "what every robot may carry, N, if not as the scene says; of one robot with its name "
+        "before, as rob1=250"
+    )
     said = {"--order ORDER": order, "--grips STIFFNESS": grips, "--props NODES": props}
-    declare(takes, said)
+    declare(takes, said | {"--payload NEWTON ...": payload})
 
 
 def engine_options(command: argparse.ArgumentParser) -> Takes:
@@ -166,10 +170,11 @@ def form_options(
 def robots_option(takes: Takes, whose: str) -> None:
     """Add the option that names robots; the help says what they take part in."""
     said = (
-        f"robots that take part in {whose}, in the order in which they place their first bricks "
-        "(default: the first of the scene whose reach allows the build)"
+        "how many robots there are (those of the scene first, further ones reach every node), or "
+        f"the names of those that take part in {whose}; in the order in which they place their "
+        "first bricks (default: the first of the scene whose reach allows the build)"
     )
-    declare(takes, {"--robots NAME,NAME[,NAME]": said}, default="")
+    declare(takes, {"--robots N|NAME,NAME": said}, default="")
 
 
 def criterion_options(command: argparse.ArgumentParser) -> None:

@@ -40,7 +40,7 @@ from seqopt.scene.holders._props import Prop
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence._timing import step_times
-from seqopt.sequence.rules import FREE, Direction, FreeRules, with_robots
+from seqopt.sequence.rules import FREE, Direction, FreeRules
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import StepKind
@@ -110,8 +110,6 @@ def asked_problem(options: argparse.Namespace) -> Asked:
         if options.schedule != FREE or options.order is not None or sought:
             raise ProblemError(f"--bases: it goes with --schedule {FREE} in the scene's own order")
         scene = without_arms(scene)  # bases are chosen afterwards
-    if options.robots.isdecimal():
-        scene = with_robots(scene, int(options.robots))
     scene, begin, end = _asked_ends(options, scene)
     fewest = fewest_asked(options, scene)
     scene = scene if fewest is None else scene.with_props(*fewest)
@@ -198,8 +196,7 @@ def _asked_moves(options: argparse.Namespace, network: Network) -> Schedule | Fr
     if options.schedule != FREE:
         schedule = find_schedule(network, options.schedule, parse_robots(options.robots))
         return schedule if rule is None else thin(schedule, rule)
-    names = () if options.robots.isdecimal() else parse_robots(options.robots)
-    rules = parse_rules(options.rule, names)
+    rules = parse_rules(options.rule, parse_robots(options.robots))
     rules = replace(rules, direction=getattr(options, "direction", None) or Direction.BUILD)
     return replace(rules, candidates=rule) if rule else rules
 
@@ -218,11 +215,6 @@ def _require_known(options: argparse.Namespace, *, of_states: bool) -> None:
     for name, why in _WRONG["free" if free else "states" if of_states else "candidates"].items():
         if getattr(options, name, None):
             raise ProblemError(f"--{name}: {why}")
-    if options.robots.isdecimal() and not free:
-        said = f"--robots: a count of robots goes with --schedule {FREE}"
-        if of_states:
-            said = f"--schedule {options.schedule}: a count of robots goes with {FREE}"
-        raise StepError(said)
 
 
 def _require_direction(options: argparse.Namespace, *, free: bool) -> None:

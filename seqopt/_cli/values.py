@@ -105,8 +105,21 @@ def _response_word(name: str, where: str) -> str:
 
 
 def parse_robots(text: str) -> tuple[str, ...]:
-    """Return names of robots from words with commas between them; nothing for none."""
-    return tuple(name.strip() for name in text.split(",")) if text else ()
+    """Return names of robots from words with commas between them; nothing for none or a count."""
+    named = text and not text.isdecimal()
+    return tuple(name.strip() for name in text.split(",")) if named else ()
+
+
+def parse_payload(text: str, scene: Scene) -> Scene:
+    """Return a scene with robots that carry what words say, ``250`` N each or ``rob1=250``."""
+    name, equals, value = text.rpartition("=")
+    names = [robot.name for robot in scene.robots]
+    if equals and name not in names:
+        hint = did_you_mean(name, names)
+        raise StepError(f"--payload {text}{hint}: give ROBOT=NEWTON, of {', '.join(names)}")
+    most = number_word(value, f"--payload {text}")
+    said = (replace(r, payload=most) if name in ("", r.name) else r for r in scene.robots)
+    return scene.with_robots(*said)
 
 
 def _parse_grip_range(text: str | None) -> tuple[float, ...]:

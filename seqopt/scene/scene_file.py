@@ -10,6 +10,7 @@ import inspect
 import json
 import math
 import os
+import shlex
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, replace
@@ -169,6 +170,7 @@ class _Kind:
         return {name: number for name, number in given.items() if number.annotation in _READ}
 
 
+_MESHES = (".obj", ".ply", ".stl")
 KINDS = {
     "arch": _Kind("an arch by span and rise: arch:span=2,rise=0.7,curve=catenary", arch, ArchForm),
     "barrel": _Kind("one of the eight tested barrel vaults: barrel:test=3", barrel_vault),
@@ -250,6 +252,16 @@ def _load_stored(name: str) -> Scene:
     return _parse_scene(_DATA.joinpath("scenes", f"{name}.json").read_text("utf-8"), name)
 
 
+def _refuse_mesh(path: Path) -> None:
+    """Raise an error that says how a mesh becomes a scene."""
+    if path.suffix.lower() in _MESHES and path.exists():
+        out = path.with_suffix(".json").name
+        raise SceneError(
+            f"scene {path}: a mesh; seqopt import {shlex.quote(str(path))} --unit m --density 2400 "
+            f"--out {shlex.quote(out)} makes a scene of it, with its own unit and density"
+        )
+
+
 def load_scene(name: str | Path) -> Scene:
     """Return a built-in scene by name, the scene of a JSON file, or one from a few words.
 
@@ -292,6 +304,7 @@ def load_scene(name: str | Path) -> Scene:
     path = Path(name)
     if not path.suffix and not os.path.lexists(path):
         raise SceneError(_no_such(name))
+    _refuse_mesh(path)
     scene = _with_models(_parse_scene(read_text(path), name), path.parent.joinpath)
     warn_of(scene, name)
     return scene

@@ -129,3 +129,21 @@ def test_a_question_is_asked_once(monkeypatch):
 def test_what_help_says_does_not_go_together_does_not(capsys, words, why):
     assert main(["optimize", "chain:bricks=7", *words.split()]) == 2
     assert why in capsys.readouterr().err
+
+
+def test_the_payload_that_is_said_to_be_enough_is(capsys):
+    words = ["optimize", "arch25", "--robots", "2", "--no-stability"]
+    assert main(words) == 0
+    out = capsys.readouterr().out
+    least = int(out.partition("payload of ")[2].partition("--payload ")[2].partition(",")[0])
+    for newton, over in ((least, False), (least - 1, True)):
+        assert main([*words, "--payload", str(newton)]) == 0
+        assert ("payload exceeded" in capsys.readouterr().out) is over
+
+
+def test_a_mesh_is_answered_by_the_command_that_imports_it(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my wall.obj").write_text("v 0 0 0", encoding="utf-8")
+    assert main(["optimize", "my wall.obj"]) == 2
+    said = "seqopt import 'my wall.obj' --unit m --density 2400 --out 'my wall.json'"
+    assert said in capsys.readouterr().err

@@ -55,9 +55,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     said.add_argument("--unit", choices=UNITS, help="unit of length, where the file has none")
     said.add_argument("--up", choices=UPS, default="z", help="axis that is up (default: z)")
     declare(said, KEYS)
-    declare(
-        said, {"--robots N": "mobile robots that reach all (default: those of the file, else 3)"}
-    )
+    robots = "how many there are, mobile ones that reach all (default: those of the file, else 3)"
+    declare(said, {"--robots N": robots})
     declare(question(command, "Which joints are made?"), JOINTS)
     form_options(command)
 

@@ -7,8 +7,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite
+from math import ceil, isfinite
 from typing import Any
+
+import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import (
@@ -82,8 +84,9 @@ from seqopt.plan.policy import FILE, find_policy
 from seqopt.plan.solving import solve, usual
 from seqopt.problem._arms import faults_in_words
 from seqopt.problem.problem import Problem
-from seqopt.problem.requirements import OWN
+from seqopt.problem.requirements import OWN, overloads
 from seqopt.responses._tolerance import value_text
+from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
 from seqopt.stability._builds import BuildProver, BuildVerdicts
@@ -290,6 +293,7 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
     table, scene = plan.responses(), plan.engine.network.scene
     stopped = plan.ended is End.INTERRUPTED
     over = () if stopped else exceeded(scene, table)
+    enough = _enough_payload(scene, table) if over else ()
     lines = [f"{_said(found)}; {written_to(options.out)}"]
     lines += map(wrapped, waits_said(plan) if plan.certificate is not None else ())
     lines += [f"stability, {each}" for each in found.own]
@@ -311,7 +315,7 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
     arms = () if plan.arms is None else (f"arms: {plan.arms}",)
     answer = Answer(
         facts={**facts, "plan": table},
-        text="\n".join([*lines, *(f"payload exceeded: {excess}" for excess in over)]),
+        text="\n".join([*lines, *(f"payload exceeded: {excess}" for excess in over), *enough]),
         written=written,
         notes=(
             *_posed_notes(found.asked.problem),
@@ -326,6 +330,13 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
     )
     unreached = () if plan.arms is None else faults_in_words(plan.arms.postures)
     return strictly(answer, options, over, plan.departures, found.verdicts, unreached)
+
+
+def _enough_payload(scene: Scene, table: pd.DataFrame) -> tuple[str, ...]:
+    """Return which payload of every robot is enough for a plan in which one is exceeded."""
+    least = max((ceil(excess.largest) for excess in overloads(scene, table)), default=None)
+    how = f"--payload {least}, or payload of its robots in the scene file"
+    return () if least is None else (f"payload of {least} N is enough for this plan: {how}",)
 
 
 def _time_notes(plan: Plan) -> tuple[str, ...]:

@@ -24,6 +24,7 @@ from seqopt._cli.options import (
     declare,
     engine_options,
     form_options,
+    robots_option,
     scene_options,
 )
 from seqopt._cli.outputs import figure_notes, write_outputs, written_to
@@ -69,7 +70,6 @@ SCHEDULE = {
     "--schedule NAME|FILE": f"{FREE} (default): any robot may place, hold or release next; or a "
     f"sequence with open grips: {', '.join(SCHEDULES)}, or a CSV file"
 }
-ROBOTS = {"--robots N|NAME,NAME": "how many robots (further ones are mobile), or which take part"}
 CHOICE = {
     "--pick NAME": "also write the plan with the least of a column of the table",
     "--round NAME=STEP ...": "round a number up to multiples of a step (SI units)",
@@ -88,7 +88,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``pareto``."""
     built, moves = question(command, BUILT), question(command, MOVES, OF_MOVES)
     scene_options(built)
-    declare(built, ROBOTS, default="")
+    robots_option(built, "the build")
     declare(moves, SCHEDULE, default=FREE)
     declare(moves, RULE | WHERE)
     best = question(command, BEST, "--under goes with --pick.")

@@ -32,7 +32,6 @@ from seqopt._cli.options import (
 )
 from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import number_word
 from seqopt._cli.words.optimizing import AIM, TIME
 from seqopt._cli.words.where import Place
 from seqopt._files import read_text
@@ -63,9 +62,9 @@ EXAMPLES = (
 PLACE = {"plan PLAN_DIR": "folder that optimize wrote: its plan, scene and summary"}
 CHANGES = {
     "--lost ROBOT ...": "robot that lets go and takes no further part",
-    "--payload ROBOT=NEWTON ...": "what a robot may carry from now on",
+    "--payload NEWTON ...": "what every robot may carry from now on, or as rob1=250 one",
     "--grips STIFFNESS": "how stiff grips are, as of optimize",
-    "--robots N": "how many robots there are from now on: new ones reach every node",
+    "--robots N": "how many robots there are from now on; new ones reach every node",
     "--missing BRICK ...": "brick that is not there: one that stood is placed again next, one that "
     "was still to come waits until all are placed that do not hang on it",
     "--measured FILE": "where bricks that stand were measured, m: a CSV file (brick, x, y, z), or "
@@ -169,8 +168,6 @@ def _told(folder: Path) -> dict[str, Any]:
 def _changed(options: argparse.Namespace, scene: Scene, begin: Place) -> tuple[Scene, Place, str]:
     """Return scene and place after what has changed, and the robots that take part, by name."""
     assert begin.site is not None
-    for text in options.payload:
-        scene = _with_payload(scene, text)
     bricks = [_brick(text) for text in options.missing]
     if options.measured is not None:
         scene = _built(scene, begin.site.bricks, options.measured)
@@ -186,16 +183,6 @@ def _built(scene: Scene, bricks: int, path: Path) -> Scene:
     if early:
         raise StepError(f"--measured {path}: brick {early[0]} does not stand yet; leave it out")
     return as_built(scene, found)
-
-
-def _with_payload(scene: Scene, text: str) -> Scene:
-    name, _, value = text.partition("=")
-    if name not in [robot.name for robot in scene.robots]:
-        known = ", ".join(robot.name for robot in scene.robots)
-        raise StepError(f"--payload {text}: give ROBOT=NEWTON, of {known}")
-    most = number_word(value, f"--payload {text}")
-    robots = (replace(r, payload=most) if r.name == name else r for r in scene.robots)
-    return scene.with_robots(*robots)
 
 
 def _brick(text: str) -> int:

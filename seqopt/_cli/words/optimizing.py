@@ -82,10 +82,7 @@ SCHEDULE = {
     f"with open grips: {', '.join(SCHEDULES)} (of all robots), or a CSV file of steps; open grips "
     "are marked ? in it (default: the loop of three robots, or of two where there is no third)"
 }
-OF_BUILT = (
-    f"--bases goes with --schedule {FREE} and not with --order. A number of robots goes with "
-    f"--schedule {FREE} alone."
-)
+OF_BUILT = f"--bases goes with --schedule {FREE} and not with --order."
 OF_MOVES = (
     f"--rule and --direction go with --schedule {FREE} alone, --keep with --direction take-down "
     "and not with --to."
