@@ -29,7 +29,7 @@ DISPLAYS = {
     "Film": "seqopt.report._pictures",
     "build_page": "seqopt.report._pages",
     "failure_figure": "seqopt.report._failure_chart",
-    "speed_chart": "seqopt.report.speed._chart",
+    "speed_chart": "seqopt.report._speed._chart",
 }
 """The functions that draw, by name, and the module of each."""
 

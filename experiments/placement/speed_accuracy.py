@@ -37,7 +37,7 @@ from experiments.placement.parts import speed_charts as charts
 from experiments.placement.parts.speed_points import REFERENCE as REFERENCE_ENGINE
 from experiments.placement.parts.speed_points import SCENES, speed_tables
 from experiments.placement.parts.worst_ratios import WAYS
-from seqopt.report.speed._table import SpeedTable
+from seqopt.report._speed._table import SpeedTable
 from seqopt.study.published import CLOSEST, EQUATIONS, WEIGHTED, WORST_RATIO
 
 STORE = RESULTS / "runs.csv"

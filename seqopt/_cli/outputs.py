@@ -19,8 +19,8 @@ from seqopt.plan.calling.formulation import trace_rows
 from seqopt.plan.out_of_sample import Trial
 from seqopt.plan.plan import Plan
 from seqopt.report._pages import PAGE, plan_page
+from seqopt.report._speed._table import SpeedTable
 from seqopt.report.comparison import Comparison
-from seqopt.report.speed._table import SpeedTable
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
 from seqopt.sequence.exports._arm_tasks import _in_postures
 from seqopt.sequence.exports._tasks import plan_tasks, tasks_csv, tasks_json

@@ -18,6 +18,7 @@ from seqopt.plan.build import ShownBuild
 from seqopt.plan.front import Front
 from seqopt.problem.requirements import overloads
 from seqopt.report._robots import _known_arms
+from seqopt.report._speed._table import SpeedTable
 from seqopt.report.comparison import (
     CLOSED,
     LARGEST,
@@ -27,7 +28,6 @@ from seqopt.report.comparison import (
     shown_table,
 )
 from seqopt.report.page import Build, Scatter, _Drawn, report_page
-from seqopt.report.speed._table import SpeedTable
 from seqopt.responses.quantities import _number_text, length_text
 from seqopt.responses.table import OUTSIDE, REMEDY, Departure, LinearRange, analyze, builds_in_words
 from seqopt.scene.scene import Scene

@@ -27,8 +27,8 @@ from seqopt.problem._arms import arm_faults
 from seqopt.problem.criteria import RankSum, WorstRatio
 from seqopt.problem.problem import Aim, Problem
 from seqopt.problem.requirements import Criterion, _prop_faults, overloads
-from seqopt.report.speed._measure import speed_accuracy
-from seqopt.report.speed._table import SpeedTable
+from seqopt.report._speed._measure import speed_accuracy
+from seqopt.report._speed._table import SpeedTable
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._tolerance import COLUMN, is_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response

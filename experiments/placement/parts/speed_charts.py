@@ -10,8 +10,8 @@ from experiments.harness.runs import NO_PROOF, REFERENCE
 from experiments.placement.parts.speed_points import speed_tables
 from seqopt.arrays import Floats
 from seqopt.report import _style as inks
+from seqopt.report._speed._chart import speed_chart
 from seqopt.report._style import dress, looks, name_panels, plain, styled
-from seqopt.report.speed._chart import speed_chart
 from seqopt.report.text import in_words
 
 

@@ -18,8 +18,8 @@ from contextlib import contextmanager
 import pandas as pd
 
 import seqopt
-from seqopt.report.speed._measure import Timer, speed_accuracy
-from seqopt.report.speed._table import SpeedTable
+from seqopt.report._speed._measure import Timer, speed_accuracy
+from seqopt.report._speed._table import SpeedTable
 from seqopt.sequence.schedule_file import find_schedule
 
 SCENES = ("arch25", "barrel:test=1", "wall:columns=4,courses=3")

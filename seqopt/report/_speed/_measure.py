@@ -23,8 +23,8 @@ from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, O
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import layers_of, natural, solve
 from seqopt.problem.problem import Aim, Problem
-from seqopt.report.speed._reference import Reference
-from seqopt.report.speed._table import CUT, DONE, FAILED, SpeedTable
+from seqopt.report._speed._reference import Reference
+from seqopt.report._speed._table import CUT, DONE, FAILED, SpeedTable
 from seqopt.work.progress import Stage, Tell
 
 TIMES = 3

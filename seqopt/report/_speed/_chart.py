@@ -13,6 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse
 
+from seqopt.report._speed._labels import Label, place
+from seqopt.report._speed._table import CUT, DONE, FAILED, SpeedTable, error_text, seconds_text
 from seqopt.report._style import (
     GRAY,
     GREEN,
@@ -26,8 +28,6 @@ from seqopt.report._style import (
     plain,
     styled,
 )
-from seqopt.report.speed._labels import Label, place
-from seqopt.report.speed._table import CUT, DONE, FAILED, SpeedTable, error_text, seconds_text
 from seqopt.report.text import in_words
 
 ENGINES = ("compliance", "frame", "auto", "discrete", "planar")  # in the order of their looks
