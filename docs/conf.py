@@ -30,6 +30,8 @@ html_title = "seqopt"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_math_renderer = "mathml"
+html_copy_source = False
+html_use_index = html_domain_indices = False  # the search finds every name
 exclude_patterns = ["_build", "jupyter_execute"]  # what a build leaves behind
 myst_enable_extensions = ["amsmath", "dollarmath", "deflist", "substitution"]
 myst_substitutions = stated()  # figures of the stored runs, by name: {{ name }} in a page
