@@ -32,7 +32,7 @@ html_css_files = ["site.css"]
 html_math_renderer = "mathml"
 html_copy_source = False
 html_use_index = html_domain_indices = False  # the search finds every name
-exclude_patterns = ["_build", "jupyter_execute"]  # what a build leaves behind
+exclude_patterns = ["_build", "jupyter_execute", "counterparts.md"]  # left behind; a part of a page
 myst_enable_extensions = ["amsmath", "dollarmath", "deflist", "substitution"]
 myst_substitutions = stated()  # figures of the stored runs, by name: {{ name }} in a page
 myst_heading_anchors = 3

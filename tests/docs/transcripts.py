@@ -25,23 +25,14 @@ from tests.builders import ROOT
 DOCS = ROOT / "docs"
 PAGES = (
     "../README",
+    "index",
     "quickstart",
     "faq",
     "coming_from",
+    "orders",
     *(
         f"guides/{name}"
-        for name in (
-            "own_robots",
-            "arms",
-            "both_sides",
-            "limits",
-            "certificate",
-            "infeasible",
-            "driving",
-            "props",
-            "taking_down",
-            "how_long",
-        )
+        for name in ("own_robots", "arms", "driving", "props", "robot_failed", "how_long", "report")
     ),
 )
 BLOCK = re.compile(r"```(sh|python)\n(.*?)```(?:\n\n```text\n(.*?)```)?", flags=re.DOTALL)

@@ -19,7 +19,7 @@ DRAWN = {name: draw for claim in claims().values() for name, draw in claim.pictu
 DRAWN["engine_limits.png"] = limits_picture
 LONG = {"calibration.png", "outside_assemblies.png", "dry_map.png", "decision_sensitivity.png"}
 DAILY = ("frame_contrast.png", "soft_grips.png", "four_arms.png")
-ELSEWHERE = {"report.png"}  # of a browser
+ELSEWHERE = {"report.png", "half_built.png"}  # of a browser
 TOUCHING = 1.5  # pixels that texts may share
 
 

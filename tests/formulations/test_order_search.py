@@ -433,7 +433,7 @@ def test_limits_hold_in_the_best_order():
     assert np.nanmax(forces) <= 150.0 * (1 + 1e-9)
 
 
-@pytest.mark.long  # README prints the same
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_arch_of_the_paper_in_its_best_order(arch25):
     """Two bricks from one end, the rest from the other: 0.7693 instead of 0.8401."""

@@ -1,4 +1,4 @@
-"""Formulations made after the pages on adding one pass the tests that the pages recommend."""
+"""Formulations made after the page on writing one pass the tests that it recommends."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 from tests.builders import ROOT
 
-ADDING, TUTORIAL = "formulations/adding.md", "tutorials/adding_formulation.md"
+PAGE = "tutorials/adding_formulation.md"
 TESTS = [f"tests/formulations/test_{name}.py" for name in ("conformance", "degenerate")]
 
 
@@ -23,8 +23,8 @@ def blocks(page, kind):
 
 def installed(folder):
     """Write a package with the formulations of the pages as if it were installed."""
-    restarts = [*blocks(TUTORIAL, "{code-cell}")[:2], "FORMULATION = RESTARTS\n"]
-    for name, text in (("first", blocks(ADDING, "python")[0]), ("restarts", "\n".join(restarts))):
+    restarts = [*blocks(PAGE, "{code-cell}")[:2], "FORMULATION = RESTARTS\n"]
+    for name, text in (("first", blocks(PAGE, "python")[0]), ("restarts", "\n".join(restarts))):
         (folder / f"page_{name}.py").write_text(text, encoding="utf-8")
     about = folder / "pages-1.dist-info"
     about.mkdir()

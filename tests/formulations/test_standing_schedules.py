@@ -316,7 +316,7 @@ def test_pareto_sets_with_a_margin(dry):
 @pytest.mark.long
 @pytest.mark.slow
 def test_the_arch_is_built_dry(engine25):
-    """Three robots can, as the README says and a test of its commands finds, but not two."""
+    """Three robots can, but not two."""
     criterion = seqopt.CRITERIA["worst-ratio-published"]
     problem = build_states(engine25, FreeRules(), criterion, "steps,minmax", stands="dry")
     plan = seqopt.solve(problem, "schedule_search")

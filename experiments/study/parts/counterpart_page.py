@@ -24,17 +24,13 @@ TITLES = {
     "plan": "Grips and responses of the published three-robot plan",
 }
 INTRODUCTION = """\
-# Counterparts of the paper's figures and tables
+## Every figure and table
 
-This page lists every figure and table of the [paper](paper.md), and compares those that have
-numbers with what seqopt computes. Photographs, sketches and definitions have no numbers.
-`python -m experiments.study.paper_counterparts` computes everything again in a few seconds, draws
-the pictures and writes this page. All values are in `experiments/results/paper_counterparts.csv`.
-Where another experiment goes into more detail, the table names it too.
-
-The error is the difference from the printed value beyond its rounding, relative to the printed
-value or to 1. An item *agrees* if every value is within 5 % of print, *agrees in part* if at
-least half of the values are, and *disagrees* otherwise.
+`python -m experiments.study.paper_counterparts` computes every figure and table that has numbers,
+draws them beside the printed ones, and writes this part of the page; all values are in
+`experiments/results/paper_counterparts.csv`. The error is the difference beyond rounding, relative
+to the printed value or to 1. An item *agrees* if every value is within 5 % of print, *agrees in
+part* if at least half of the values are, and *disagrees* otherwise.
 
 """
 CONVENTIONS = """\
@@ -112,14 +108,13 @@ def page(table: pd.DataFrame) -> str:
         "| agreement |\n|---|---|---|---|---|---|"
     )
     lines = [line(item, table) for item in ITEMS]
-    parts = [INTRODUCTION + total, "\n".join([head, *lines]) + "\n", CONVENTIONS + "## Pictures\n"]
-    return "\n".join([*parts, *(section(picture, table) for picture in TITLES)])
+    parts = [INTRODUCTION + total, "\n".join([head, *lines]) + "\n", CONVENTIONS + "### Pictures\n"]
+    return "\n".join([*parts, *map(section, TITLES)])
 
 
-def section(picture: str, table: pd.DataFrame) -> str:
-    """Return a picture with its caption and the reasons for what disagrees."""
-    items = [item for item in ITEMS if item.picture == picture]
-    text = " ".join(f"{stated(item, table)} {item.why}".strip() for item in items)
+def section(picture: str) -> str:
+    """Return a picture with its title and the reasons for what disagrees."""
+    text = " ".join(f"{i.number}: {i.why}" for i in ITEMS if i.picture == picture and i.why)
     image = f"![{TITLES[picture]}](figures/counterpart_{picture}.png)"
     body = textwrap.fill(f"*{TITLES[picture]}.* {text}", 120, break_on_hyphens=False)
     return f"{image}\n\n{body}\n"
