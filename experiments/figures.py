@@ -1,9 +1,8 @@
 """Claim: the documentation's pictures of built-in scenes are those of the scenes that ship.
 
-Method: draw `arch25` with its network; the twisting step 35 of the sequential method beside the
-cantilever method at the same step; responses along all methods; printed against computed ones;
-`vault338` while it grows and from above; scenes of the library's generators; the Pareto sets
-of the free schedule and of the loop.
+Method: draw `arch25` with its network; responses along all methods; printed against computed ones; `vault338`
+while it grows and from above; scenes of the library's generators; the Pareto sets of the free
+schedule and of the loop.
 Every picture is held against the stored one before it takes its place: gray means over squares of
 16 pixels, so that fonts do not count, may differ by a fifth of what tells the stored picture from a
 blank one.
@@ -28,7 +27,7 @@ from experiments.harness.results import FIGURES, save_figure
 from experiments.harness.yardstick import VALUES
 from seqopt import FreeRules, build_network, load_scene, pose, three_robot_loop
 from seqopt.arrays import Floats
-from seqopt.engines.interface import Engine, Want
+from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.plan.front import find_front
 from seqopt.report._style import BLUE, DPI, GRAY, GREEN, VERMILION, plain, styled
@@ -100,7 +99,6 @@ def scenes_in_words(_: Engine) -> Figure:
 
 
 FROM_ASIDE = View(azimuth=20, elevation=14)  # nodes stand apart
-MAGNIFY = 2000.0
 SQUARE, ALIKE = 16, 0.2  # pixels; share of what the stored picture shows
 ROUNDED = {"F_largest": 5.0, "M_sup": 0.5, "T_max": 5.0, "D_max": 5e-7}
 COLUMNS = {
@@ -125,25 +123,6 @@ TABLES = {
     "cantilever": ("x", VERMILION, "Table A.2: cantilever method"),
     "published": ("+", GREEN, "Table B.1: three-robot plan\n(not used to identify the arch)"),
 }
-
-
-@styled
-def twisting_step(engine: Engine) -> Figure:
-    """Draw the arch, 18 bricks held off their line, and the same held on a brick along it."""
-    net = engine.network
-    figure, (whole, twist, calm) = subplots(3.0, 1, 3)
-    draw_bricks(whole, net, 25, VIEW)
-    whole.set_title("the arch of 25 bricks", loc="center")
-    for axes, node, name in (
-        (twist, 35, "18 bricks held off their line:\nthey twist (motion × 2,000)"),
-        (calm, 31, "held on their line:\nthey do not (motion × 2,000)"),
-    ):
-        fields = engine.solve(18, [[node]], Want.ALL)
-        draw_bricks(axes, net, 18, VIEW, alpha=0.1)
-        draw_bricks(axes, net, 18, VIEW, twist=fields.brick_twist[0], magnify=MAGNIFY)
-        draw_grips(axes, net, (None, node, None), VIEW)
-        axes.set_title(name, loc="center")
-    return figure
 
 
 @styled
@@ -235,7 +214,6 @@ def free_front(engine: Engine) -> Figure:
 
 SEARCHED = "free_front.png"
 PICTURES: dict[str, Callable[[Engine], Figure]] = {
-    "twisting_step.png": twisting_step,
     "network.png": network_picture,
     "axial_forces.png": axial_forces,
     "responses.png": responses_along_the_build,

@@ -53,7 +53,7 @@ from experiments.harness.results import apart, drawn, stored
 from experiments.harness.scenes import arch25, half_circle
 from experiments.harness.timing import best
 from experiments.placement.parts.budget_cases import CASES, COMPARED, NO_BUDGET
-from experiments.placement.parts.formulation_charts import contest_chart, cost_chart, shape_chart
+from experiments.placement.parts.formulation_charts import contest_chart, shape_chart
 from formulations.solvers import anatomy, minimize_whole
 from seqopt import Network, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -270,7 +270,6 @@ CLAIM = Claim(
     times=Times.JUDGED,
     digits={"formulation_cost": 4, "budget_proofs": 10, "program_shapes": 6, "program_traces": 6},
     pictures={
-        "formulation_cost.png": drawn(cost_chart, "formulation_cost"),
         "contest.png": drawn(contest_chart, "budget_proofs"),
         "program_shapes.png": drawn(shape_chart, "program_shapes", "program_traces"),
     },

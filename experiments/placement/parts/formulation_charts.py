@@ -17,22 +17,6 @@ FORMULATIONS = (
 BUDGETED = ("lagrangian", "labels", "overlap_lp", "overlap_mip")
 SPREAD = 0.06  # of the brick count, by which marks of one formulation stand beside the next
 LOOKS = looks(FORMULATIONS)
-DRAWN = ("overlap_dp", "cascade", "beam", "overlap_lp", "overlap_mip")
-
-
-@styled
-def cost_chart(table: pd.DataFrame) -> Figure:
-    table = table.iloc[:-1]  # the last row is of arch25
-    figure, axes = subplots(3.6)
-    axes.plot(table["bricks"], table["pose"], "-", color=GRAY, lw=2.5, label="posing the problem")
-    for name, style in looks(DRAWN).items():
-        axes.plot(table["bricks"], table[name], label=in_words(name), **style.line())
-    axes.set(xscale="log", yscale="log", xlabel="bricks", ylabel="time [s]")
-    ticks(table["bricks"], axes.xaxis)
-    plain(axes.yaxis)
-    dress(axes)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside right center")
-    return figure
 
 
 @styled

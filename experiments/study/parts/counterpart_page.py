@@ -92,9 +92,8 @@ def line(item: Item, table: pd.DataFrame) -> str:
     if not item.has_numbers:
         return f"{head} no: {item.why} | – | – | – |"
     named = ", ".join(f"`{name}`" for name in ("study.paper_counterparts", item.also) if name)
-    picture = f"[picture](figures/counterpart_{item.picture}.png)"
     text = stated(item, table).removeprefix(f"{item.number} ")
-    return f"{head} yes | {named} | {picture} | {text} |"
+    return f"{head} yes | {named} | [picture](#pictures) | {text} |"
 
 
 def page(table: pd.DataFrame) -> str:
