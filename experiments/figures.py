@@ -1,8 +1,8 @@
 """Claim: the documentation's pictures of built-in scenes are those of the scenes that ship.
 
-Method: draw `arch25` with its network; responses along all methods; printed against computed ones; `vault338`
-while it grows and from above; scenes of the library's generators; the Pareto sets of the free
-schedule and of the loop.
+Method: draw `arch25` with its network; responses along all methods; printed against computed
+ones; `vault338` while it grows and from above; scenes of the library's generators; the Pareto sets
+of the free schedule and of the loop.
 Every picture is held against the stored one before it takes its place: gray means over squares of
 16 pixels, so that fonts do not count, may differ by a fifth of what tells the stored picture from a
 blank one.
