@@ -33,10 +33,13 @@ def has_place(thing):
 
 
 def members(module):
-    """Return the classes and functions that a module hands out."""
+    """Return the classes and functions that a room hands out, or the classes of a module."""
     home = import_module(module)
-    names = getattr(home, "__all__", [name for name in vars(home) if name[0] != "_"])
-    return [f"{module}.{name}" for name in names if has_place(getattr(home, name))]
+    own = [n for n, thing in vars(home).items() if getattr(thing, "__module__", "") == module]
+    names = getattr(home, "__all__", [n for n in own if inspect.isclass(getattr(home, n))])
+    return [
+        f"{module}.{name}" for name in names if name[0] != "_" and has_place(getattr(home, name))
+    ]
 
 
 def shown():

@@ -17,6 +17,7 @@ from tests.browser import browsed
 from tests.builders import ROOT
 from tests.docs.extensions import stated
 from tests.docs.site_links import broken
+from tests.docs.site_size import megabytes, sizes, words
 from tests.docs.transcripts import PAGES
 
 STATED = stated()
@@ -38,10 +39,37 @@ def test_the_site_builds_strictly(tmp_path):
     assert f"takes {STATED['lp_times_25']} times as long at 25 bricks" in " ".join(page.split())
     assert page.count("<table") >= 4
     assert broken(tmp_path / "html") == []
+    assert too_much(tmp_path / "html") == []
     search = (tmp_path / "html" / "search.html").as_uri()
     if "<p>here</p>" in browsed(tmp_path, "data:text/html,<p>here</p>")[0]:
         assert "faq.html" in found(tmp_path, f"{search}?q=infeasible")
         assert ".html" not in found(tmp_path, f"{search}?q=zzzz")  # the control
+
+
+LOOKED_UP = ("api/", "changelog", "command_line", "glossary")  # nobody reads these from the top
+
+
+def too_much(site):
+    """Return what of a site is more than a reader should meet."""
+    every = sizes(site)
+    found = [
+        f"{name}: {told:,} words in sentences"
+        for name, (_, told) in every.items()
+        if told > 1_500 and not name.startswith(LOOKED_UP)
+    ]
+    total = sum(count for count, _ in every.values())
+    bounds = {"pages": (len(every), 45), "words": (total, 85_000), "MB": (megabytes(site), 15)}
+    return found + [f"{n:,.0f} {what}" for what, (n, most) in bounds.items() if n > most]
+
+
+def test_words_of_a_page_are_those_that_are_read(tmp_path):
+    main = (
+        "<article><p>one two</p>\n<table><td>three</td></table>\n<script>x = 1</script></article>"
+    )
+    assert words(f"<nav>a b</nav>{main}<p>after</p>") == (3, 2)
+    (tmp_path / "long.html").write_text(f"<article>{'word ' * 1_501}</article>")
+    (tmp_path / "glossary.html").write_text(f"<article>{'word ' * 1_501}</article>")
+    assert too_much(tmp_path) == ["long.html: 1,501 words in sentences"]
 
 
 def found(folder, search):
