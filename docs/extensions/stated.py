@@ -93,7 +93,7 @@ def stated() -> dict[str, str]:
         | _outside(stored("outside_assemblies"))
         | _composing(stored("composing"))
         | {"vault_loads_table": _vault_loads(stored("vault_loads"))}
-        | {f"{name}_table": _on_graphs(stored(name)) for name in GRAPHS}
+        | {"free_formulations_table": _on_graphs(stored("free_formulations"))}
         | {"classical_table": _classical(stored("classical"))}
         | {"makespan_table": _makespans(stored("makespan"), stored("makespan_large"))}
         | instance_tables(*map(stored, INSTANCES))
@@ -129,9 +129,6 @@ def _composing(table: pd.DataFrame) -> dict[str, str]:
         "composing_cells": str(len(table)),
         "composing_no": str(int(table["reason"].notna().sum())),
     }
-
-
-GRAPHS = ("free_formulations", "loop_formulations")
 
 
 def _on_graphs(table: pd.DataFrame) -> str:

@@ -192,8 +192,8 @@ def criterion_options(command: argparse.ArgumentParser) -> None:
     takes.add_argument(
         "--ranked",
         choices=[ranked.value for ranked in Ranked],
-        help="for criteria of ranks: rank a step that two moves share over all pairs of their "
-        "candidates, or only over those that go with the earlier choice (default: pairs)",
+        help="for criteria of ranks: where two open grips meet in a step, rank all pairs of their "
+        "nodes together, or only the pairs with the node chosen before (default: pairs)",
     )
     takes.add_argument(
         "--among",

@@ -43,11 +43,7 @@ def told():
             yield pytest.param(text, id=path.stem)
 
 
-LONG = (
-    "--order search",
-    "seqopt pareto arch25",
-    "--bases",
-)  # commands that take as long as all others
+LONG = ("--order search", "seqopt pareto arch25")  # commands that take as long as all others
 
 
 def shown(name, *, long):

@@ -383,8 +383,9 @@ def _known(value: float, width: int, form: str) -> str:
 def _about_choices(comparison: Comparison, criterion: Criterion) -> str:
     said = (
         f"Objective: what the criterion {criterion.name} adds up to over all steps; "
-        f"{_of_steps(comparison, criterion)}. Only rows under one heading, and of one aim, "
-        "compete. Gap: how far the objective is above the proven optimum of that aim. Models: "
+        f"{_of_steps(comparison, criterion)}. Compare objectives only within a heading and an "
+        "aim: others add up other steps. Gap: how far the objective is above the proven optimum "
+        "of that aim. Models: "
         f"how many partial structures with different grips it looks at{_counted(comparison)}. "
         "Seconds: to choose and to check"
     )

@@ -60,8 +60,8 @@ EXAMPLES = (
     "seqopt times my.json --plan plan.csv --reassign --out faster",
 )
 REASSIGN = {
-    "--reassign": "let those robots have the same grips, in the same order, with which the build "
-    "takes least, as far as they reach and carry them"
+    "--reassign": "give the same grips, in the same order, to the robots with which the build ends "
+    "first, within their reach and payload"
 }
 
 
