@@ -1,8 +1,8 @@
 """Assemblies and models of COMPAS's packages: what blocks they have, and where these touch.
 
-Assemblies of compas_assembly and compas_cra are graphs, with meshes in or beside them, or lists of
-meshes. Models of compas_dem are elements with transformations. Beams of compas_timber are their
-blanks; the model's own joints say which run into each other.
+Assemblies of compas_assembly and compas_cra are graphs, with meshes in or beside them.
+Models of compas_model and compas_dem are elements with transformations. Beams of compas_timber are
+their blanks; the model's own joints say which run into each other.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from seqopt.scene.imports._content import (
     points,
 )
 from seqopt.scene.library.common import JointLaw
+from seqopt.scene.shape import normal_of
 
 _PLAIN = 1e-9  # by how much rounding may change the last row of a transformation
 _Solid = tuple[Floats, list[list[int]]]
@@ -58,7 +59,7 @@ def kind(value: Any) -> str:
     return name.rsplit("/", 1)[-1].lower() if isinstance(name, str) else ""
 
 
-def _mesh(where: str, value: Any) -> _Solid:
+def solid_of(where: str, value: Any) -> _Solid:
     """Return the vertices (V, 3) and faces of a mesh, a polyhedron or a box."""
     held = payload(value)
     if isinstance(held, dict) and {"xsize", "ysize", "zsize"} <= set(held):
@@ -119,7 +120,7 @@ def _frame(where: str, value: Any) -> tuple[Floats, Floats]:
     return origin, np.stack([first, np.cross(third, first), third])
 
 
-def _transformation(where: str, value: Any) -> Floats:
+def transformation_of(where: str, value: Any) -> Floats:
     """Return a transformation (4, 4): with a ``matrix``, or a matrix; none if None."""
     if value is None:
         return np.eye(4)
@@ -136,7 +137,7 @@ def _transformation(where: str, value: Any) -> Floats:
     return np.array(matrix)
 
 
-def _moved(place: Floats, matrix: Floats) -> Floats:
+def moved(place: Floats, matrix: Floats) -> Floats:
     """Return points (k, 3) after a transformation (4, 4)."""
     return np.asarray(place @ matrix[:3, :3].T + matrix[:3, 3])
 
@@ -161,7 +162,7 @@ def _elements(source: str, held: Entry) -> list[_Element]:
     named = {guid: f"{source}: element {i}" for i, (guid, _) in enumerate(rows)}
     inner = {guid: _held(named[guid], item) for guid, item in rows}
     placed: dict[str | None, Floats] = {
-        None: _transformation(f"{source}: transformation", held.get("transformation"))
+        None: transformation_of(f"{source}: transformation", held.get("transformation"))
     }
     for guid, parent in _tree(source, held):
         if guid not in inner or guid in placed:
@@ -185,8 +186,8 @@ def by_guid(where: str, found: Any) -> Iterator[tuple[str, Entry]]:
 
 def _own(where: str, held: Entry) -> Floats:
     """Return the transformation of an element to its parent; early ones have a frame too."""
-    frame = _transformation(f"{where}: frame", held.get("frame"))
-    return frame @ _transformation(f"{where}: transformation", held.get("transformation"))
+    frame = transformation_of(f"{where}: frame", held.get("frame"))
+    return frame @ transformation_of(f"{where}: transformation", held.get("transformation"))
 
 
 def _tree(source: str, held: Entry) -> Iterator[tuple[str, str | None]]:
@@ -205,8 +206,6 @@ def _tree(source: str, held: Entry) -> Iterator[tuple[str, str | None]]:
 
 def read_assembly(document: Any, source: str) -> Content:
     """Return what an assembly says."""
-    if isinstance(document, list):
-        return _meshes(document, source)
     graph, meshes = assembly_graph(document, source)
     nodes = mapping(f"{source}: node", entry(source, graph, "node", "vertex"))
     common = _held(source, graph.get("node_attributes") or graph.get("dva") or {})
@@ -240,19 +239,9 @@ def assembly_graph(document: Any, source: str) -> tuple[Entry, dict[str, Any] | 
     return held, None
 
 
-def _meshes(document: list[Any], source: str) -> Content:
-    """Return a list of meshes as blocks."""
-    blocks = []
-    for i, item in enumerate(document):
-        while isinstance(item, list) and len(item) == 1:
-            item = item[0]  # noqa: PLW2901  # some files wrap each mesh
-        blocks.append(FileBlock(str(i), *_mesh(f"{source}: mesh {i}", item)))
-    return Content(tuple(blocks), said=("a list of meshes: no supports, faces or order",))
-
-
 def _node_block(where: str, key: str, node: Entry, meshes: dict[str, Any] | None) -> FileBlock:
     held = meshes[key] if meshes is not None else entry(where, node, "block")
-    vertices, faces = _mesh(where, held)
+    vertices, faces = solid_of(where, held)
     course = node.get("course", node.get("order"))
     return FileBlock(
         key,
@@ -321,14 +310,40 @@ def _densities(source: str, held: Entry) -> dict[str, float]:
 
 def _block(key: str, element: _Element, densities: dict[str, float]) -> FileBlock:
     where, held = element.where, element.held
-    vertices, faces = _mesh(where, entry(where, held, "geometry", "shape"))
+    vertices, faces = _element_solid(where, held)
     return FileBlock(
         key,
-        _moved(vertices, element.matrix),
+        moved(vertices, element.matrix),
         faces,
         support=held.get("is_support") is True,
         density=densities.get(str(held.get("material"))),
     )
+
+
+def _element_solid(where: str, held: Entry) -> _Solid:
+    """Return the shape of an element: its mesh, or a beam, column or plate of compas_model."""
+    if "polygon" in held:
+        return _plate(where, held)
+    if {"width", "depth"} <= held.keys() and not {"geometry", "shape"} & held.keys():
+        tall = entry(where, held, "length", "height")
+        size = [number(where, x) for x in (held["width"], held["depth"], tall)]
+        local = 0.5 * (BOX_CORNERS + np.array([0.0, 0.0, 1.0])) * size
+        return np.asarray(local), [list(face) for face in BOX_FACES]
+    return solid_of(where, entry(where, held, "geometry", "shape"))
+
+
+def _plate(where: str, held: Entry) -> _Solid:
+    """Return a plate, which lies behind its polygon."""
+    front = points(f"{where}: polygon", entry(where, payload(held["polygon"]), "points"))
+    normal = normal_of(front) if len(front) else np.zeros(3)
+    if not (size := float(np.linalg.norm(normal))) > 0:
+        raise SceneError(f"{where}: its polygon has no area")
+    thickness = number(f"{where}: thickness", entry(where, held, "thickness"))
+    first = [*range(len(front))]
+    behind = [len(front) + i for i in first]
+    around = zip(first, first[1:] + first[:1], behind, behind[1:] + behind[:1], strict=True)
+    sides = [[b, a, c, d] for a, b, c, d in around]
+    return np.vstack([front, front - thickness * normal / size]), [first, behind[::-1], *sides]
 
 
 def _places(source: str, held: Entry, known: dict[str, int | None]) -> dict[str, int]:
@@ -396,7 +411,7 @@ def _beam(where: str, key: str, beam: _Element) -> FileBlock:
     if held.get("frame") is not None:
         origin, axes = _frame(where, held["frame"])
         return FileBlock(key, np.asarray(origin + local @ axes), BOX_FACES)
-    return FileBlock(key, _moved(local, beam.matrix), BOX_FACES)
+    return FileBlock(key, moved(local, beam.matrix), BOX_FACES)
 
 
 def _pairs(source: str, held: Entry, place: dict[str, int]) -> Iterable[tuple[int, int]]:

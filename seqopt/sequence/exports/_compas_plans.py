@@ -47,7 +47,7 @@ def read_source(scene: Scene, path: Path) -> Source:
         document = parse_json(read_text(path), str(path))
         form = sniffed(document, str(path))
         graph = document if form == "compas_assembly" and isinstance(document, dict) else None
-        if form in ("compas_dem", "compas_timber"):
+        if form in ("compas_model", "compas_dem", "compas_timber"):
             held = payload(document)
             held = payload(held["model"]) if "model" in held else held
             rows = by_guid(f"{path}: element", held["elements"])
