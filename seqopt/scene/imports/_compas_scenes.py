@@ -11,15 +11,9 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.scene.imports._compas_models import (
-    by_guid,
-    kind,
-    moved,
-    payload,
-    solid_of,
-    transformation_of,
-)
-from seqopt.scene.imports._content import Content, Entry, FileBlock, entry, listing, mapping
+from seqopt.scene.imports._compas_models import by_guid
+from seqopt.scene.imports._compas_shapes import kind, payload, solid_of, transformation_of
+from seqopt.scene.imports._content import Content, Entry, FileBlock, entry, listing, mapping, moved
 from seqopt.scene.imports._meshes import object_content
 
 _SOLIDS = ("mesh", "box", "polyhedron")

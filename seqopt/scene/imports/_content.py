@@ -189,3 +189,8 @@ def point(where: str, value: object) -> Floats:
 def points(where: str, value: object) -> Floats:
     """Return the points (k, 3) of a list of a document."""
     return np.array([point(where, row) for row in listing(where, value)]).reshape(-1, 3)
+
+
+def moved(place: Floats, matrix: Floats) -> Floats:
+    """Return points (k, 3) after a transformation (4, 4)."""
+    return np.asarray(place @ matrix[:3, :3].T + matrix[:3, 3])

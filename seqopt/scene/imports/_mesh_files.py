@@ -21,8 +21,7 @@ import numpy as np
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import FileError, SceneError
 from seqopt.scene._checks import short
-from seqopt.scene.imports._compas_models import moved
-from seqopt.scene.imports._content import LARGEST, UNITS, Content, FileBlock
+from seqopt.scene.imports._content import LARGEST, UNITS, Content, FileBlock, moved
 from seqopt.scene.imports._meshes import mesh_content, object_content
 
 _UNASKED = logging.NullHandler()  # else Python prints what no one listens to

@@ -17,8 +17,7 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene._checks import short
-from seqopt.scene.imports._compas_models import moved
-from seqopt.scene.imports._content import LARGEST, Content, FileBlock
+from seqopt.scene.imports._content import LARGEST, Content, FileBlock, moved
 from seqopt.scene.imports._mesh_files import known_unit, require_readers
 from seqopt.scene.imports._meshes import object_content
 

@@ -21,7 +21,8 @@ from seqopt.errors import StepError
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.imports._building import block_numbers
 from seqopt.scene.imports._carried import carry
-from seqopt.scene.imports._compas_models import assembly_graph, by_guid, kind, payload
+from seqopt.scene.imports._compas_models import assembly_graph, by_guid
+from seqopt.scene.imports._compas_shapes import kind, payload
 from seqopt.scene.imports._content import entry, parse_json
 from seqopt.scene.imports.formats import read_content, sniffed
 from seqopt.scene.scene import Scene
