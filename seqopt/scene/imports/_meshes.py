@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import SceneError
+from seqopt.scene._checks import short
 from seqopt.scene.boxes import as_vectors
 from seqopt.scene.imports._content import MOST_BLOCKS, Content, FileBlock
 from seqopt.scene.shape import FLAT, Polyhedron, Surface, bend, edges, fans
@@ -130,8 +131,14 @@ def object_content(objects: Iterable[FileBlock], source: str) -> Content:
     """Return the blocks of objects that have a name each; an object may be several blocks."""
     found = []
     for own in objects:
-        for part in _split_blocks(own.vertices, own.faces) if own.faces else []:
-            vertices, faces = _compact(own.vertices, [own.faces[i] for i in part])
+        sides = [face for face in own.faces if len(face) > 2]
+        if any(not 0 <= min(face) <= max(face) < len(own.vertices) for face in sides):
+            raise SceneError(
+                f"{source}: a face of {short(own.key or 'a mesh')} names a vertex that is not "
+                f"there; {len(own.vertices)} are"
+            )
+        for part in _split_blocks(own.vertices, sides) if sides else []:
+            vertices, faces = _compact(own.vertices, [sides[i] for i in part])
             found.append(replace(own, vertices=vertices, faces=faces))
     return _named(found, source)
 
