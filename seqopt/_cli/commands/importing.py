@@ -47,9 +47,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     basic = question(command, "What is read and written?")
     declare(basic, {"file FILE": "what to read"})
     declare(basic, {"--out FILE": "scene to write, JSON"}, required=True)
-    basic.add_argument(
-        "--format", choices=FORMATS, help="what the file is (default: what it looks like)"
-    )
+    what = f"what the file is (default: what it looks like): {', '.join(FORMATS)}"
+    basic.add_argument("--format", choices=FORMATS, metavar="NAME", help=what)
     basic.add_argument("--name", help="of the scene (default: that of the file)")
     said = question(command, "What does the file not say?")
     said.add_argument("--unit", choices=UNITS, help="unit of length, where the file has none")
