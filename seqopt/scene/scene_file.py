@@ -170,7 +170,9 @@ class _Kind:
         return {name: number for name, number in given.items() if number.annotation in _READ}
 
 
-_MESHES = (".obj", ".ply", ".stl")
+_MESHES = {".obj": True, ".off": True, ".ply": True, ".stl": True} | dict.fromkeys(
+    (".3dm", ".3mf", ".glb"), False
+)  # and whether one has to say its unit
 KINDS = {
     "arch": _Kind("an arch by span and rise: arch:span=2,rise=0.7,curve=catenary", arch, ArchForm),
     "barrel": _Kind("one of the eight tested barrel vaults: barrel:test=3", barrel_vault),
@@ -254,11 +256,13 @@ def _load_stored(name: str) -> Scene:
 
 def _refuse_mesh(path: Path) -> None:
     """Raise an error that says how a mesh becomes a scene."""
-    if path.suffix.lower() in _MESHES and path.exists():
+    asked = _MESHES.get(path.suffix.lower())
+    if asked is not None and path.exists():
         out = path.with_suffix(".json").name
+        words = f"{'--unit m ' if asked else ''}--density 2400 --out {shlex.quote(out)}"
         raise SceneError(
-            f"scene {path}: a mesh; seqopt import {shlex.quote(str(path))} --unit m --density 2400 "
-            f"--out {shlex.quote(out)} makes a scene of it, with its own unit and density"
+            f"scene {path}: a mesh; seqopt import {shlex.quote(str(path))} {words} makes a scene "
+            f"of it, with its own {'unit and ' if asked else ''}density"
         )
 
 

@@ -18,8 +18,8 @@ from seqopt.scene.scene_file import dump_scene
 
 MOST_ROBOTS = 100
 DESCRIPTION = (
-    "Read an assembly of COMPAS, a mesh, a table of boxes or a frame, say what was assumed, and "
-    "write it as a scene."
+    "Read a file of Rhino, an assembly of COMPAS, meshes, a table of boxes or a frame, say what "
+    "was assumed, and write it as a scene."
 )
 USAGE = ("FILE --out SCENE.json [--unit UNIT] [other options]",)
 EXAMPLES = (
@@ -30,8 +30,8 @@ EXAMPLES = (
 
 KEYS = {
     "--density KG/M3": "of blocks for which the file has none, kg/m³",
-    "--supports KEY,KEY": "blocks that are the ground, by their keys in the file (default: those "
-    "that it marks, else what stands at the lowest level)",
+    "--supports KEY,KEY": "blocks that are the ground, by their keys or layers in the file "
+    "(default: those that it marks, else what stands at the lowest level)",
 }
 JOINTS = {
     "--stiffness NORMAL,TANGENTIAL": "of joints by area, N/m³, in place of that of the file "
@@ -47,13 +47,13 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     basic = question(command, "What is read and written?")
     declare(basic, {"file FILE": "what to read"})
     declare(basic, {"--out FILE": "scene to write, JSON"}, required=True)
-    basic.add_argument(
-        "--format", choices=FORMATS, help="what the file is (default: what it looks like)"
-    )
+    what = f"what the file is (default: what it looks like): {', '.join(FORMATS)}"
+    basic.add_argument("--format", choices=FORMATS, metavar="NAME", help=what)
     basic.add_argument("--name", help="of the scene (default: that of the file)")
     said = question(command, "What does the file not say?")
     said.add_argument("--unit", choices=UNITS, help="unit of length, where the file has none")
-    said.add_argument("--up", choices=UPS, default="z", help="axis that is up (default: z)")
+    up = "axis that is up (default: y in a GLB, else z)"
+    said.add_argument("--up", choices=UPS, help=up)
     declare(said, KEYS)
     robots = "how many there are, mobile ones that reach all (default: those of the file, else 3)"
     declare(said, {"--robots N": robots})

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
+import re
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
 
 from seqopt.errors import SceneError
 from seqopt.scene._checks import LARGEST_NUMBER, one_of, positive, rows, short, whole_between
@@ -55,7 +58,7 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
     try:
         said = list(content.said)
         _check_size(content)
-        content = content.placed(_unit(content, given, said), _up(given, said))
+        content = content.placed(_unit(content, given, said), _up(content, given, said))
         supports = _supports(content, given, said)
         blocks = [repair_shape(b, may_be_open=i in supports) for i, b in enumerate(content.blocks)]
         if (own := own_scene(content, given, blocks, said)) is not None:
@@ -95,40 +98,54 @@ def _check_size(content: Content) -> None:
 def _unit(content: Content, given: Given, said: list[str]) -> float:
     """Return the file's unit of length in m."""
     known = content.own.unit if content.own else content.unit
-    if known is None and given.unit is None:
-        raise SceneError(f"it does not say its unit of length; give one of {', '.join(UNITS)}")
-    unit = one_of("unit", known if given.unit is None else given.unit, UNITS)
-    if known is None:
+    usual = content.usual_unit if given.unit is None else None
+    if known is None and usual is None and given.unit is None:
+        points = np.vstack([block.vertices for block in content.blocks])
+        size = " by ".join(f"{x:.4g}" for x in np.ptp(points, axis=0)) if points.size else "0"
+        raise SceneError(
+            f"it does not say its unit of length, and is {size} large; give one of "
+            f"{', '.join(UNITS)}"
+        )
+    unit = one_of("unit", given.unit or known or usual, UNITS)
+    if usual is not None:
+        said.append(f"lengths are in {unit}, as the format has them; say --unit if they are not")
+    elif known is None:
         said.append(f"lengths are in {unit}, as given")
     elif unit != known:
         raise SceneError(f"its lengths are known in {known}; give no other unit")
     return UNITS[unit]
 
 
-def _up(given: Given, said: list[str]) -> str:
+def _up(content: Content, given: Given, said: list[str]) -> str:
     """Return the axis of the file that points up."""
-    one_of("up", given.up, UPS)
-    if given.up == "y":
-        said.append("y is up in the file, as given: (x, y, z) is (x, -z, y) here")
-    return given.up
+    up = content.up if given.up is None else one_of("up", given.up, UPS)
+    if up == "y":
+        origin = "as given" if given.up else "as the format has it"
+        said.append(f"y is up in the file, {origin}: (x, y, z) is (x, -z, y) here")
+    return up
 
 
 def _supports(content: Content, given: Given, said: list[str]) -> set[int]:
     """Return the places of the blocks that are the ground."""
-    place = {block.key: i for i, block in enumerate(content.blocks)}
+    named = defaultdict[str, set[int]](set)
+    for i, block in enumerate(content.blocks):
+        named[block.group].add(i)
+    named.pop("", None)
+    for i, block in enumerate(content.blocks):
+        named[block.key].add(i)
     marked = [block.key for block in content.blocks if block.support]
     keys = marked if given.supports is None else rows("supports", given.supports, "keys of blocks")
     for key in keys:
-        if not isinstance(key, str) or key not in place:
-            known = short(", ".join(place), 200)
+        if not isinstance(key, str) or key not in named:
+            known = short(", ".join(named), 200)
             raise SceneError(f"there is no block {short(key)}; known are {known}")
     if keys:
         shown = ", ".join(keys[:8])
         more = "" if len(keys) <= 8 else f" and {len(keys) - 8} more"
         origin = "as the file says" if given.supports is None else "as given"
         said.append(f"supports are blocks {shown}{more}, {origin}: the ground")
-    supports = {place[key] for key in keys}
-    if len(supports) == len(place):
+    supports = {i for key in keys for i in named[key]}
+    if len(supports) == len(content.blocks):
         raise SceneError("all blocks are supports; leave one to be built")
     return supports
 
@@ -140,7 +157,7 @@ def _bricks(
     keys = [block.key for block in content.blocks]
     numbers = block_numbers(keys)
     if [str(number) for number in numbers] != keys:
-        said.append("blocks are numbered from 1 in the file's order")
+        said.append(f"blocks are numbered {_numbered(keys, numbers)}")
     density = None if given.density is None else positive("density", given.density, "kg/m³")
     built = [(i, block) for i, block in enumerate(content.blocks) if i not in supports]
     silent = [block.key for _, block in built if block.density is None]
@@ -155,12 +172,26 @@ def _bricks(
     }
 
 
+def _numbered(keys: Sequence[str], numbers: Sequence[int]) -> str:
+    """Return in words which numbers blocks have."""
+    shown = [f"{key} is {number}" for key, number in zip(keys, numbers, strict=True)]
+    more = "" if len(shown) <= 8 else f" and {len(shown) - 8} more"
+    own = numbers != [*range(1, len(keys) + 1)]
+    how = "as in their names" if own else "from 1 in the file's order"
+    return f"{how}: {', '.join(shown[:8])}{more}"
+
+
 def block_numbers(keys: Sequence[str]) -> list[int]:
-    """Return names of bricks: the keys of all blocks where these are numbers, else from 1."""
-    if all(key.isascii() and key.isdigit() and len(key) < 10 for key in keys):
-        found = [int(key) for key in keys]
-        if len(set(found)) == len(keys) and max(found) < LARGEST_NUMBER // 4:
-            return found
+    """Return names of bricks: the numbers in which all keys differ, else from 1.
+
+    Keys are numbers, or end in one after the same letters, as stone_1 and stone_2 do.
+    """
+    found = [re.fullmatch(r"(.*?)([0-9]{1,9})", key) for key in keys]
+    parts = [match.groups() for match in found if match]
+    numbers = [int(number) for _, number in parts]
+    alike = len({*numbers}) == len(keys) and len({letters for letters, _ in parts}) == 1
+    if alike and max(numbers) < LARGEST_NUMBER // 4:
+        return numbers
     return [*range(1, len(keys) + 1)]
 
 

@@ -1,8 +1,8 @@
 """Assemblies and models of COMPAS's packages: what blocks they have, and where these touch.
 
-Assemblies of compas_assembly and compas_cra are graphs, with meshes in or beside them, or lists of
-meshes. Models of compas_dem are elements with transformations. Beams of compas_timber are their
-blanks; the model's own joints say which run into each other.
+Assemblies of compas_assembly and compas_cra are graphs, with meshes in or beside them.
+Models of compas_model and compas_dem are elements with transformations. Beams of compas_timber are
+their blanks; the model's own joints say which run into each other.
 """
 
 from __future__ import annotations
@@ -19,6 +19,15 @@ from seqopt.errors import SceneError
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.imports._carried import carried, own_density
+from seqopt.scene.imports._compas_shapes import (
+    frame_of,
+    held_by,
+    kind,
+    payload,
+    solid_of,
+    solid_of_element,
+    transformation_of,
+)
 from seqopt.scene.imports._content import (
     Content,
     Entry,
@@ -28,117 +37,11 @@ from seqopt.scene.imports._content import (
     entry,
     listing,
     mapping,
+    moved,
     number,
-    point,
     points,
 )
 from seqopt.scene.library.common import JointLaw
-
-_PLAIN = 1e-9  # by how much rounding may change the last row of a transformation
-_Solid = tuple[Floats, list[list[int]]]
-
-
-def payload(value: Any) -> Any:
-    """Return what an object holds, under whichever key its version uses; itself if it is bare."""
-    for _ in range(4):
-        if isinstance(value, dict):
-            inner = value.get("data", value.get("value"))
-            value = inner if isinstance(inner, dict | list) else value
-    return value
-
-
-def _held(where: str, value: Any) -> Entry:
-    """Return what a serialized object holds, which is an object too."""
-    return mapping(where, payload(value))
-
-
-def kind(value: Any) -> str:
-    """Return the last part of what an object says that it is, in small letters; empty if none."""
-    name = value.get("dtype") if isinstance(value, dict) else None
-    return name.rsplit("/", 1)[-1].lower() if isinstance(name, str) else ""
-
-
-def _mesh(where: str, value: Any) -> _Solid:
-    """Return the vertices (V, 3) and faces of a mesh, a polyhedron or a box."""
-    held = payload(value)
-    if isinstance(held, dict) and {"xsize", "ysize", "zsize"} <= set(held):
-        return _box(where, held)
-    if isinstance(held, dict) and "vertices" in held:
-        rows = [point(f"{where}: a vertex", row) for row in listing(where, held["vertices"])]
-        sides = listing(where, entry(where, held, "faces"))
-        return np.array(rows).reshape(-1, 3), [_corners(where, side, None) for side in sides]
-    return _halfedge(where, held)
-
-
-def _halfedge(where: str, held: Any) -> _Solid:
-    """Return a mesh whose vertices and faces have keys."""
-    vertex = mapping(f"{where}: vertex", entry(where, held, "vertex"))
-    face = mapping(f"{where}: face", entry(where, held, "face"))
-    place = {key: i for i, key in enumerate(vertex)}
-    rows = [
-        [number(f"{where}: vertex {key}", mapping(where, v).get(axis, 0.0)) for axis in "xyz"]
-        for key, v in vertex.items()
-    ]
-    return np.array(rows).reshape(-1, 3), [
-        _corners(f"{where}: face {key}", side, place) for key, side in face.items()
-    ]
-
-
-def _corners(where: str, side: Any, place: dict[str, int] | None) -> list[int]:
-    """Return the places of a face's vertices; a vertex that closes the circle is left out."""
-    keys = listing(where, side)
-    out = []
-    for key in keys:
-        named = place.get(str(key)) if place is not None else key
-        if not isinstance(named, int) or isinstance(named, bool):
-            raise SceneError(f"{where}: there is no vertex {short(key)}")
-        out.append(named)
-    return out[:-1] if len(out) > 1 and out[0] == out[-1] else out
-
-
-def _box(where: str, held: dict[str, Any]) -> _Solid:
-    """Return a box, whose frame is in its middle."""
-    size = [number(f"{where}: {key}", held[key]) for key in ("xsize", "ysize", "zsize")]
-    origin, axes = _frame(where, held.get("frame"))
-    return origin + 0.5 * (BOX_CORNERS * size) @ axes, [list(face) for face in BOX_FACES]
-
-
-def _frame(where: str, value: Any) -> tuple[Floats, Floats]:
-    """Return the origin (3,) and the axes (3, 3), as rows, of a frame; the world's if None."""
-    if value is None:
-        return np.zeros(3), np.eye(3)
-    held = payload(value)
-    origin, first, second = (
-        point(f"{where}: {key}", entry(where, held, key)) for key in ("point", "xaxis", "yaxis")
-    )
-    third = np.cross(first, second)
-    sizes = [float(np.linalg.norm(axis)) for axis in (first, third)]
-    if not min(sizes) > 0:
-        raise SceneError(f"{where}: xaxis and yaxis span no plane")
-    first, third = first / sizes[0], third / sizes[1]
-    return origin, np.stack([first, np.cross(third, first), third])
-
-
-def _transformation(where: str, value: Any) -> Floats:
-    """Return a transformation (4, 4): with a ``matrix``, or a matrix; none if None."""
-    if value is None:
-        return np.eye(4)
-    held = payload(value)
-    if isinstance(held, dict) and "matrix" not in held and "point" in held:
-        origin, axes = _frame(where, held)
-        return np.vstack([np.column_stack([axes.T, origin]), np.eye(4)[3]])
-    rows = listing(where, held.get("matrix", held) if isinstance(held, dict) else held)
-    matrix = [[number(where, x) for x in listing(where, row)] for row in rows]
-    if [len(row) for row in matrix] != [4] * 4:
-        raise SceneError(f"{where} is {short(value)}; a matrix of four by four is expected")
-    if not np.allclose(matrix[3], (0.0, 0.0, 0.0, 1.0), rtol=0.0, atol=_PLAIN):
-        raise SceneError(f"{where} ends in {matrix[3]}; give a matrix that ends in 0, 0, 0, 1")
-    return np.array(matrix)
-
-
-def _moved(place: Floats, matrix: Floats) -> Floats:
-    """Return points (k, 3) after a transformation (4, 4)."""
-    return np.asarray(place @ matrix[:3, :3].T + matrix[:3, 3])
 
 
 @dataclass(frozen=True)
@@ -159,9 +62,9 @@ def _elements(source: str, held: Entry) -> list[_Element]:
     """
     rows = [*by_guid(f"{source}: elements", entry(source, held, "elements"))]
     named = {guid: f"{source}: element {i}" for i, (guid, _) in enumerate(rows)}
-    inner = {guid: _held(named[guid], item) for guid, item in rows}
+    inner = {guid: held_by(named[guid], item) for guid, item in rows}
     placed: dict[str | None, Floats] = {
-        None: _transformation(f"{source}: transformation", held.get("transformation"))
+        None: transformation_of(f"{source}: transformation", held.get("transformation"))
     }
     for guid, parent in _tree(source, held):
         if guid not in inner or guid in placed:
@@ -185,13 +88,13 @@ def by_guid(where: str, found: Any) -> Iterator[tuple[str, Entry]]:
 
 def _own(where: str, held: Entry) -> Floats:
     """Return the transformation of an element to its parent; early ones have a frame too."""
-    frame = _transformation(f"{where}: frame", held.get("frame"))
-    return frame @ _transformation(f"{where}: transformation", held.get("transformation"))
+    frame = transformation_of(f"{where}: frame", held.get("frame"))
+    return frame @ transformation_of(f"{where}: transformation", held.get("transformation"))
 
 
 def _tree(source: str, held: Entry) -> Iterator[tuple[str, str | None]]:
     """Yield the identifiers of elements and of their parents, parents first."""
-    tree = _held(f"{source}: tree", held.get("tree") or {})
+    tree = held_by(f"{source}: tree", held.get("tree") or {})
     waiting: list[tuple[Any, str | None]] = [(tree.get("root") or {}, None)]
     while waiting:
         node, above = waiting.pop()
@@ -205,11 +108,9 @@ def _tree(source: str, held: Entry) -> Iterator[tuple[str, str | None]]:
 
 def read_assembly(document: Any, source: str) -> Content:
     """Return what an assembly says."""
-    if isinstance(document, list):
-        return _meshes(document, source)
     graph, meshes = assembly_graph(document, source)
     nodes = mapping(f"{source}: node", entry(source, graph, "node", "vertex"))
-    common = _held(source, graph.get("node_attributes") or graph.get("dva") or {})
+    common = held_by(source, graph.get("node_attributes") or graph.get("dva") or {})
     keys = [key for key in nodes if meshes is None or key in meshes]
     own = carried(graph, source)
     blocks = []
@@ -229,30 +130,20 @@ def read_assembly(document: Any, source: str) -> Content:
 
 def assembly_graph(document: Any, source: str) -> tuple[Entry, dict[str, Any] | None]:
     """Return the graph of an assembly, and its meshes by key where they stand beside it."""
-    held = _held(source, document)
+    held = held_by(source, document)
     if "blocks" in held and "assembly" in held:
-        graph = _held(f"{source}: assembly", held["assembly"])
+        graph = held_by(f"{source}: assembly", held["assembly"])
         return graph, mapping(f"{source}: blocks", held["blocks"])
     if "graph" in held:
-        held = _held(f"{source}: graph", held["graph"])
+        held = held_by(f"{source}: graph", held["graph"])
     if "node" not in held:
         raise SceneError(f"{source}: neither graph nor node is there; give an assembly")
     return held, None
 
 
-def _meshes(document: list[Any], source: str) -> Content:
-    """Return a list of meshes as blocks."""
-    blocks = []
-    for i, item in enumerate(document):
-        while isinstance(item, list) and len(item) == 1:
-            item = item[0]  # noqa: PLW2901  # some files wrap each mesh
-        blocks.append(FileBlock(str(i), *_mesh(f"{source}: mesh {i}", item)))
-    return Content(tuple(blocks), said=("a list of meshes: no supports, faces or order",))
-
-
 def _node_block(where: str, key: str, node: Entry, meshes: dict[str, Any] | None) -> FileBlock:
     held = meshes[key] if meshes is not None else entry(where, node, "block")
-    vertices, faces = _mesh(where, held)
+    vertices, faces = solid_of(where, held)
     course = node.get("course", node.get("order"))
     return FileBlock(
         key,
@@ -284,7 +175,7 @@ def _interfaces(where: str, held: Entry) -> Iterator[Floats]:
 
 def read_model(document: Any, source: str) -> Content:
     """Return what a block model, or a problem about one, says."""
-    held = _held(source, document)
+    held = held_by(source, document)
     law, said = None, list[str]()
     if kind(document) == "problem":
         law = _law(source, held.get("contact_properties"))
@@ -293,7 +184,7 @@ def read_model(document: Any, source: str) -> Content:
             raise SceneError(
                 f"{source}: the problem does not hold its model; give the model itself"
             )
-        held = _held(f"{source}: model", held["model"])
+        held = held_by(f"{source}: model", held["model"])
     elements = _elements(source, held)
     densities = _densities(source, held)
     kept = {i: e for i, e in enumerate(elements) if e.kind != "group"}
@@ -313,7 +204,7 @@ def read_model(document: Any, source: str) -> Content:
 def _densities(source: str, held: Entry) -> dict[str, float]:
     """Return the densities of materials by their identifier."""
     items = by_guid(f"{source}: materials", held.get("materials") or [])
-    found = {guid: _held(source, item).get("density") for guid, item in items}
+    found = {guid: held_by(source, item).get("density") for guid, item in items}
     return {
         g: number(f"{source}: density", value) for g, value in found.items() if value is not None
     }
@@ -321,10 +212,10 @@ def _densities(source: str, held: Entry) -> dict[str, float]:
 
 def _block(key: str, element: _Element, densities: dict[str, float]) -> FileBlock:
     where, held = element.where, element.held
-    vertices, faces = _mesh(where, entry(where, held, "geometry", "shape"))
+    vertices, faces = solid_of_element(where, held)
     return FileBlock(
         key,
-        _moved(vertices, element.matrix),
+        moved(vertices, element.matrix),
         faces,
         support=held.get("is_support") is True,
         density=densities.get(str(held.get("material"))),
@@ -350,7 +241,7 @@ def _contacts(source: str, held: Entry) -> Iterator[tuple[str, str, Floats]]:
     graph = mapping(source, held.get("graph") or {})
     for a, b, where, item in _edges(source, mapping(source, graph.get("edge") or {})):
         for face in listing(where, mapping(where, item or {}).get("contacts") or []):
-            corners = points(where, _held(where, face).get("points") or [])
+            corners = points(where, held_by(where, face).get("points") or [])
             if len(corners) > 2:  # of points and edges nothing is carried over a face
                 yield a, b, corners
 
@@ -359,9 +250,9 @@ def _law(source: str, held: Any) -> JointLaw | None:
     """Return the stiffness of joints by area, if the model has one."""
     if held is None:
         return None
-    properties = _held(source, held)
+    properties = held_by(source, held)
     found = properties.get("joint_model") or properties.get("contact_model") or {}
-    model = _held(f"{source}: joint model", found)
+    model = held_by(f"{source}: joint model", found)
     normal = model.get("kn", model.get("k_n"))
     side = model.get("kt", model.get("k_t"))
     if normal is None or side is None:
@@ -372,7 +263,7 @@ def _law(source: str, held: Any) -> JointLaw | None:
 
 def read_timber(document: Any, source: str) -> Content:
     """Return the beams of a model, which must have some."""
-    elements = _elements(source, held := _held(source, document))
+    elements = _elements(source, held := held_by(source, document))
     beams = [element for element in elements if element.kind == "beam"]
     if not beams:
         raise SceneError(f"{source}: it has no beams; give a model with some")
@@ -394,15 +285,15 @@ def _beam(where: str, key: str, beam: _Element) -> FileBlock:
         raise SceneError(f"{where}: its sizes are {size.tolist()}; give positive ones")
     local: Floats = 0.5 * (BOX_CORNERS + np.array([1.0, 0.0, 0.0])) * size
     if held.get("frame") is not None:
-        origin, axes = _frame(where, held["frame"])
+        origin, axes = frame_of(where, held["frame"])
         return FileBlock(key, np.asarray(origin + local @ axes), BOX_FACES)
-    return FileBlock(key, _moved(local, beam.matrix), BOX_FACES)
+    return FileBlock(key, moved(local, beam.matrix), BOX_FACES)
 
 
 def _pairs(source: str, held: Entry, place: dict[str, int]) -> Iterable[tuple[int, int]]:
     """Return the places of beams that the model's own joints hold together, each pair once."""
     items = by_guid(f"{source}: joints", held.get("joints") or [])
-    ends = [listing(source, _held(source, item).get("element_guids") or []) for _, item in items]
+    ends = [listing(source, held_by(source, item).get("element_guids") or []) for _, item in items]
     known = [sorted(place[str(x)] for x in found if str(x) in place) for found in ends]
     return dict.fromkeys(pair for found in known for pair in combinations(found, 2))
 

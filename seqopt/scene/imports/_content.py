@@ -36,6 +36,7 @@ class FileBlock:
     support: bool = False  # whether it is fixed
     density: float | None = None  # kg/m³
     course: float | None = None  # its place in the build; lower ones come first
+    group: str = ""  # its layer or group in the file
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,8 @@ class Content:
     faces: tuple[FileFace, ...] = ()  # empty where the file has none
     joints: tuple[FileJoint, ...] = ()  # of frames and of beams that run into each other
     unit: str | None = None  # unit of length, one of `UNITS`, if the file says it
+    usual_unit: str | None = None  # if the format has one, which not all who write it respect
+    up: str = "z"  # which axis the format has up, one of `UPS`
     law: JointLaw | None = None  # if the file has stiffnesses
     said: tuple[str, ...] = ()  # what was read, left out or assumed
     own: Carried | None = None  # the scene that seqopt wrote into it
@@ -106,8 +109,9 @@ class Given:
     """What the user adds if a file does not say it.
 
     ``unit``: unit of length of the file, one of `UNITS`; ``up``: which axis of the file points up,
-    ``z`` or ``y``; ``density``: of blocks for which the file has none, kg/m³; ``supports``: keys of
-    blocks that are fixed, in place of those of the file; ``law``: stiffness of joints by area, in
+    ``z`` or ``y``, by default that of its format; ``density``: of blocks for which the file has
+    none, kg/m³; ``supports``: keys of blocks that are fixed, or of layers and groups of blocks, in
+    place of those of the file; ``law``: stiffness of joints by area, in
     place of that of the file; ``gap``: most that may lie between faces that touch, m; ``detect``:
     whether to look for faces although the file has some; ``robots``: how many mobile robots the
     scene gets, three if the file has none; ``name``: of the scene; ``progress``: told how far it is
@@ -115,7 +119,7 @@ class Given:
     """
 
     unit: str | None = None
-    up: str = "z"
+    up: str | None = None
     density: float | None = None
     supports: Sequence[str] | None = None
     law: JointLaw | None = None
@@ -185,3 +189,8 @@ def point(where: str, value: object) -> Floats:
 def points(where: str, value: object) -> Floats:
     """Return the points (k, 3) of a list of a document."""
     return np.array([point(where, row) for row in listing(where, value)]).reshape(-1, 3)
+
+
+def moved(place: Floats, matrix: Floats) -> Floats:
+    """Return points (k, 3) after a transformation (4, 4)."""
+    return np.asarray(place @ matrix[:3, :3].T + matrix[:3, 3])

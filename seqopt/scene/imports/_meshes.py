@@ -1,18 +1,10 @@
-"""Meshes of blocks: OBJ with its polygons and objects, PLY and STL, read and repaired.
-
-trimesh reads PLY and STL. Of an OBJ it keeps triangles alone, cut as fans, which a face that is not
-convex does not survive, and joins all objects; so OBJ has a few lines of its own here.
-"""
+"""Blocks of meshes: where one ends and the next begins, what they are called, and their repair."""
 
 from __future__ import annotations
 
-import io
-import logging
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from importlib import import_module
-from importlib.util import find_spec
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,10 +12,10 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from seqopt.arrays import Floats, Ints
-from seqopt.errors import FileError, SceneError
+from seqopt.errors import SceneError
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import as_vectors
-from seqopt.scene.imports._content import LARGEST, MOST_BLOCKS, Content, FileBlock
+from seqopt.scene.imports._content import MOST_BLOCKS, Content, FileBlock
 from seqopt.scene.shape import FLAT, Polyhedron, Surface, bend, edges, fans
 
 if TYPE_CHECKING:
@@ -123,72 +115,44 @@ def _linked(count: int, links: Ints) -> Ints:
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
-_UNASKED = logging.NullHandler()  # else Python prints what no one listens to
+def mesh_content(
+    vertices: Floats, faces: _Polygons, source: str, names: Sequence[str] = ()
+) -> Content:
+    """Return the blocks of a mesh. ``names``: of each face, or none."""
+    own = _split_blocks(vertices, faces) if faces else []
+    found = [
+        FileBlock(names[block[0]] if names else "", *_compact(vertices, [faces[i] for i in block]))
+        for block in own
+    ]
+    return _named(found, source)
 
 
-def read_obj(text: str, source: str) -> Content:
-    """Return the blocks of a Wavefront OBJ file, named as objects, or groups if they are more."""
-    vertices: list[list[float]] = []
-    faces: list[list[int]] = []
-    named = {"o": "", "g": ""}
-    names: dict[str, list[str]] = {"o": [], "g": []}
-    for i, line in enumerate(text.splitlines(), start=1):
-        words = line.split("#", 1)[0].split()
-        if words and words[0] == "v":
-            vertices.append(_numbers(f"{source}, line {i}", words[1:4]))
-        elif words and words[0] == "f":
-            face = [_place(f"{source}, line {i}", w, len(vertices)) for w in words[1:]]
-            if len(face) < 3:
-                raise SceneError(f"{source}, line {i}: a face has three vertices or more")
-            faces.append(face)
-            for kind, name in named.items():
-                names[kind].append(name)
-        elif words and words[0] in named:
-            named[words[0]] = " ".join(words[1:])
-    points = np.array(vertices, dtype=float).reshape(-1, 3)
-    return _content(points, faces, source, max(names.values(), key=lambda own: len(set(own))))
+def object_content(objects: Iterable[FileBlock], source: str) -> Content:
+    """Return the blocks of objects that have a name each; an object may be several blocks."""
+    found = []
+    for own in objects:
+        sides = [face for face in own.faces if len(face) > 2]
+        if any(not 0 <= min(face) <= max(face) < len(own.vertices) for face in sides):
+            raise SceneError(
+                f"{source}: a face of {short(own.key or 'a mesh')} names a vertex that is not "
+                f"there; {len(own.vertices)} are"
+            )
+        for part in _split_blocks(own.vertices, sides) if sides else []:
+            vertices, faces = _compact(own.vertices, [sides[i] for i in part])
+            found.append(replace(own, vertices=vertices, faces=faces))
+    return _named(found, source)
 
 
-def read_mesh(content: bytes, source: str, form: str) -> Content:
-    """Return the blocks of a ``ply`` or ``stl`` file, for which trimesh is needed."""
-    if find_spec("trimesh") is None:
-        raise FileError(f"{source}: reading {form} needs trimesh; pip install 'seqopt[blocks]'")
-    vertices, faces = _loaded(content, source, form)
-    if not (np.abs(vertices) <= LARGEST).all():
-        raise SceneError(f"{source}: a vertex is not finite; give numbers up to {LARGEST:g}")
-    if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
-        raise SceneError(f"{source}: a face names a vertex that is not there; {len(vertices)} are")
-    if form == "stl":  # it repeats the vertices of every triangle
-        vertices, place = np.unique(vertices, axis=0, return_inverse=True)
-        faces = place.reshape(-1)[faces]
-    return _content(vertices, faces.tolist(), source)
-
-
-def _loaded(content: bytes, source: str, form: str) -> tuple[Floats, Ints]:
-    """Return what trimesh makes of bytes; what it logs is for those who asked for logs."""
-    logging.getLogger("trimesh").addHandler(_UNASKED)
-    try:
-        found = import_module("trimesh").load_mesh(
-            io.BytesIO(content), file_type=form, process=False
-        )
-        return np.asarray(found.vertices, dtype=float), np.asarray(found.faces, dtype=np.int64)
-    except MemoryError:
-        raise
-    except Exception as error:  # whatever a reader of broken bytes may raise
-        said = short(str(error) or type(error).__name__, 80)
-        raise SceneError(f"{source}: no {form} file that can be read: {said}") from error
-
-
-def _content(vertices: Floats, faces: _Polygons, source: str, names: Sequence[str] = ()) -> Content:
-    if not faces:
+def _named(blocks: list[FileBlock], source: str) -> Content:
+    if not blocks:
         raise SceneError(f"{source}: it has no faces; give closed meshes")
-    own = _split_blocks(vertices, faces)
-    if len(own) > MOST_BLOCKS:
-        raise SceneError(f"{source}: {len(own)} blocks; {MOST_BLOCKS} is the most")
-    keys = _keys([names[block[0]] if names else "" for block in own])
-    parts = (_compact(vertices, [faces[i] for i in block]) for block in own)
-    blocks = tuple(FileBlock(key, *part) for key, part in zip(keys, parts, strict=True))
-    return Content(blocks, said=("a mesh: no supports, faces or order",))
+    if len(blocks) > MOST_BLOCKS:
+        raise SceneError(f"{source}: {len(blocks)} blocks; {MOST_BLOCKS} is the most")
+    keys = _keys([block.key for block in blocks])
+    return Content(
+        tuple(replace(block, key=key) for block, key in zip(blocks, keys, strict=True)),
+        said=("a mesh: no supports, faces or order",),
+    )
 
 
 def _keys(names: Sequence[str]) -> list[str]:
@@ -206,28 +170,6 @@ def _compact(points: Floats, faces: _Polygons) -> tuple[Floats, tuple[tuple[int,
     used = sorted({v for face in faces for v in face})
     place = {v: i for i, v in enumerate(used)}
     return points[used], tuple(tuple(place[v] for v in face) for face in faces)
-
-
-def _numbers(where: str, words: list[str]) -> list[float]:
-    try:
-        row = [float(word) for word in words]
-    except ValueError:
-        row = []
-    if len(row) != 3 or not (np.abs(row) <= LARGEST).all():
-        raise SceneError(f"{where}: a vertex is {short(' '.join(words))}; give three numbers")
-    return row
-
-
-def _place(where: str, word: str, count: int) -> int:
-    """Return which vertex a word names: from 1, or back from the last."""
-    try:
-        named = int(word.split("/", 1)[0])
-    except ValueError:
-        named = 0
-    place = named - 1 if named > 0 else count + named
-    if named == 0 or not 0 <= place < count:
-        raise SceneError(f"{where}: there is no vertex {short(word)}; {count} stand before")
-    return place
 
 
 _Loop = tuple[int, ...]

@@ -7,6 +7,7 @@ import io
 import math
 import warnings
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,9 @@ from seqopt.errors import SceneError, SceneWarning
 from seqopt.scene._checks import printable, short
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.imports._building import build_scene
-from seqopt.scene.imports._compas_models import kind, read_assembly, read_model, read_timber
+from seqopt.scene.imports._compas_models import read_assembly, read_model, read_timber
+from seqopt.scene.imports._compas_scenes import is_meshes, read_meshes, read_scene
+from seqopt.scene.imports._compas_shapes import kind, payload
 from seqopt.scene.imports._content import (
     LARGEST,
     MOST_BLOCKS,
@@ -27,19 +30,41 @@ from seqopt.scene.imports._content import (
     parse_json,
 )
 from seqopt.scene.imports._frames import read_frame
-from seqopt.scene.imports._meshes import read_mesh, read_obj
+from seqopt.scene.imports._mesh_files import read_mesh, read_obj, read_objects, read_off
+from seqopt.scene.imports._rhino import read_3dm
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import warn_of
 
 _DOCUMENTS: dict[str, Callable[[Any, str], Content]] = {
     "compas_assembly": read_assembly,
+    "compas_model": read_model,
     "compas_dem": read_model,
     "compas_timber": read_timber,
+    "compas_scene": read_scene,
+    "compas_meshes": read_meshes,
     "frame": read_frame,
 }
-_SUFFIXES = {".csv": "boxes", ".obj": "obj", ".ply": "ply", ".stl": "stl", ".json": ""}
+_BYTES: dict[str, Callable[[bytes, str], Content]] = {
+    "3dm": read_3dm,
+    "glb": partial(read_objects, form="glb"),
+    "3mf": partial(read_objects, form="3mf"),
+    "ply": partial(read_mesh, form="ply"),
+    "stl": partial(read_mesh, form="stl"),
+}
+_SUFFIXES = {"csv": "boxes", "obj": "obj", "off": "off", "json": "", **{key: key for key in _BYTES}}
+_MESHED = ".glb or .obj, every block a closed mesh with a name"
+_INSTEAD = {  # what to save in place of what is not read
+    "dwg dxf": "open it in Rhino and save as .3dm, or export closed solids as .stl",
+    "gh ghx": "bake it and save from Rhino as .3dm",
+    "step stp iges igs sat x_t fcstd": "open it in Rhino and save as .3dm, or in FreeCAD and save "
+    "as .obj",
+    "ifc rvt": "convert it (IfcConvert a.ifc a.obj, of IfcOpenShell), or export closed meshes as "
+    ".obj",
+    "skp blend fbx dae max c4d usd usdz": f"export {_MESHED}",
+    "gltf": "export .glb, which is one file",
+}
 _LYING = 3  # blocks on the ground from which on it is odd if most are there
-FORMATS = (*_DOCUMENTS, "boxes", "obj", "ply", "stl")
+FORMATS = (*_DOCUMENTS, "boxes", "obj", "off", *_BYTES)
 
 
 def import_scene(path: str | Path, form: str | None = None, given: Given | None = None) -> Scene:
@@ -72,18 +97,18 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
     content = read_content(where, form)
     scene = build_scene(content, given or Given(), printable("file", where.stem or "file"))
     warn_of(scene, scene.name)
-    if content.own is None and (given is None or (given.supports is None and given.up == "z")):
-        _warn_of_lying(scene)
+    if content.own is None and (given is None or (given.supports is None and given.up is None)):
+        _warn_of_lying(scene, "z" if content.up == "y" else "y")
     return scene
 
 
-def _warn_of_lying(scene: Scene) -> None:
-    """Warn if most blocks rest on the ground, as they do where y is up and nobody says so."""
+def _warn_of_lying(scene: Scene, up: str) -> None:
+    """Warn if most blocks rest on the ground, as they do where another axis is up in the file."""
     low = {ground.brick for ground in scene.grounds}
     if len(low) >= _LYING and 2 * len(low) > len(scene.bricks):
         warnings.warn(
             f"scene {scene.name}: {len(low)} of {len(scene.bricks)} blocks rest on the ground; if "
-            "y is up in the file, say so (--up y)",
+            f"{up} is up in the file, say so (--up {up})",
             SceneWarning,
             stacklevel=3,
         )
@@ -91,31 +116,51 @@ def _warn_of_lying(scene: Scene) -> None:
 
 def read_content(path: Path, form: str | None = None) -> Content:
     """Return what a file says, in one of `FORMATS`; by default in that which it looks like."""
-    source = str(path)
-    named = _SUFFIXES.get(path.suffix.lower()) if form is None else form
+    source, suffix = str(path), path.suffix.lower().removeprefix(".")
+    named = _SUFFIXES.get(suffix) if form is None else form
     if named is None or (form is not None and form not in FORMATS):
-        what = f"format is {short(form)}" if form else f"{source}: its format is not known"
-        raise SceneError(f"{what}; give one of {', '.join(FORMATS)}")
-    if named in ("ply", "stl"):
-        return read_mesh(read_bytes(path), source, named)
+        raise SceneError(_not_read(source, suffix, form))
+    if named in _BYTES:
+        return _BYTES[named](read_bytes(path), source)
     text = read_text(path)
-    if named in ("boxes", "obj"):
-        return (_read_boxes if named == "boxes" else read_obj)(text, source)
+    texts = {"boxes": _read_boxes, "obj": read_obj, "off": read_off}
+    if named in texts:
+        return texts[named](text, source)
     document = parse_json(text, source)
     return _DOCUMENTS[named or sniffed(document, source)](document, source)
 
 
+def _not_read(source: str, suffix: str, form: str | None) -> str:
+    """Return why a format is not read, and what to save instead."""
+    for suffixes, remedy in _INSTEAD.items():
+        if form is None and suffix in suffixes.split():
+            return f"{source}: a .{suffix} cannot be read; {remedy}"
+    what = f"format is {short(form)}" if form else f"{source}: its format is not known"
+    return f"{what}; give one of {', '.join(FORMATS)}"
+
+
 def sniffed(document: Any, source: str) -> str:
     """Return which of `_DOCUMENTS` a JSON document is."""
-    by_kind = {"blockmodel": "compas_dem", "problem": "compas_dem", "timbermodel": "compas_timber"}
-    if kind(document) in by_kind:
-        return by_kind[kind(document)]
-    keys = set(document) if isinstance(document, dict) else set()
+    known = {
+        "blockmodel": "compas_dem",
+        "problem": "compas_dem",
+        "timbermodel": "compas_timber",
+        "scene": "compas_scene",
+    }
+    if kind(document) in known:
+        return known[kind(document)]
+    held = payload(document)
+    inner = {*held} if isinstance(held, dict) else {*()}
+    if {"elements", "tree"} <= inner:
+        return "compas_model"
+    keys = {*document} if isinstance(document, dict) else {*()}
     if document and isinstance(document, dict) and document.get("format") == "seqopt-scene":
         raise SceneError(f"{source}: it is a scene of seqopt already; give it as such")
     if {"nodes", "elements"} <= keys:
         return "frame"
-    if isinstance(document, list) or keys & {"graph", "node", "blocks", "assembly", "data"}:
+    if is_meshes(document):
+        return "compas_meshes"
+    if keys & {"graph", "node", "blocks", "assembly", "data"}:
         return "compas_assembly"
     raise SceneError(f"{source}: no assembly that is known; give one of {', '.join(FORMATS)}")
 

@@ -21,7 +21,8 @@ from seqopt.errors import StepError
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.imports._building import block_numbers
 from seqopt.scene.imports._carried import carry
-from seqopt.scene.imports._compas_models import assembly_graph, by_guid, kind, payload
+from seqopt.scene.imports._compas_models import assembly_graph, by_guid
+from seqopt.scene.imports._compas_shapes import kind, payload
 from seqopt.scene.imports._content import entry, parse_json
 from seqopt.scene.imports.formats import read_content, sniffed
 from seqopt.scene.scene import Scene
@@ -47,7 +48,7 @@ def read_source(scene: Scene, path: Path) -> Source:
         document = parse_json(read_text(path), str(path))
         form = sniffed(document, str(path))
         graph = document if form == "compas_assembly" and isinstance(document, dict) else None
-        if form in ("compas_dem", "compas_timber"):
+        if form in ("compas_model", "compas_dem", "compas_timber"):
             held = payload(document)
             held = payload(held["model"]) if "model" in held else held
             rows = by_guid(f"{path}: element", held["elements"])

@@ -5,6 +5,11 @@ from __future__ import annotations
 import copy
 import json
 
+import compas
+from compas.geometry import Box
+from compas.scene import Scene as CompasScene
+from compas_model.elements import BeamElement, PlateElement
+from compas_model.models import Model
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -33,7 +38,20 @@ def places(held, before=()):
 
 WALL = running_bond(2, 1)
 STEPS = METHODS["sequential"](build_network(WALL), ())
-DOCUMENTS = OTHERS | {"carried": json.loads(export_plan(WALL, STEPS, "compas_assembly"))}
+
+
+def by_compas():
+    """Documents that COMPAS writes: a scene, a dictionary of shapes, a model of elements."""
+    scene, model = CompasScene(), Model()
+    scene.add(Box(1), name="stone", parent=scene.add_group("stones"))
+    for element in (PlateElement(), BeamElement()):
+        model.add_element(element)
+    written = {"scene": scene, "meshes": {"a": Box(1), "b": [Box(1)]}, "generic": model}
+    return {f"{name} of compas": json.loads(compas.json_dumps(it)) for name, it in written.items()}
+
+
+CARRIED = {"carried": json.loads(export_plan(WALL, STEPS, "compas_assembly"))}
+DOCUMENTS = OTHERS | by_compas() | CARRIED
 PLACES = {name: sorted(places(held), key=repr) for name, held in DOCUMENTS.items()}
 REMOVED = "removed"
 

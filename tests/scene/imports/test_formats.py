@@ -138,8 +138,10 @@ def test_bars_of_a_frame(read):
 def test_meshes_of_every_kind(read):
     parts = [LOW, HIGH, TOP]
     scene = read("wall.obj", obj(*parts))
-    assert measures(scene) == ({1: 2400.0, 2: 1200.0, 3: 2400.0}, [1.0, 1.0], [2.0])
-    assert "blocks are numbered from 1" in scene.provenance  # their keys are names of objects
+    assert measures(scene) == ({0: 2400.0, 1: 1200.0, 2: 2400.0}, [1.0, 1.0], [2.0])
+    assert "numbered as in their names: block_0 is 0, block_1 is 1" in scene.provenance
+    names = obj(*parts).replace("block_1", "sill")
+    assert "from 1 in the file's order: block_0 is 1, sill is 2" in read("a.obj", names).provenance
     assert len(scene.bricks[0].shape.faces) == 6  # polygons stay what they are
     fans = [(f[0], f[1], f[2]) for f in LOW.faces] + [(f[0], f[2], f[3]) for f in LOW.faces]
     mesh = trimesh.Trimesh(np.array(LOW.vertices), fans, process=False)
@@ -235,7 +237,10 @@ def test_what_can_be_mended_is_mended_and_said(read):
         ("a.csv", BOXES.replace("2,1,.5", "2,-1,.5"), METERS, "give positive ones"),
         ("a.csv", BOXES.replace(",0,1", ",0,maybe"), METERS, "support is 'maybe'; give 1 or 0"),
         ("a.csv", BOXES.splitlines()[0], METERS, "0 rows; give 1 to"),
-        ("a.dxf", "0\nSECTION\n", METERS, "its format is not known; give one of compas_assembly"),
+        ("a.xyz", "0 0 0\n", METERS, "its format is not known; give one of compas_assembly"),
+        ("a.dxf", "0\nSECTION\n", METERS, "a .dxf cannot be read; open it in Rhino and save as"),
+        ("a.ifc", "ISO-10303-21;", METERS, r"convert it (IfcConvert a.ifc a.obj, of"),
+        ("a.gltf", "{}", METERS, "export .glb, which is one file"),
         ("a.json", "{", METERS, "not JSON, line 1"),
         ("a.json", "[" * 100_000, METERS, "nested too deep"),
         ("a.json", '{"node": NaN}', METERS, "NaN stands where a number should"),

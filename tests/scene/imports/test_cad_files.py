@@ -1,0 +1,421 @@
+"""Files that rhino3dm, trimesh and COMPAS wrote become the blocks that were put into them."""
+
+from __future__ import annotations
+
+import compas
+import numpy as np
+import pytest
+import rhino3dm as rhino
+import trimesh
+from compas.datastructures import Mesh
+from compas.geometry import Box, Frame, Point, Polygon, Translation
+from compas.scene import Scene as CompasScene
+from compas_model.elements import BeamElement, ColumnElement, PlateElement
+from compas_model.models import Model
+
+from seqopt.errors import FileError, SceneError
+from seqopt.scene.imports._content import FileBlock, Given
+from seqopt.scene.imports._meshes import object_content, repair_shape
+from seqopt.scene.imports._rhino import _polysurface
+from seqopt.scene.imports.formats import import_scene, read_content
+
+DENSE, GIVEN = Given(density=2000.0), Given(unit="m", density=2000.0)
+WHERE = {  # lowest and highest corner of the blocks of a tower, mm
+    "foot": ((0, 0, 0), (400, 200, 100)),
+    "left": ((0, 0, 100), (200, 200, 200)),
+    "lid": ((0, 0, 200), (300, 200, 300)),
+}
+
+
+def placed(scene):
+    """Masses, and centroids in mm, of bricks by their numbers."""
+    return {
+        brick.name: (round(brick.mass, 4), *(round(1e3 * x, 4) for x in brick.position))
+        for brick in scene.bricks
+    }
+
+
+TOWER = {
+    1: (16.0, 200.0, 100.0, 50.0),
+    2: (8.0, 100.0, 100.0, 150.0),
+    3: (12.0, 150.0, 100.0, 250.0),
+}
+
+
+def corners(low, high):
+    return rhino.BoundingBox(rhino.Point3d(*low), rhino.Point3d(*high))
+
+
+def brep(low, high):
+    return rhino.Brep.CreateFromBoundingBox(corners(low, high))
+
+
+def extrusion(low, high):
+    return rhino.Extrusion.CreateBoxExtrusion(rhino.Box(corners(low, high)), cap=True)
+
+
+def mesh(low, high):
+    """A box as Rhino's mesh: quadrangles, and vertices of their own for each of them."""
+    out = rhino.Mesh()
+    solid = trimesh.creation.box(bounds=(low, high))
+    for triangle in solid.triangles:
+        for corner in triangle:
+            out.Vertices.Add(*corner)
+        out.Faces.AddFace(*(len(out.Vertices) - 3 + k for k in range(3)))
+    return out
+
+
+class Rhino:
+    """A file of Rhino."""
+
+    def __init__(self, unit=rhino.UnitSystem.Millimeters):
+        self.file = rhino.File3dm()
+        self.file.Settings.ModelUnitSystem = unit
+
+    def layer(self, name, *, visible=True):
+        layer = rhino.Layer()
+        layer.Name, layer.Visible = name, visible
+        return self.file.Layers.Add(layer)
+
+    def add(self, shape, name="", layer=0, *, visible=True):
+        own = rhino.ObjectAttributes()
+        own.Name, own.LayerIndex, own.Visible = name, layer, visible
+        self.file.Objects.Add(shape, own)
+
+    def written(self, folder):
+        path = folder / "model.3dm"
+        assert self.file.Write(str(path), 8)
+        return path
+
+
+@pytest.mark.parametrize("kind", [brep, extrusion, mesh])
+def test_rhino_solids_bring_their_unit_and_names(tmp_path, kind):
+    model = Rhino()
+    model.layer("Stones")
+    for name, (low, high) in WHERE.items():
+        model.add(kind(low, high), name)
+    model.add(rhino.LineCurve(rhino.Point3d(0, 0, 0), rhino.Point3d(1, 0, 0)))
+    scene = import_scene(model.written(tmp_path), given=DENSE)
+    assert placed(scene) == TOWER
+    assert "1 objects are left out: curves, points, text" in scene.provenance
+    assert "from 1 in the file's order: foot is 1, left is 2, lid is 3" in scene.provenance
+    assert "turned" not in scene.provenance  # faces look outward as they are
+    sides = 12 if kind is mesh else 6
+    assert [len(read_content(tmp_path / "model.3dm").blocks[i].faces) for i in range(3)] == [
+        sides
+    ] * 3
+    with pytest.raises(SceneError, match="its lengths are known in mm; give no other unit"):
+        import_scene(tmp_path / "model.3dm", given=Given(unit="m", density=1.0))
+
+
+def test_rhino_layers_name_supports_and_blocks_and_hide(tmp_path):
+    model = Rhino(rhino.UnitSystem.Centimeters)
+    stones, ground, away = (
+        model.layer("Stones"),
+        model.layer("Ground"),
+        model.layer("Off", visible=False),
+    )
+    low, high = WHERE["foot"]
+    model.add(brep(low, high), layer=ground)
+    model.add(brep(*WHERE["left"]), layer=stones)
+    model.add(brep(*WHERE["lid"]), layer=stones)
+    model.add(brep((0, 0, 0), (9, 9, 9)), layer=away)
+    model.add(brep((0, 0, 0), (9, 9, 9)), layer=stones, visible=False)
+    path = model.written(tmp_path)
+    content = read_content(path)
+    assert [block.key for block in content.blocks] == ["Ground", "Stones", "Stones-2"]
+    assert content.unit == "cm"
+    assert "2 objects are left out: hidden" in content.said
+    scene = import_scene(path, given=Given(density=2000.0, supports=["Ground"]))
+    assert len(scene.bricks) == 2
+    assert {ground.brick for ground in scene.grounds} == {2}
+    with pytest.raises(
+        SceneError, match="there is no block 'Earth'; known are 'Ground, Stones, Sto"
+    ):
+        import_scene(path, given=Given(density=1.0, supports=["Earth"]))
+
+
+def test_rhino_blocks_stand_where_they_are_put(tmp_path):
+    """An instance of a block of Rhino that holds another one."""
+    model = Rhino()
+    own = rhino.ObjectAttributes()
+    low, high = WHERE["left"]
+    table = model.file.InstanceDefinitions
+    base = rhino.Point3d(0, 0, 0)
+    table.Add("stone", "", "", "", base, (brep((0, 0, 0), (200, 200, 100)),), (own,))
+    (stone,) = [item.Id for item in table]
+    for height in (0, 100):
+        shift = rhino.Transform.Translation(50, 0, height)
+        model.file.Objects.AddInstanceObject(rhino.InstanceReference(stone, shift), own)
+    scene = import_scene(model.written(tmp_path), given=DENSE)
+    assert placed(scene) == {1: (8.0, 150.0, 100.0, 50.0), 2: (8.0, 150.0, 100.0, 150.0)}
+    assert (low, high) == ((0, 0, 100), (200, 200, 200))
+
+
+def profile():
+    """The outline of an L."""
+    out = rhino.Polyline(7)
+    for x, y in ((0, 0), (4, 0), (4, 1), (1, 1), (1, 3), (0, 3), (0, 0)):
+        out.Add(x, y, 0)
+    return out.ToPolylineCurve()
+
+
+def test_a_rhino_extrusion_that_is_not_convex_keeps_its_polygons(tmp_path):
+    model = Rhino(rhino.UnitSystem.Meters)
+    model.add(rhino.Extrusion.Create(profile(), 2.0, cap=True), "angle")
+    scene = import_scene(model.written(tmp_path), given=DENSE)
+    assert scene.bricks[0].mass == pytest.approx(2000.0 * 6 * 2)
+    assert sorted(map(len, scene.bricks[0].shape.faces)) == [4] * 6 + [6] * 2
+
+
+class Drum:
+    """A round polysurface with the meshes by which Rhino last drew it.
+
+    They stand beside it here: rhino3dm cannot give a face a mesh without losing it.
+    """
+
+    def __init__(self):
+        cylinder = rhino.Cylinder(rhino.Circle(1.0), 2.0)
+        self.own = rhino.Brep.CreateFromCylinder(cylinder, capBottom=True, capTop=True)
+        self.Faces = [Face(self.own.Faces[i]) for i in range(len(self.own.Faces))]
+
+    def __getattr__(self, name):
+        return getattr(self.own, name)
+
+
+class Face:
+    """A face of a drum, and its mesh of twelve sides."""
+
+    def __init__(self, own):
+        self.own, self.mesh = own, rhino.Mesh()
+        ends, turns = own.GetBoundingBox(), np.linspace(0, 2 * np.pi, 12, endpoint=False)
+        for x, y in zip(np.cos(turns), np.sin(turns), strict=True):
+            self.mesh.Vertices.Add(x, y, ends.Min.Z)
+            self.mesh.Vertices.Add(x, y, ends.Max.Z)
+        for a, b in zip(range(0, 24, 2), (*range(2, 24, 2), 0), strict=True):
+            if ends.Max.Z > ends.Min.Z:
+                self.mesh.Faces.AddFace(a, b, b + 1, a + 1)
+            elif a and b:
+                self.mesh.Faces.AddFace(0, a, b)
+
+    def GetMesh(self, kind):  # noqa: N802  # as rhino3dm calls it
+        assert self.own.GetMesh(kind) is None
+        return self.mesh
+
+    def __getattr__(self, name):
+        return getattr(self.own, name)
+
+
+def test_round_rhino_solids_need_the_mesh_of_the_file(tmp_path):
+    content = object_content([FileBlock("drum", *_polysurface("drum", Drum()))], "drum")
+    solid = repair_shape(content.blocks[0]).solid
+    assert solid.volume == pytest.approx(12 * 0.5 * np.sin(np.pi / 6) * 2, rel=1e-6)
+    model = Rhino()
+    model.add(Drum().own, "drum")
+    with pytest.raises(
+        SceneError, match=r"object 'drum' has faces that are curved .* turn it into"
+    ):
+        import_scene(model.written(tmp_path), given=DENSE)
+
+
+@pytest.mark.parametrize(
+    ("unit", "shape", "said"),
+    [
+        ("None", brep, "does not say its unit of length, and is 400 by 200 by 100 large; give"),
+        ("Yards", brep, "its unit is Yards; save it in one of m, cm, mm, in, ft"),
+        (
+            "Meters",
+            lambda *_: rhino.Brep.CreateTrimmedPlane(rhino.Plane.WorldXY(), profile()),
+            "'foot' is an open surface; close it",
+        ),
+        ("Meters", lambda *_: rhino.Point(rhino.Point3d(0, 0, 0)), "it has no faces"),
+    ],
+)
+def test_what_a_rhino_file_lacks_is_one_line(tmp_path, unit, shape, said):
+    model = Rhino(getattr(rhino.UnitSystem, unit))
+    model.add(shape(*WHERE["foot"]), "foot")
+    with pytest.raises(SceneError, match=said) as caught:
+        import_scene(model.written(tmp_path), given=DENSE)
+    assert "\n" not in str(caught.value)
+
+
+def scene_of_trimesh(up="z"):
+    """The tower in m, as nodes that move one box each."""
+    out = trimesh.Scene()
+    turn = (
+        np.eye(4)
+        if up == "z"
+        else np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+    )
+    for name, bounds in WHERE.items():
+        low, high = np.array(bounds) / 1e3
+        box = trimesh.creation.box(high - low)
+        shift = trimesh.transformations.translation_matrix(0.5 * (low + high))
+        out.add_geometry(box, node_name=name, geom_name=f"mesh of {name}", transform=turn @ shift)
+    return out
+
+
+def test_a_glb_is_in_meters_with_y_up_unless_said_otherwise(tmp_path):
+    path = tmp_path / "tower.glb"
+    path.write_bytes(scene_of_trimesh("y").export(file_type="glb"))
+    scene = import_scene(path, given=DENSE)
+    assert placed(scene) == TOWER
+    assert (
+        "lengths are in m, as the format has them; say --unit if they are not" in scene.provenance
+    )
+    assert "y is up in the file, as the format has it" in scene.provenance
+    assert "foot is 1, left is 2, lid is 3" in scene.provenance
+    path.write_bytes(scene_of_trimesh().export(file_type="glb"))
+    assert placed(import_scene(path, given=Given(up="z", density=2000.0))) == TOWER
+    small = import_scene(path, given=Given(up="z", unit="mm", density=2000.0))
+    assert small.bricks[0].mass == pytest.approx(16e-9)
+
+
+def test_a_3mf_says_its_unit(tmp_path):
+    path = tmp_path / "tower.3mf"
+    tower = scene_of_trimesh().apply_scale(1e3)
+    path.write_bytes(tower.export(file_type="3mf"))
+    scene = import_scene(path, given=DENSE)
+    assert placed(scene) == TOWER
+    with pytest.raises(SceneError, match="its lengths are known in mm; give no other unit"):
+        import_scene(path, given=Given(unit="m", density=1.0))
+
+
+@pytest.mark.parametrize("form", ["glb", "3mf", "3dm", "off"])
+def test_a_file_that_is_broken_is_one_line(tmp_path, form):
+    path = tmp_path / f"broken.{form}"
+    path.write_bytes(b"OFX 1 2 3")
+    with pytest.raises(SceneError, match=f"no {form} file that can be read") as caught:
+        import_scene(path, given=DENSE)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("form", "package"), [("3dm", "rhino3dm"), ("3mf", "lxml")])
+def test_a_package_that_is_missing_is_named(tmp_path, monkeypatch, form, package):
+    path = tmp_path / f"a.{form}"
+    path.write_bytes(b"")
+    found = "seqopt.scene.imports._mesh_files.find_spec"
+    monkeypatch.setattr(found, lambda name: None if name == package else object())
+    with pytest.raises(
+        FileError, match=rf"reading {form} needs {package}; pip install 'seqopt\[cad\]'"
+    ):
+        import_scene(path, given=DENSE)
+
+
+BOX_OFF = """# a box, and the color of its last face
+OFF
+8 6 12
+
+0 0 0
+2 0 0
+2 1 0
+0 1 0
+0 0 .5
+2 0 .5
+2 1 .5
+0 1 .5
+4 0 3 2 1
+4 4 5 6 7
+4 0 1 5 4
+4 1 2 6 5
+4 2 3 7 6
+4 3 0 4 7 255 0 0
+"""
+
+
+def test_off_keeps_polygons_and_leaves_colors(tmp_path):
+    path = tmp_path / "box.off"
+    path.write_text(BOX_OFF)
+    assert import_scene(path, given=GIVEN).bricks[0].mass == pytest.approx(2000.0)
+    assert len(read_content(path).blocks[0].faces) == 6
+    trimesh.creation.box((2, 1, 0.5)).export(path)
+    assert len(read_content(path).blocks[0].faces) == 12
+    assert import_scene(path, given=GIVEN).bricks[0].mass == pytest.approx(2000.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("OFF\n", "its counts are ''"),
+        ("OFF 3 2\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "4 lines where 3 \\+ 2 are announced"),
+        ("OFF 3 1\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", "face 0 is '3 0 1 3'; give"),
+        ("OFF 3 1\n0 0 0\n1 0 0\n0 1 0\n4 0 1 2\n", "face 0 is '4 0 1 2'; give"),
+        ("OFF 3 1\n0 0 0\n1 0\n0 1 0\n3 0 1 2\n", "vertex 1: a vertex is '1 0'; give three"),
+        ("OFF -3 1\n0 0 0\n", "-3 \\+ 1 are announced"),
+    ],
+)
+def test_an_off_that_is_none_is_one_line(tmp_path, text, said):
+    path = tmp_path / "a.off"
+    path.write_text(text)
+    with pytest.raises(SceneError, match=said):
+        import_scene(path, given=Given(unit="m", density=1.0))
+
+
+def boxes():
+    """The blocks of the tower as boxes of COMPAS, m."""
+    out = {}
+    for name, bounds in WHERE.items():
+        low, high = np.array(bounds) / 1e3
+        out[name] = Box(*(high - low), frame=Frame(0.5 * (low + high), [1, 0, 0], [0, 1, 0]))
+    return out
+
+
+def test_lists_and_dictionaries_of_compas_meshes(tmp_path):
+    path = tmp_path / "meshes.json"
+    meshes = {name: Mesh.from_shape(box) for name, box in boxes().items()}
+    for written in (meshes, {"course": [*boxes().values()]}, [[box] for box in boxes().values()]):
+        compas.json_dump(written, path)
+        found = [*placed(import_scene(path, given=GIVEN)).values()]
+        assert found == [*TOWER.values()]
+    compas.json_dump(meshes, path)
+    assert [block.key for block in read_content(path).blocks] == [*WHERE]
+    for name, item in meshes.items():
+        item.name = name.upper()
+    compas.json_dump([*meshes.values()], path)
+    assert [block.key for block in read_content(path).blocks] == ["FOOT", "LEFT", "LID"]
+    compas.json_dump(meshes["foot"], path)
+    assert [*placed(import_scene(path, given=GIVEN)).values()] == [TOWER[1]]
+
+
+def test_a_compas_scene_shows_what_it_shows(tmp_path):
+    scene = CompasScene()
+    group = scene.add_group("stones")
+    for name, box in boxes().items():
+        low = Mesh.from_shape(box.translated([0, 0, -1]))
+        item = scene.add(low, parent=group, name=name)
+        item.transformation = Translation.from_vector([0, 0, 1 - 0.5])
+    group.transformation = Translation.from_vector([0, 0, 0.5])
+    scene.add(Point(0, 0, 0))
+    scene.add(Box(9), name="away", show=False)
+    path = tmp_path / "scene.json"
+    compas.json_dump(scene, path)
+    content = read_content(path)
+    assert [(block.key, block.group) for block in content.blocks] == [(n, "stones") for n in WHERE]
+    assert content.said[1:] == ("1 objects are left out: point", "1 objects are left out: hidden")
+    shown = {item.name: item for item in compas.json_load(path).objects}
+    for block in content.blocks:  # where COMPAS itself has them
+        item = shown[block.key]
+        own = item.item.transformed(item.worldtransformation).vertices_attributes("xyz")
+        np.testing.assert_allclose(block.vertices, own, atol=1e-12)
+    assert placed(import_scene(path, given=GIVEN)) == TOWER
+
+
+def test_elements_of_a_compas_model(tmp_path):
+    """A column that carries a plate, on which a beam stands."""
+    model = Model()
+    model.add_element(ColumnElement(0.4, 0.3, 2.0))
+    outline = Polygon([[0, 0, 0], [0, 1, 0], [1, 1, 0], [1, 0, 0]])  # looks down: grows upward
+    plate = PlateElement(outline, 0.1, transformation=Translation.from_vector([-0.5, -0.5, 2.0]))
+    model.add_element(plate)
+    beam = BeamElement(0.1, 0.2, 3.0, transformation=Translation.from_vector([0, 0, 2.1]))
+    model.add_element(beam)
+    path = tmp_path / "model.json"
+    compas.json_dump(model, path)
+    content = read_content(path)
+    for block, element in zip(content.blocks, model.elements(), strict=True):
+        own = element.modelgeometry
+        vertices = np.array(own.vertices_attributes("xyz") if isinstance(own, Mesh) else own.points)
+        np.testing.assert_allclose(block.vertices.min(axis=0), vertices.min(axis=0), atol=1e-12)
+        np.testing.assert_allclose(block.vertices.max(axis=0), vertices.max(axis=0), atol=1e-12)
+    masses = [brick.mass for brick in import_scene(path, given=GIVEN).bricks]
+    assert masses == pytest.approx([2000 * 0.24, 2000 * 0.1, 2000 * 0.06])
