@@ -384,8 +384,7 @@ def _about_choices(comparison: Comparison, criterion: Criterion) -> str:
     said = (
         f"Objective: what the criterion {criterion.name} adds up to over all steps; "
         f"{_of_steps(comparison, criterion)}. Compare objectives only within a heading and an "
-        "aim: others add up other steps. Gap: how far the objective is above the proven optimum "
-        "of that aim. Models: "
+        "aim: others add up other steps. Gap: how far the objective is above its optimum. Models: "
         f"how many partial structures with different grips it looks at{_counted(comparison)}. "
         "Seconds: to choose and to check"
     )
