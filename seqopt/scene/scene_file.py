@@ -25,6 +25,7 @@ from seqopt._files import read_text, write_text
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import cut, reading_json, short
+from seqopt.scene._fitting import which_fit
 from seqopt.scene._loads import Load
 from seqopt.scene.arm import Arm
 from seqopt.scene.holders._durations import Durations
@@ -196,10 +197,13 @@ _READ: dict[Any, tuple[Callable[[str], Any], str]] = {
 
 def _scene_by_words(words: str) -> Scene:
     """Return the scene of a key of `KINDS`, a colon, and ``name=value`` parted by commas."""
+    name, given = words.partition(":")[0], _in_words(words)
     try:
-        scene = _made_of_words(words.partition(":")[0], _in_words(words))
+        scene = _made_of_words(name, given)
     except OverflowError as error:
         raise SceneError(f"scene {words}: its numbers are too large; give smaller ones") from error
+    except SceneError as error:
+        raise SceneError(f"{error}{which_fit(partial(_made_of_words, name), given)}") from error
     return replace(scene, provenance=f"{scene.provenance} In words: {words}.")
 
 
