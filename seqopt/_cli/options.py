@@ -10,7 +10,6 @@ from typing import Any, TypeAlias
 from seqopt._cli.screens import question
 from seqopt.engines.registry import ENGINES
 from seqopt.problem.criteria import Among, Ranked
-from seqopt.scene.scene import ORDERS
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import CRITERIA, PUBLISHED
@@ -109,8 +108,8 @@ def scene_options(takes: Takes) -> None:
     declare(takes, {"scene SCENE": known + how}, nargs="?", default="arch25")
     order = (
         "in which order bricks are placed, if not in the scene's own: "
-        f"{', '.join(ORDERS)} (from all ground ends at once), or the names of all bricks, as "
-        "1..12,25..13"
+        "reversed, ends (from all ground ends at once), sides (course by course, from both ends of "
+        "each to its middle), or the names of all bricks, as 1..12,25..13"
     )
     grips = (
         "how stiff the grips of all robots are, if not as the scene says: rigid, or N/m, as 1e6, "

@@ -12,6 +12,7 @@ PATIENCE = 3.0  # s
 COUNTS = range(1, 61)  # how far from a number that is given others are tried
 SHARES = [1.04**k for k in range(1, 37)]  # of a length, up to four times and a quarter of it
 DIGITS = 3
+WHOLE = ("length", "height")  # of whole bricks: their own error says which are
 
 
 def which_fit(make: Callable[[Mapping[str, Any]], object], given: Mapping[str, Any]) -> str:
@@ -30,7 +31,7 @@ def which_fit(make: Callable[[Mapping[str, Any]], object], given: Mapping[str, A
 
     found = []
     for name, value in given.items():
-        for other in _near(value):
+        for other in () if name in WHOLE else _near(value):
             if time.perf_counter() > end:
                 break
             if fits(name, other):

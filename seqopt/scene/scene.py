@@ -475,11 +475,30 @@ def _from_all_ends(scene: Scene) -> Order:
     return tuple(sorted(scene.build_order, key=lambda name: far.get(name, last)))
 
 
+def _from_both_sides(scene: Scene) -> Order:
+    """Return the order that builds course by course, from both ends of each to its middle."""
+    up = np.array(scene.up)
+    places = np.array([brick.position for brick in scene.placed])
+    level = places - np.outer(places @ up, up)
+    axis = np.linalg.svd(level - level.mean(axis=0))[2][0]  # along which it is longest
+    along = np.round(level @ axis * np.sign(axis[np.abs(axis).argmax()]), 6)
+    courses, course = np.unique(np.round(places @ up, 6), return_inverse=True)
+    ends = [along[course == k] for k in range(len(courses))]
+    middle = np.array([0.5 * (each.min() + each.max()) for each in ends])[course]
+    rank = np.lexsort((along, np.round(-np.abs(along - middle), 6), course))
+    return tuple(scene.placed[k].name for k in rank)
+
+
 ORDERS: dict[str, Callable[[Scene], Order]] = {
     "reversed": lambda scene: scene.build_order[::-1],
     "ends": _from_all_ends,
+    "sides": _from_both_sides,
 }
-"""Orders by name: the scene's own from its last brick on, and from all ground ends at once."""
+"""Orders by name.
+
+The scene's own from its last brick on; from all ground ends at once; course by course, from both
+ends of each to its middle.
+"""
 
 
 def _parse_order(scene: Scene, text: str) -> Order:
