@@ -58,7 +58,7 @@ def given_scene(options: argparse.Namespace) -> Scene:
 
 def file_name(name: str | Path, end: str) -> Path:
     """Return what a file about a scene is called where no name is given: in this folder."""
-    return Path(re.sub(r"\W+", "-", Path(name).stem).strip("-") + end)
+    return Path(re.sub(r"\W+", "-", re.sub(r"\.json$", "", Path(name).name)).strip("-") + end)
 
 
 def plan_folder(options: argparse.Namespace, asked: object, *, free: bool = False) -> Path:

@@ -15,6 +15,7 @@ from seqopt.errors import SceneError
 from seqopt.scene._checks import check, not_negative, printable, short, vector, wholes
 from seqopt.scene._grip_kinds import GripKinds, grip_kinds
 from seqopt.scene._loads import Load
+from seqopt.scene._sides import from_both_sides
 from seqopt.scene.holders._durations import _durations_in_words
 from seqopt.scene.holders._props import Prop, centered, settled_props
 from seqopt.scene.parts import Brick, Ground, Joint, Reach, Robot
@@ -475,24 +476,10 @@ def _from_all_ends(scene: Scene) -> Order:
     return tuple(sorted(scene.build_order, key=lambda name: far.get(name, last)))
 
 
-def _from_both_sides(scene: Scene) -> Order:
-    """Return the order that builds course by course, from both ends of each to its middle."""
-    up = np.array(scene.up)
-    places = np.array([brick.position for brick in scene.placed])
-    level = places - np.outer(places @ up, up)
-    axis = np.linalg.svd(level - level.mean(axis=0))[2][0]  # along which it is longest
-    along = np.round(level @ axis * np.sign(axis[np.abs(axis).argmax()]), 6)
-    courses, course = np.unique(np.round(places @ up, 6), return_inverse=True)
-    ends = [along[course == k] for k in range(len(courses))]
-    middle = np.array([0.5 * (each.min() + each.max()) for each in ends])[course]
-    rank = np.lexsort((along, np.round(-np.abs(along - middle), 6), course))
-    return tuple(scene.placed[k].name for k in rank)
-
-
 ORDERS: dict[str, Callable[[Scene], Order]] = {
     "reversed": lambda scene: scene.build_order[::-1],
     "ends": _from_all_ends,
-    "sides": _from_both_sides,
+    "sides": lambda s: from_both_sides(s.build_order, [b.position for b in s.placed], s.up),
 }
 """Orders by name.
 

@@ -99,7 +99,7 @@ def _nobody(scene: Scene, free: Sequence[int], able: Set[int], k: int) -> StepEr
     why = f"brick {brick.name}: {names} {reach} none of its free nodes {nodes}"
     if able and k:
         why += f"; {scene.robots[min(able)].name} does, and holds the brick before"
-    return StepError(f"{why}; extend a reach or let another robot place it")
+    return StepError(f"{why}; extend a reach, or let another robot place it")
 
 
 def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list[int]:
@@ -224,7 +224,7 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     if not free:
         raise StepError(
             f"brick {brick.name}: {robot.name} reaches none of its free nodes {list(brick.nodes)}; "
-            "extend a reach or let another robot place it"
+            "extend a reach, or let another robot place it"
         )
     if isinstance(robot.reach, Side) and brick.name not in lies_along(network):
         toward = np.array(robot.reach.toward)

@@ -74,10 +74,14 @@ class WallShape:
     def _count(self, name: str, extent: str, each: float) -> None:
         """Set how many bricks there are where it is said how long they are together."""
         value = getattr(self, extent)
+        if value is None and not getattr(self, name):
+            raise SceneError(
+                f"wall: {name} is 0 or missing; give a whole number, or {extent} in m in its place"
+            )
         if value is None:
             return
         if getattr(self, name):
-            raise SceneError(f"wall: {name} and {extent} are both given; leave one out")
+            raise SceneError(f"wall: {name} and {extent} are both given; give one")
         check(self, "wall", **{extent: length})
         count = (value + self.gap) / (each + self.gap)
         if abs(count - round(count)) > WHOLE or round(count) < 1:
