@@ -1,3 +1,7 @@
+from seqopt._cli.python import assess as assess
+from seqopt._cli.python import compare as compare
+from seqopt._cli.python import pareto as pareto
+from seqopt._cli.python import replan as replan
 from seqopt.contact.mortar import DRY as DRY
 from seqopt.contact.mortar import EPOXY as EPOXY
 from seqopt.engines.interface import Engine as Engine

@@ -9,6 +9,7 @@ from dataclasses import replace
 import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
+from seqopt._cli.given import given_scene, given_steps
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_payload, parse_robots
 from seqopt._cli.words.props import parse_props
@@ -24,14 +25,12 @@ from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.report.comparison import idle_note
 from seqopt.responses.table import OUTSIDE, REMEDY
 from seqopt.scene.scene import Scene, in_order
-from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.rules import with_robots
-from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import AnyStep, Step
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
-from seqopt.study.published import PUBLISHED, is_reference_arch, published_plan
+from seqopt.study.published import PUBLISHED
 
 
 def scene_facts(scene: Scene) -> dict[str, object]:
@@ -60,7 +59,7 @@ def asked_scene(options: argparse.Namespace, *, ranged: bool = False) -> Scene:
         raise ProblemError(
             "--order search: only the free schedule has it; give optimize --schedule free"
         )
-    scene = in_order(load_scene(options.scene), options.order)
+    scene = in_order(given_scene(options), options.order)
     for text in options.payload:
         scene = parse_payload(text, scene)
     if getattr(options, "robots", "").isdecimal():
@@ -96,22 +95,13 @@ def asked_steps(options: argparse.Namespace, network: Network) -> tuple[Step, ..
     Raises `SceneError`, `StepError` if the method is not for the scene, or robots are named beside
     a plan.
     """
-    scene, robots = network.scene, parse_robots(options.robots)
-    if options.robots and options.method not in METHODS:
+    robots = parse_robots(options.robots)
+    if options.robots and (options.plan is not None or options.method == PUBLISHED):
         raise StepError(
             f"--robots {options.robots}: a plan says itself who holds; leave it out, or give "
             f"--method {' or '.join(METHODS)}"
         )
-    if options.plan is not None:
-        return read_plan(scene, options.plan)
-    if options.method != PUBLISHED:
-        return METHODS[options.method](network, robots)
-    if not is_reference_arch(scene):
-        raise SceneError(
-            f"scene {scene.name}: --method {PUBLISHED} is the printed plan for arch25; "
-            "give --plan FILE for another scene"
-        )
-    return published_plan(scene)
+    return given_steps(options, network, robots)
 
 
 def level_notes(engine: Engine) -> tuple[str, ...]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 import numpy as np
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
+from seqopt._cli.given import plan_name
 from seqopt._cli.outputs import require_out, write_outputs
 from seqopt._cli.values import asked_mortar
 from seqopt._files import csv_text
@@ -36,8 +36,7 @@ def answer_load_factor(options: argparse.Namespace) -> Answer:
 
     def files() -> dict[str, bytes | str]:
         engine = make_engine(USUAL, network, None)
-        name = options.method or Path(options.plan).stem
-        page = load_page(engine, name, steps, found, said)
+        page = load_page(engine, plan_name(options), steps, found, said)
         return {"load_factors.csv": csv_text(table), PAGE: page}
 
     written = write_outputs(options, files)

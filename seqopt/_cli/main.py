@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 from seqopt._cli.answer import Answer, Status, print_answer, status_of
 from seqopt._cli.arguments import COMMANDS, EXAMPLES, asked_command, parser
@@ -57,4 +58,5 @@ def _run(words: Sequence[str]) -> int:
     options.words = (*words,)  # an instance says which ones made it
     with quiet_numbers(quiet=options.quiet), Watcher(shows=not options.quiet) as options.tell:
         answer: Answer = COMMANDS[options.command].load().run(options)
+    answer = replace(answer, notes=(*getattr(options, "taken", ()), *answer.notes))
     return print_answer(answer, options)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
+from seqopt._cli.given import plan_name
 from seqopt._cli.outputs import figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import count_word, mortar_word, number_word
@@ -136,8 +136,7 @@ def _asked_builds(options: argparse.Namespace, scene: Scene) -> tuple[Builds, li
     """Return the builds that are asked for, by name, and why others are not possible."""
     if options.method is None and options.plan is None:
         return usual_builds(scene, options.tell)
-    name = options.method or Path(options.plan).stem
-    return {name: asked_steps(options, build_network(scene))}, []
+    return {plan_name(options): asked_steps(options, build_network(scene))}, []
 
 
 def _files(scene: Scene, builds: Builds, found: FailureMap) -> dict[str, bytes | str]:

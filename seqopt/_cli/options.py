@@ -10,7 +10,6 @@ from typing import Any, TypeAlias
 from seqopt._cli.screens import question
 from seqopt.engines.registry import ENGINES
 from seqopt.problem.criteria import Among, Ranked
-from seqopt.scene.scene import ORDERS
 from seqopt.scene.scene_file import builtin_scenes
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import CRITERIA, PUBLISHED
@@ -88,8 +87,9 @@ DURATIONS = {
     "as rob3:fetch=75 or rob3:slower=2.5 (default: as the scene says)"
 }
 STEPS_USAGE = (
-    "[SCENE] --method NAME [--out FILE] [other options]",
+    "[SCENE] [--method NAME] [--out FILE] [other options]",
     "[SCENE] --plan FILE [--out FILE] [other options]",
+    "PLAN_DIR [--out FILE] [other options]",
 )
 STABILITY = {
     "--no-stability": "do not prove which steps stand, dry and with epoxy (or the mortar of "
@@ -103,13 +103,13 @@ CSV_OUT = {"--out FILE": "CSV file to write (default: standard output)"}
 
 def scene_options(takes: Takes) -> None:
     """Add what says what is built, and in which order."""
-    known = f"a built-in scene ({', '.join(builtin_scenes())}), a JSON file, or a few words such "
-    how = "as arch:span=2,rise=0.8 (default: %(default)s); seqopt scene --list shows all"
+    known = f"a built-in scene ({', '.join(builtin_scenes())}), a JSON file, a plan's folder, or "
+    how = "words as arch:span=2,rise=0.8 (default: %(default)s); seqopt scene --list shows all"
     declare(takes, {"scene SCENE": known + how}, nargs="?", default="arch25")
     order = (
         "in which order bricks are placed, if not in the scene's own: "
-        f"{', '.join(ORDERS)} (from all ground ends at once), or the names of all bricks, as "
-        "1..12,25..13"
+        "reversed, ends (from all ground ends at once), sides (course by course, from both ends of "
+        "each to its middle), or the names of all bricks, as 1..12,25..13"
     )
     grips = (
         "how stiff the grips of all robots are, if not as the scene says: rigid, or N/m, as 1e6, "
@@ -203,16 +203,17 @@ def criterion_options(command: argparse.ArgumentParser) -> None:
     )
 
 
-def steps_options(takes: Takes, *, required: bool = True) -> None:
+def steps_options(takes: Takes) -> None:
     """Add what names a closed sequence of steps."""
-    steps = takes.add_mutually_exclusive_group(required=required)
+    steps = takes.add_mutually_exclusive_group()
     steps.add_argument(
         "--method",
         choices=(*METHODS, PUBLISHED),
         help=f"how it is built: by two robots, or {PUBLISHED}, the three-robot plan that Bruun et "
-        "al. print for arch25",
+        f"al. print for arch25 (default: the first of {', '.join(METHODS)} that fits, or the "
+        "steps of a plan's folder)",
     )
-    plan = "CSV file of the steps: step, type, bricks, and NAME_node for each robot"
+    plan = "a plan's folder, or a CSV file of steps: step, type, bricks, NAME_node of each robot"
     declare(steps, {"--plan FILE": plan})
     robots_option(takes, "--method")
 

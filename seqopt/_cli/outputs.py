@@ -11,6 +11,7 @@ from typing import Any
 
 import pandas as pd
 
+from seqopt._cli.given import is_folder
 from seqopt._files import csv_text, require_apart, require_folder, write_csv, write_folder
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.states.states import States
@@ -199,6 +200,8 @@ def keep_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
 
 def _inputs(options: argparse.Namespace) -> list[Path]:
     """Return the files that a command reads."""
-    scene = None if options.scene in builtin_scenes() else options.scene
-    named = (scene, getattr(options, "plan", None), getattr(options, "schedule", None))
-    return [Path(name) for name in named if name is not None]
+    asked = (options.scene, getattr(options, "plan", None), getattr(options, "schedule", None))
+    named = [Path(name) for name in asked if isinstance(name, str | Path)]
+    folders = [path for path in named if is_folder(path)]
+    inside = [path / name for path in folders for name in ("scene.json", "plan.csv")]
+    return [path for path in (*named, *inside) if str(path) not in builtin_scenes()]

@@ -181,11 +181,13 @@ def parse_numbers(
     return out
 
 
-def parse_limits(texts: Sequence[str], scene: Scene) -> tuple[Limit, ...]:
+def parse_limits(texts: Sequence[str | Limit], scene: Scene) -> tuple[Limit, ...]:
     """Return limits, each from ``payload``, of the scene's robots, or ``RESPONSE=VALUE``, SI."""
     out: list[Limit] = []
     for text in texts:
-        if text == "payload":
+        if isinstance(text, Limit):  # of Python
+            out.append(text)
+        elif text == "payload":
             out += payload_limits(scene)
         else:
             name, value = _split_word(text)
@@ -238,8 +240,10 @@ def asked_mortar(options: argparse.Namespace) -> Mortar:
     return replace(mortar_word(options.mortar, "--mortar"), **given)
 
 
-def mortar_word(text: str, where: str) -> Mortar:
+def mortar_word(text: str | Mortar, where: str) -> Mortar:
     """Return a mortar by its words; ``where`` is the argument, for messages."""
+    if isinstance(text, Mortar):  # of Python
+        return text
     try:
         return find_mortar(text)
     except SceneError as error:
@@ -301,11 +305,13 @@ def asked_criterion(options: argparse.Namespace) -> Criterion:
     return criterion
 
 
-def parse_criterion(text: str, crown: str | None = None) -> Criterion:
+def parse_criterion(text: str | Criterion, crown: str | None = None) -> Criterion:
     """Return a criterion by name, or a rank sum of responses, as ``T_max,M_sup=2``.
 
     A weight is 1 by default; ``crown`` has the bricks placed at the crown, or ``none``.
     """
+    if not isinstance(text, str):  # of Python
+        return text
     if crown is not None:
         named = CRITERIA.get(text)
         if not isinstance(named, RankSum):

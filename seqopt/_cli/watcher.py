@@ -23,7 +23,8 @@ class Watcher:
     """Shows on standard error what a command does, how far it is and how long it will take.
 
     A stage whose share is known has a bar and the time left; of any other the time that it took so
-    far is shown. Nothing is shown unless standard error is a terminal, nor in the first second.
+    far is shown. Nothing is shown unless standard error is a terminal or that of a notebook, nor in
+    the first second.
 
     Examples
     --------
@@ -32,7 +33,7 @@ class Watcher:
     """
 
     def __init__(self, *, shows: bool = True) -> None:
-        self._shows = shows and is_terminal(sys.stderr)
+        self._shows = shows and (is_terminal(sys.stderr) or hasattr(sys.stderr, "pub_thread"))
         self._start = self._told = time.perf_counter()
         self._began: dict[str, tuple[float, float]] = {}  # of each stage, and its last share
         self._stage = Stage("working", -1.0)  # no share is below zero

@@ -49,7 +49,13 @@ RESPONSES = {
     "F_max_N": "largest tension in an edge, N",
     "D_max_1e-3mm": "largest displacement, 1e-3 mm",
 }
-PARTS = {"style": "viewer.css", "three": "three.js", "charts": "charts.js", "viewer": "viewer.js"}
+PARTS = {
+    "style": "viewer.css",
+    "three": "three.js",
+    "charts": "charts.js",
+    "marks": "marks.js",
+    "viewer": "viewer.js",
+}
 MOST = 6_000_000  # numbers of fields in a page: about 8 MB
 NARROW = 600  # pixels up to which a screen shows the narrow form of a picture
 LEFT_OUT = "Displacements and axial forces of some builds are left out"

@@ -15,6 +15,7 @@ from seqopt.errors import SceneError
 from seqopt.scene._checks import check, not_negative, printable, short, vector, wholes
 from seqopt.scene._grip_kinds import GripKinds, grip_kinds
 from seqopt.scene._loads import Load
+from seqopt.scene._sides import from_both_sides
 from seqopt.scene.holders._durations import _durations_in_words
 from seqopt.scene.holders._props import Prop, centered, settled_props
 from seqopt.scene.parts import Brick, Ground, Joint, Reach, Robot
@@ -478,8 +479,13 @@ def _from_all_ends(scene: Scene) -> Order:
 ORDERS: dict[str, Callable[[Scene], Order]] = {
     "reversed": lambda scene: scene.build_order[::-1],
     "ends": _from_all_ends,
+    "sides": lambda s: from_both_sides(s.build_order, [b.position for b in s.placed], s.up),
 }
-"""Orders by name: the scene's own from its last brick on, and from all ground ends at once."""
+"""Orders by name.
+
+The scene's own from its last brick on; from all ground ends at once; course by course, from both
+ends of each to its middle.
+"""
 
 
 def _parse_order(scene: Scene, text: str) -> Order:

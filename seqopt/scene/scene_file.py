@@ -25,16 +25,18 @@ from seqopt._files import read_text, write_text
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import cut, reading_json, short
+from seqopt.scene._fitting import which_fit
 from seqopt.scene._loads import Load
 from seqopt.scene.arm import Arm
 from seqopt.scene.holders._durations import Durations
 from seqopt.scene.holders._props import Prop
+from seqopt.scene.library._barrel import BarrelShape, barrel
 from seqopt.scene.library.arch_form import ArchForm, arch, barrel_vault, chain
 from seqopt.scene.library.dome import DomeShape, dome
 from seqopt.scene.library.vault import VaultShape, herringbone_vault
 from seqopt.scene.library.wall import WallShape, wall
 from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Reach, Robot, Side, Sphere
-from seqopt.scene.scene import Scene
+from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.shape import Polyhedron
 
 _ONE_PLACE = 0.25  # distance of centroids treated as zero, over the smallest dimension
@@ -173,12 +175,29 @@ class _Kind:
 _MESHES = {".obj": True, ".off": True, ".ply": True, ".stl": True} | dict.fromkeys(
     (".3dm", ".3mf", ".glb"), False
 )  # and whether one has to say its unit
+def _herringbone(shape: VaultShape) -> Scene:
+    """Return a herringbone vault around the arch of Bruun et al."""
+    return herringbone_vault(_load_stored("arch25"), shape)
+
+
 KINDS = {
     "arch": _Kind("an arch by span and rise: arch:span=2,rise=0.7,curve=catenary", arch, ArchForm),
     "barrel": _Kind("one of the eight tested barrel vaults: barrel:test=3", barrel_vault),
     "chain": _Kind("an arch of any number of bricks that turn evenly: chain:bricks=40", chain),
     "dome": _Kind("a dome: dome:courses=6,around=20,bond=herringbone", dome, DomeShape),
-    "wall": _Kind("a wall in running bond: wall:columns=6,courses=4,corbel=0.02", wall, WallShape),
+    "herringbone": _Kind(
+        "a herringbone vault that grows from arch25: herringbone:bricks=100",
+        _herringbone,
+        VaultShape,
+    ),
+    "vault": _Kind(
+        "a barrel vault in running bond: vault:span=2,rise=0.8,columns=3", barrel, BarrelShape
+    ),
+    "wall": _Kind(
+        "a wall in running bond: wall:columns=6,courses=4,corbel=0.02, or wall:length=2,height=0.6",
+        wall,
+        WallShape,
+    ),
 }
 
 
@@ -187,10 +206,12 @@ def _vector(text: str) -> Vector:
     return x, y, z
 
 
+ORDER = "order"  # of any kind: in which bricks are placed
 _READ: dict[Any, tuple[Callable[[str], Any], str]] = {
     int: (int, "12"),
     int | None: (int, "12"),
     float: (float, "0.5"),
+    float | None: (float, "0.5"),
     str: (str, "a word"),
     Vector: (_vector, "0.2x0.1x0.06"),
 }  # by what a number is: how it is read, and an example
@@ -198,11 +219,16 @@ _READ: dict[Any, tuple[Callable[[str], Any], str]] = {
 
 def _scene_by_words(words: str) -> Scene:
     """Return the scene of a key of `KINDS`, a colon, and ``name=value`` parted by commas."""
+    name, given = words.partition(":")[0], _in_words(words)
+    order = given.pop(ORDER, None)
     try:
-        scene = _made_of_words(words.partition(":")[0], _in_words(words))
+        scene = _made_of_words(name, given)
     except OverflowError as error:
         raise SceneError(f"scene {words}: its numbers are too large; give smaller ones") from error
-    return replace(scene, provenance=f"{scene.provenance} In words: {words}.")
+    except SceneError as error:
+        raise SceneError(f"{error}{which_fit(partial(_made_of_words, name), given)}") from error
+    made = in_order(scene, order)
+    return replace(made, provenance=f"{scene.provenance} In words: {words}.")
 
 
 def _made_of_words(name: str, given: Mapping[str, Any]) -> Scene:
@@ -223,11 +249,11 @@ def _in_words(words: str) -> dict[str, Any]:
     given: dict[str, Any] = {}
     for part in filter(None, rest.split(",")):
         key, _, text = part.partition("=")
-        if key not in numbers or key in given:
+        if key not in (*numbers, ORDER) or key in given:
             hint = did_you_mean(key, numbers)
             what = "is given twice" if key in given else f"is none of its numbers{hint}"
-            raise SceneError(f"scene {words}: {key!r} {what}; give {', '.join(numbers)}")
-        read, example = _READ[numbers[key].annotation]
+            raise SceneError(f"scene {words}: {key!r} {what}; give {', '.join((*numbers, ORDER))}")
+        read, example = _READ[str if key == ORDER else numbers[key].annotation]
         try:
             given[key] = read(text)
         except ValueError:

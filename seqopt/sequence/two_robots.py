@@ -19,6 +19,7 @@ from seqopt.network.build import network_of
 from seqopt.network.network import Network, PartKind
 from seqopt.scene.parts import Brick, Robot, Side
 from seqopt.scene.scene import Scene
+from seqopt.sequence._reach import says_reach
 from seqopt.sequence.schedule import acting_bodies, check_support
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 
@@ -98,7 +99,7 @@ def _nobody(scene: Scene, free: Sequence[int], able: Set[int], k: int) -> StepEr
     why = f"brick {brick.name}: {names} {reach} none of its free nodes {nodes}"
     if able and k:
         why += f"; {scene.robots[min(able)].name} does, and holds the brick before"
-    return StepError(f"{why}; extend a reach or let another robot place it")
+    return StepError(f"{why}; extend a reach, or let another robot place it")
 
 
 def cast(scene: Scene, roles: Sequence[Set[int]], robots: Sequence[int]) -> list[int]:
@@ -223,7 +224,7 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     if not free:
         raise StepError(
             f"brick {brick.name}: {robot.name} reaches none of its free nodes {list(brick.nodes)}; "
-            "extend its reach or let another robot place it"
+            "extend a reach, or let another robot place it"
         )
     if isinstance(robot.reach, Side) and brick.name not in lies_along(network):
         toward = np.array(robot.reach.toward)
@@ -231,6 +232,7 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     return brick.placing_node if brick.placing_node in free else free[0]
 
 
+@says_reach
 def sequential(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[Step, ...]:
     """Two robots take turns: one places the next brick while the other holds the last one.
 
@@ -269,6 +271,7 @@ def sequential(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     return _two_robots(network, "sequential", every, robots)
 
 
+@says_reach
 def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[Step, ...]:
     """One robot holds, the other places bricks up to one that lies along; then they swap.
 

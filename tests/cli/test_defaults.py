@@ -99,3 +99,58 @@ def test_a_chain_that_opens_its_joints_has_a_plan_in_python_too():
     """The engine that opens joints is taken where it is asked for."""
     plan = seqopt.optimize("chain:bricks=75", "three-robot", formulation="cascade")
     assert len(plan.steps) == 290
+
+
+def test_compare_in_python_is_the_command(capsys, arch):
+    found = answered(capsys, "compare", arch, "--no-stability", "--criteria", "worst-ratio")
+    same = seqopt.compare(arch, no_stability=True, criterion="worst-ratio")
+    assert [row["name"] for row in found["rows"]] == [*same.table.index]
+    assert [row["F_rob"] for row in found["rows"]] == [*same.table["F_rob"]]
+
+
+def test_pareto_in_python_is_the_command(capsys, arch, tmp_path):
+    words = ("--aim", "F_largest,steps", "--rule", "least_grips=1")
+    found = answered(capsys, "pareto", arch, *words)["points"]
+    same = seqopt.pareto(seqopt.load_scene(arch), aim="F_largest,steps", least_grips=1)
+    assert [row["F_largest"] for row in found] == [*same.table["F_largest"]]
+    seqopt.pareto(
+        arch, aim="F_largest,M_sup", limits=[seqopt.Limit("F_largest", 1e6)], out=tmp_path / "set"
+    )
+    assert (tmp_path / "set" / "pareto.csv").is_file()
+
+
+def test_assess_in_python_is_the_command(capsys, arch, tmp_path):
+    plan = seqopt.optimize(arch, "free")
+    assert main(["optimize", str(arch), "--schedule", "free", "--out", str(tmp_path / "p")]) == 0
+    capsys.readouterr()
+    found = answered(capsys, "assess", tmp_path / "p", "--margins", "bond")["steps"]
+    for built in (plan, tmp_path / "p"):
+        same = seqopt.assess(built, mortar=seqopt.EPOXY, margins="bond")
+        assert [row["verdict"] for row in found] == [*same["verdict"]]
+    assert set(seqopt.assess(arch, map="friction=0.5,0.9", holds="dry")["value"]) == {0.5, 0.9}
+
+
+def test_replan_in_python_is_the_command(capsys, arch, tmp_path):
+    plan = seqopt.optimize(arch, "free")
+    assert main(["optimize", str(arch), "--schedule", "free", "--out", str(tmp_path / "p")]) == 0
+    capsys.readouterr()
+    words = ("--at", "4", "--lost", "rob3", "--rule", "least_grips=1")
+    found = answered(capsys, "replan", tmp_path / "p", *words)
+    for built in (plan, tmp_path / "p"):
+        same = seqopt.replan(built, at=4, lost=["rob3"], least_grips=1)
+        assert [row["step"] for row in found["plan"]] == [step.number for step in same.steps]
+
+
+def test_a_word_that_python_does_not_know_names_those_that_it_does():
+    with pytest.raises(seqopt.SeqoptError, match=r"^pareto has no 'aims' \(did you mean aim\?\)"):
+        seqopt.pareto("arch25", aims="D_max")
+    with pytest.raises(seqopt.SeqoptError, match=r"^engine 'complianc' does not exist .*give "):
+        seqopt.pareto("arch25", engine="complianc")
+    with pytest.raises(seqopt.SeqoptError, match=r"^scene arch26: no such"):
+        seqopt.assess("arch26")
+
+
+def test_whoever_waits_for_python_is_told(arch):
+    told = []
+    seqopt.compare(arch, no_stability=True, progress=told.append)
+    assert {each.what for each in told if isinstance(each, Stage)} >= {"comparing"}

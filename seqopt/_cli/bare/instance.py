@@ -9,11 +9,12 @@ from pathlib import Path
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.commands import optimize
+from seqopt._cli.given import file_name, take
 from seqopt._cli.options import WRITTEN, declare
+from seqopt._cli.outputs import keep_apart
 from seqopt._cli.posing import asked_problem
 from seqopt._cli.screens import question
 from seqopt._cli.values import number_word
-from seqopt._files import require_apart
 from seqopt.errors import ProblemError
 from seqopt.graph.instances._files import WRITERS, save_instance
 from seqopt.plan._bare._compiled import compile_instance
@@ -25,7 +26,7 @@ DESCRIPTION = (
     "what is capped. Whoever reads it needs no scene. The options are those of optimize; what "
     "concerns the search alone is left aside."
 )
-USAGE = ("[SCENE] --out FILE [options of optimize]",)
+USAGE = ("[SCENE] [--out FILE] [options of optimize]",)
 EXAMPLES = (
     "seqopt instance arch25 --out arch25.npz",
     "seqopt instance arch25 --budget travel=0.8 --out arch25.mps",
@@ -42,7 +43,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``instance``: those of ``optimize``, and how it is written."""
     optimize.add_arguments(command)
     out = next(action for action in command._actions if action.dest == "out")
-    out.metavar, out.help, out.required = "FILE", OUT, True
+    out.metavar, out.help = "FILE", OUT
     about = {
         "--name NAME": "what it is called (default: as the file)",
         "--below VALUE": "leave out states of which the first aim, a worst step, takes more; "
@@ -53,14 +54,17 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Answer:
     """Write the instance of the problem that is asked for."""
-    path = Path(options.out)
-    if path.suffix not in ("", *WRITERS):
+    path = options.out and Path(options.out)
+    if path and path.suffix not in ("", *WRITERS):
         raise ProblemError(f"--out {path}: give a name with {', '.join(WRITERS)}, or a folder")
     if options.bases is not None:
         raise ProblemError("--bases: an instance is of one scene; leave it out")
     below = number_word(options.below, "--below") if options.below is not None else float("inf")
     options.out, options.command = None, "optimize"
     problem = asked_problem(options).problem
+    if path is None:
+        path = file_name(problem.engine.network.scene.name, ".npz")
+        take(options, f"file: {path}; --out names another, or a folder for every format")
     named = None if options.formulation is None else find_formulation(options.formulation)
     options.tell("computing all that arcs take")
     aim = None if named is None else named.aim
@@ -68,8 +72,7 @@ def run(options: argparse.Namespace) -> Answer:
     name = options.name or path.stem
     instance = compile_instance(problem, name=name, aim=aim, below=below, facts=facts)
     options.tell("writing the instance")
-    scene = Path(options.scene or "")
-    require_apart([path], [scene] if scene.is_file() else [])
+    keep_apart(options, path)
     save_instance(instance, path)
     limited = ", ".join(f"{name} {most:g}" for name, _, most in first_stage(instance).limited)
     lines = [f"{instance!r}".strip("<>"), *([f"capped: {limited}"] if limited else [])]

@@ -73,7 +73,7 @@ OF_ASKED = "One of: --margins with --steps, --load-factor, and --map with --hold
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``assess``."""
     scene_options(question(command, BUILT))
-    steps_options(question(command, MOVES, "--map goes without these too."), required=False)
+    steps_options(question(command, MOVES))
     holds = question(command, HOLDS, OF_HOLDS)
     holds.add_argument(
         "--mortar",
@@ -92,8 +92,6 @@ def run(options: argparse.Namespace) -> Answer:
     """Assess every step of a sequence, or map builds; tables are written whatever the verdicts."""
     if options.map is not None:
         return answer_map(options)
-    if options.method is None and options.plan is None:
-        raise ProblemError("nothing to assess: give --method NAME, --plan FILE, or --map friction")
     if options.load_factor:
         return answer_load_factor(options)
     keep_apart(options, options.out)

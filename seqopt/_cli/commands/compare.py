@@ -6,7 +6,6 @@ import argparse
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -45,6 +44,7 @@ from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import _parse_grip_range, asked_criterion, parse_robots, speed_seconds
 from seqopt.arms.reach import find_postures
+from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import FormulationKind, formulations
@@ -57,7 +57,7 @@ from seqopt.report.text import format_details
 from seqopt.responses.table import builds_in_words
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
-from seqopt.stability._builds import BuildVerdicts
+from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
 from seqopt.study.published import PUBLISHED
 
@@ -117,7 +117,13 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Answer:
     """Compare all ways to build a scene."""
-    grips, seconds = _parse_grip_range(options.grips), speed_seconds(options.speed)
+    return answered(options, *find(options))
+
+
+def find(options: argparse.Namespace) -> tuple[Engine, Criterion, BuildProver, Comparison]:
+    """Compare all ways to build a scene; with what it is compared by."""
+    _parse_grip_range(options.grips)  # said before anything is computed
+    seconds = speed_seconds(options.speed)
     scene = asked_scene(options, ranged=True)
     find_postures(scene, options.cache, options.tell)
     engine = asked_engine(options, build_network(scene))
@@ -126,13 +132,28 @@ def run(options: argparse.Namespace) -> Answer:
     prover = asked_prover(options, engine.network)
     robots = parse_robots(options.robots)
     result = compare(engine, criterion, options.tell, robots, prover, seconds)
-    about = {"scene": scene.name, "criteria": _criteria(result), **provenance(engine)}
-    blocks, headings = _sections(result, scene, criterion, details=options.details)
+    return engine, criterion, prover, result
+
+
+def answered(
+    options: argparse.Namespace,
+    engine: Engine,
+    criterion: Criterion,
+    prover: BuildProver,
+    result: Comparison,
+) -> Answer:
+    """Write a comparison, and return what is in it."""
+    scene, grips = engine.network.scene, _parse_grip_range(options.grips)
+    criteria = {k: {"criterion": c.name, **c.settings} for k, c in result.criteria.items()}
+    about = {"scene": scene.name, "criteria": criteria, **provenance(engine)}
+    text, headings = _tell(result, scene, criterion)
+    blocks = [text, format_details(result, scene)] if options.details else [text]
+    if result.speed is not None:
+        blocks.append("\n".join([SPEED, *result.speed.told(wrapped)]))
     softly = held_softly(engine, _shown_tables(result), grips, options.tell)
     turns = turning_points(softly, _fixed(result)) if grips else ()
     if grips:
         blocks += _softly(softly, turns)
-        headings = (*headings, SOFTLY, TURNS)
     written: tuple[Path, ...] = ()
     if options.out is not None:
         options.tell("drawing figures")
@@ -150,7 +171,7 @@ def run(options: argparse.Namespace) -> Answer:
         | ({"grips": {"rows": softly, "turns": list(turns)}} if grips else {})
         | ({} if result.speed is None else {"speed": result.speed.facts()}),
         text="\n\n".join(blocks),
-        headings=headings,
+        headings=(*headings, SPEED, SOFTLY, TURNS),
         written=written,
         notes=(
             *level_notes(engine),
@@ -163,17 +184,6 @@ def run(options: argparse.Namespace) -> Answer:
     over = exceeded(scene, *result.tables.values())
     left = builds_in_words(result.departures)
     return strictly(answer, options, over, left, result.verdicts)
-
-
-def _sections(
-    result: Comparison, scene: Scene, criterion: Criterion, *, details: bool
-) -> tuple[list[str], tuple[str, ...]]:
-    """Return what a comparison found as blocks of lines, and their headings."""
-    text, headings = _tell(result, scene, criterion)
-    blocks = [text, format_details(result, scene)] if details else [text]
-    if result.speed is not None:
-        blocks.append("\n".join([SPEED, *result.speed.told(wrapped)]))
-    return blocks, (*headings, SPEED)
 
 
 def _softly(table: pd.DataFrame, turns: Sequence[str]) -> list[str]:
@@ -209,25 +219,18 @@ def _where(folder: Path, *, speed: bool) -> str:
     ) + ("" if figure_notes() else "\n  *.png, *.svg: the figures")
 
 
-def _criteria(result: Comparison) -> dict[str, object]:
-    """Return the criteria of the rows that have an objective, with all of their numbers."""
-    return {
-        problem: {"criterion": criterion.name, **criterion.settings}
-        for problem, criterion in result.criteria.items()
-    }
-
-
 def _facts(result: Comparison) -> dict[str, object]:
     """Return rows, notes and what the paper prints, for scripts."""
     table = result.table.assign(
         steps=[len(result.tables[name]) for name in result.table.index],
         paper=pd.Series({name: _printed_largest(result, name) for name in result.table.index}),
     )
-    loop = result.loop
+    loop, printed = result.loop, result.printed
+    paper = None if printed is None else printed.set_axis(result.maxima.columns, axis=1)
     return {
         "rows": table.rename_axis("name").reset_index(),
         "largest_by_robot": result.maxima.to_dict(),
-        "paper_by_robot": _paper(result),
+        "paper_by_robot": None if paper is None else paper.to_dict(),
         "loop": None
         if loop is None
         else {
@@ -240,13 +243,6 @@ def _facts(result: Comparison) -> dict[str, object]:
         "enough": result.enough.facts(),
         "findings": list(result.notes),
     }
-
-
-def _paper(result: Comparison) -> dict[Any, Any] | None:
-    """Return the largest responses that the paper prints, if any, by method and quantity."""
-    if result.printed is None:
-        return None
-    return result.printed.set_axis(result.maxima.columns, axis=1).to_dict()
 
 
 def _tell(

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import scene_facts
+from seqopt._cli.given import plan_folder
 from seqopt._cli.options import WRITTEN, declare, form_options
 from seqopt._cli.screens import question
 from seqopt._cli.values import number_word
@@ -46,36 +47,39 @@ SOURCE = {
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``export``."""
     basic = question(command, "Which plan, and in which format?")
-    declare(basic, {"folder PLAN_DIR": "folder of a plan"})
-    said = f"what to write: {', '.join(EXPORTS)}"
-    basic.add_argument("--format", choices=EXPORTS, required=True, metavar="NAME", help=said)
+    about = "folder of a plan; of a scene, in its place, the usual steps are taken"
+    declare(basic, {"folder PLAN_DIR|SCENE": about})
+    said = f"what to write: {', '.join(EXPORTS)} (default: %(default)s)"
+    basic.add_argument("--format", choices=EXPORTS, default="csv", metavar="NAME", help=said)
     declare(basic, SOURCE)
     declare(basic, DISTANCE | POSTURES)
-    declare(question(command, WRITTEN), {"--out FILE": "file to write"}, required=True)
+    about = "file to write (default: standard output)"
+    declare(question(command, WRITTEN), {"--out FILE": about})
     form_options(command)
 
 
 def run(options: argparse.Namespace) -> Answer:
     """Write the plan of a folder in a format of others."""
-    inputs = [options.folder / name for name in ("scene.json", "plan.csv")]
-    require_apart([options.out], [*inputs, *filter(None, [options.source])])
-    scene, steps = read_folder(options.folder)
+    folder = plan_folder(options, options.folder)
+    inputs = [folder / name for name in ("scene.json", "plan.csv")]
+    outputs = [*filter(None, [options.out])]
+    require_apart(outputs, [*inputs, *filter(None, [options.source])])
+    scene, steps = read_folder(folder)
     given = options.distance
     distance = None if given is None else number_word(given, f"--distance {given}")
     notes, postures = _arms(options, scene, steps)
     text = export_plan(scene, steps, options.format, options.source, distance, postures)
-    write_text(options.out, text)
     said, lost = f"{len(steps)} steps", LOST.get(options.format)
     if lost:
         said = f"{len(scene.bricks)} blocks, without {', '.join(lost)},"
     elif lost is not None:
         said = f"the scene and its {len(steps)} steps"
-    return Answer(
-        facts={"scene": scene_facts(scene), "steps": len(steps), "format": options.format},
-        text=f"{said} written to {options.out}",
-        written=(options.out,),
-        notes=notes,
-    )
+    facts = {"scene": scene_facts(scene), "steps": len(steps), "format": options.format}
+    if options.out is None:
+        return Answer(facts=facts | {"text": text}, data=text, notes=notes)
+    write_text(options.out, text)
+    said = f"{said} written to {options.out}"
+    return Answer(facts=facts, text=said, written=(options.out,), notes=notes)
 
 
 def _arms(

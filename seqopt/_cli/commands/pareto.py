@@ -31,14 +31,14 @@ from seqopt._cli.outputs import figure_notes, write_outputs, written_to
 from seqopt._cli.posing import asked_problem
 from seqopt._cli.screens import question
 from seqopt._cli.values import parse_numbers
-from seqopt._files import csv_text, require_folder
+from seqopt._files import csv_text
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.graph.states.states import States
 from seqopt.plan.front import Front, find_front, pick
 from seqopt.plan.solving import states_of
-from seqopt.problem.problem import judged_by
+from seqopt.problem.problem import Problem, judged_by
 from seqopt.report._pages import PAGE, front_page
 from seqopt.report.comparison import fixed_methods, shown_table, worst_of
 from seqopt.responses.table import LinearRange, analyze, builds_in_words
@@ -49,13 +49,14 @@ from seqopt.stability._builds import BuildProver
 from seqopt.stability.assessment import Verdict
 from seqopt.work.progress import with_progress, within
 
+MOST_ROWS = 30  # of a table on the terminal
 FOUR = "F_largest,M_sup,T_max,D_max"
 DESCRIPTION = (
     "Find every plan of the free schedule, or of a sequence with open grips, that no other plan "
     "beats in all aims at once (the Pareto set); check each, and write a table, the plans, a chart "
     "and a page for the browser."
 )
-USAGE = ("[SCENE] --out DIR [--aim NAME,NAME] [other options]",)
+USAGE = ("[SCENE] [--out DIR] [--aim NAME,NAME] [other options]",)
 EXAMPLES = (
     "seqopt pareto arch25 --out front",
     "seqopt pareto arch25 --pick D_max --under F_largest=250 --out front",
@@ -97,21 +98,32 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     declare(question(command, HOLDS, OF_HOLDS), LIMIT | STANDING)
     declare(question(command, PROVES), SECONDS, default="inf", type=float)
     engine_options(command)
-    declare(question(command, WRITTEN), {"--out DIR": "folder to write"}, required=True)
+    declare(question(command, WRITTEN), {"--out DIR": "folder to write"})
     form_options(command, builds=True)
     command.set_defaults(criteria=None, crown=None)
 
 
 def run(options: argparse.Namespace) -> Answer:
     """Find all plans that no other beats in every aim, and write them."""
-    require_folder(options.out)
-    asked = asked_problem(options)
-    scene, free = asked.scene, states_of(asked.problem)
+    return answered(options, *find(options))
+
+
+def find(options: argparse.Namespace) -> tuple[Problem, Front]:
+    """Find all plans that no other beats in every aim; with the problem that they are plans of."""
+    problem = asked_problem(options).problem
+    free = states_of(problem)
     rounding = parse_numbers("--round", options.round, [str(goal) for goal in free.goals])
     seconds = float(options.seconds)
     front = find_front(
-        asked.problem, rounding=rounding, seconds=seconds, progress=within(options.tell, seconds)
+        problem, rounding=rounding, seconds=seconds, progress=within(options.tell, seconds)
     )
+    return problem, front
+
+
+def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Answer:
+    """Write a Pareto set, and return what is in it."""
+    free = states_of(problem)
+    scene = free.engine.network.scene
     methods = fixed_methods(free.engine)
     provers = {own: asked_prover(options, own.network) for own in {*front.engines}}
     files, left = _front_files(front, free, methods, provers, options)
@@ -125,7 +137,9 @@ def run(options: argparse.Namespace) -> Answer:
         picked = {"point": chosen + 1, **values}
         row = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
         said += f"; picked row {chosen + 1}: {row}"
-    write_outputs(options, lambda: files | {"scene.json": dump_scene(scene)})
+    written = write_outputs(options, lambda: files | {"scene.json": dump_scene(scene)})
+    shown = "" if written else f"{_numbered(front).to_string(max_rows=MOST_ROWS)}\n"
+    missing = figure_notes() if written else ()
     answer = Answer(
         facts={
             "scene": scene_facts(scene),
@@ -134,9 +148,9 @@ def run(options: argparse.Namespace) -> Answer:
             "points": shown_table(front.table),
             "picked": picked,
         },
-        text=f"{said}; {written_to(options.out)}",
-        written=(options.out,),
-        notes=(*level_notes(free.engine), *refused(next(iter(provers.values()))), *figure_notes()),
+        text=f"{shown}{said}; {written_to(options.out)}",
+        written=written,
+        notes=(*level_notes(free.engine), *refused(next(iter(provers.values()))), *missing),
     )
     return marked(answer, left)
 
@@ -174,8 +188,7 @@ def _front_files(
         **posed,
         **provenance(engine),
     }
-    numbered = shown_table(front.table)
-    numbered.insert(0, "point", range(1, len(numbered) + 1))
+    numbered = _numbered(front).reset_index()
     for each in [*zip(*verdicts, strict=True)]:
         numbered[f"falls_{each[0].mortar}"] = [found.count(Verdict.FALLS) for found in each]
     if said:
@@ -191,6 +204,12 @@ def _front_files(
         **_picture(front, methods),
         "summary.json": json.dumps(summary, indent=2) + "\n",
     }, said
+
+
+def _numbered(front: Front) -> pd.DataFrame:
+    """Return the table of a Pareto set, its points counted from 1."""
+    table = shown_table(front.table)
+    return table.set_axis(pd.RangeIndex(1, len(table) + 1, name="point"))
 
 
 def _picture(front: Front, methods: Mapping[str, pd.DataFrame]) -> Mapping[str, bytes | str]:

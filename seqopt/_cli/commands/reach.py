@@ -19,8 +19,8 @@ from seqopt.arms.reach import find_postures
 from seqopt.scene.scene import Scene
 
 DESCRIPTION = (
-    "Say which robots reach which nodes with their arms, with how many postures, and up to how "
-    "many bricks. Robots have arms in the scene file; the extra arms computes postures."
+    "Say which robots reach which nodes; of those with arms, with how many postures, and up to "
+    "how many bricks. Robots have arms in the scene file; the extra arms computes postures."
 )
 EXAMPLES = ("seqopt reach my.json --out reach", "seqopt reach my.json --cache postures --json")
 WRITTEN = {"--out DIR": "folder to write reach.csv, postures.csv and a picture to"}
@@ -39,33 +39,57 @@ def run(options: argparse.Namespace) -> Answer:
     scene = asked_scene(options)
     require_out(options)
     find_postures(scene, options.cache, options.tell)
-    table = reach_table(scene)
+    table = reach_table(scene) if scene.has_arms else _without_arms(scene)
     written = write_outputs(options, lambda: _files(scene, table))
-    lines = [*_described(scene, table)]
+    lines = [*(_described if scene.has_arms else _covered)(scene, table)]
     if written:
-        lines.append(f"written to {options.out}: reach.csv, postures.csv")
+        names = "reach.csv, postures.csv" if scene.has_arms else "reach.csv"
+        lines.append(f"written to {options.out}: {names}")
     else:
-        lines.append("--out DIR writes a row for every robot and node, and every posture")
+        lines.append("--out DIR writes a row for every robot and node, and postures of arms")
     return Answer(
         facts={"scene": scene_facts(scene), "reach": table},
         text="\n".join(map(wrapped, lines)),
         written=written,
-        notes=figure_notes() if written else (),
+        notes=figure_notes() if written and scene.has_arms else (),
     )
 
 
 def _files(scene: Scene, table: pd.DataFrame) -> dict[str, bytes | str]:
     """Return the tables, and the picture if it can be drawn, by file name."""
-    files: dict[str, bytes | str] = {
-        "reach.csv": csv_text(table),
-        "postures.csv": csv_text(find_table(scene).table()),
-    }
+    files: dict[str, bytes | str] = {"reach.csv": csv_text(table)}
+    if not scene.has_arms:
+        return files
+    files["postures.csv"] = csv_text(find_table(scene).table())
     if figure_notes():
         return files
     from seqopt.report._reach import reach_picture  # noqa: PLC0415  # matplotlib is an extra
     from seqopt.report._style import picture_files  # noqa: PLC0415
 
     return files | picture_files("reach", reach_picture(table))
+
+
+def _without_arms(scene: Scene) -> pd.DataFrame:
+    """Return which nodes lie within the reach of each robot, a row for each."""
+    rows = (
+        {"robot": robot.name, "brick": brick.name, "node": node, "reached": node in reached}
+        for robot in scene.robots
+        for brick, reached in zip(scene.placed, scene.within_reach(robot), strict=True)
+        for node in brick.nodes
+        if node not in scene.blocked_nodes
+    )
+    return pd.DataFrame(rows)
+
+
+def _covered(scene: Scene, table: pd.DataFrame) -> Iterator[str]:
+    """Yield how much lies within the reach of each robot, none of which has an arm."""
+    yield f"no robot of {scene.name} has an arm: this is the reach that the scene gives them"
+    for robot, (_, rows) in zip(scene.robots, table.groupby("robot", sort=False), strict=True):
+        kind = type(robot.reach).__name__.lower()
+        yield f"{robot.name}: reach {kind}, {rows['reached'].sum()} of {len(rows)} nodes"
+        lacking = [str(node) for node in rows["node"][~rows["reached"]]]
+        if lacking:
+            yield f"  never: {_listed(lacking)}"
 
 
 def _described(scene: Scene, table: pd.DataFrame) -> Iterator[str]:

@@ -14,6 +14,7 @@ from typing import Any
 from seqopt._cli.answer import Answer
 from seqopt._cli.arguments import parser
 from seqopt._cli.commands import optimize
+from seqopt._cli.given import plan_folder
 from seqopt._cli.options import (
     BEST,
     CURING,
@@ -53,13 +54,16 @@ DESCRIPTION = (
     "carries less or is new, a brick is missing. Any robot may release, hold or place next; aims, "
     "criterion and rules are those of the plan, if nothing else is said."
 )
-USAGE = ("PLAN_DIR --at STEP [changes] [--out DIR] [other options]",)
+USAGE = ("PLAN_DIR [--at STEP] [changes] [--out DIR] [other options]",)
 EXAMPLES = (
     "seqopt replan free --at 12 --lost rob3 --rule least_grips=1",
     "seqopt replan free --at 12 --payload rob1=250 --out weaker",
     "seqopt replan free --at 12 --robots 4 --missing 9",
 )
-PLACE = {"plan PLAN_DIR": "folder that optimize wrote: its plan, scene and summary"}
+PLACE = {
+    "plan PLAN_DIR|SCENE": "folder that optimize wrote: its plan, scene and summary; in "
+    "place of it a scene, for which the best free schedule is planned first"
+}
 CHANGES = {
     "--lost ROBOT ...": "robot that lets go and takes no further part",
     "--payload NEWTON ...": "what every robot may carry from now on, or as rob1=250 one",
@@ -79,7 +83,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``replan``."""
     basic = question(command, "Which plan, and where does it stand?")
     declare(basic, PLACE)
-    declare(basic, {"--at STEP": "number of the last step that was done"}, required=True)
+    about = "number of the last step that was done (default: %(default)s)"
+    declare(basic, {"--at STEP": about}, default="1")
     declare(question(command, "What has changed?"), CHANGES)
     declare(question(command, MOVES), RULE | DURATIONS)
     declare(question(command, BEST, "As before, where nothing is said."), AIM)
@@ -93,18 +98,31 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Answer:
     """Plan the rest of a build, and say what changes."""
+    return answered(options, *find(options))
+
+
+def find(options: argparse.Namespace) -> tuple[argparse.Namespace, optimize.Found]:
+    """Plan the rest of a build; with what was asked, as words of ``optimize``."""
+    options.plan = plan_folder(options, options.plan, free=True)
     scene_file = options.plan / "scene.json"
     scene = load_scene(scene_file)
-    steps = read_plan(scene, options.plan / "plan.csv")
     for name in ("at", "robots"):
         if not (getattr(options, name) or "0").isdecimal():
             raise StepError(f"--{name} {getattr(options, name)}: give a number")
     base = _as_optimize(options, scene_file)
     try:
-        found = optimize.find(base)
+        return base, optimize.find(base)
     except InfeasibleError as error:
         asked = int(options.robots or 0)
         raise InfeasibleError(f"{error}{_with_another(base, scene, asked)}") from None
+
+
+def answered(
+    options: argparse.Namespace, base: argparse.Namespace, found: optimize.Found
+) -> Answer:
+    """Write the new plan, and say what it changes."""
+    scene = load_scene(options.plan / "scene.json")
+    steps = read_plan(scene, options.plan / "plan.csv")
     answer = optimize.answered(base, found)
     old = [step for step in steps if step.number > int(options.at)]
     facts = compared(found.plan, old)

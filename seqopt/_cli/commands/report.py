@@ -7,6 +7,7 @@ from pathlib import Path
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import asked_engine, asked_prover, asked_scene, scene_facts
+from seqopt._cli.given import file_name, plan_folder
 from seqopt._cli.options import BUILT, WRITTEN, declare, engine_options, form_options, scene_options
 from seqopt._cli.outputs import figure_notes, keep_apart
 from seqopt._cli.screens import question
@@ -26,9 +27,12 @@ EXAMPLES = (
 )
 
 
-FOLDER = {"folder DIR": "folder that holds plans as CSV"}
+FOLDER = {
+    "folder DIR": "folder that holds plans as CSV; in place of it a scene, whose usual steps "
+    "are shown"
+}
 SHOWN = {
-    "--out FILE": f"page to write (default: {PAGE} in DIR)",
+    "--out FILE": f"page to write (default: {PAGE} in DIR, of a scene its name with .html)",
     "--figures FOLDER": "also write figures there as PNG and SVG: steps, who holds what when, and "
     "responses along the build (needs matplotlib)",
 }
@@ -46,11 +50,15 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Answer:
     """Write the page of the plans in a folder."""
+    usual = Path(options.folder, PAGE)
+    if not Path(options.folder).is_dir():
+        options.folder = plan_folder(options, asked := options.folder)
+        usual = file_name(asked, ".html")
     own = options.folder / "scene.json"
     if own.is_file():  # plans go with the scene that stands beside them
         options.scene = str(own)
     scene = asked_scene(options)
-    path = options.folder / PAGE if options.out is None else options.out
+    path = usual if options.out is None else options.out
     keep_apart(options, path)
     written: tuple[Path, ...] = (path,)
     if options.figures is not None:

@@ -10,12 +10,14 @@ import numpy as np
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import asked_scene, scene_facts, size_line
+from seqopt._cli.given import file_name
 from seqopt._cli.options import BUILT, declare, form_options, scene_options
 from seqopt._cli.outputs import keep_apart
 from seqopt._cli.screens import question
 from seqopt._files import write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
+from seqopt.report._scene_page import scene_page
 from seqopt.scene.holders._props import Prop
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
@@ -30,12 +32,15 @@ EXAMPLES = (
     "seqopt scene --list",
     "seqopt scene arch:span=2,rise=0.8",
     "seqopt scene arch25 --export my.json",
+    "seqopt scene my.json --view",
 )
 
 
 WHAT = {
     "--list": "name all built-in scenes, and the words that make others",
     "--export FILE": "JSON file to write",
+    "--view": "write a page for the browser: bricks by name in their order, nodes at which robots "
+    "can hold, ground, bases and reaches",
 }
 
 
@@ -58,11 +63,16 @@ def run(options: argparse.Namespace) -> Answer:
     if options.export is not None:
         write_text(options.export, dump_scene(scene))
         lines.append(f"written to {options.export}")
+    written = () if options.export is None else (options.export,)
+    if options.view:
+        page = file_name(scene.name, ".html")
+        keep_apart(options, page)
+        options.tell("writing the page")
+        write_text(page, scene_page(scene))
+        lines.append(f"written to {page}; open it in a browser")
+        written = (page,)
     return Answer(
-        facts={"scene": facts},
-        text="\n".join(lines),
-        headings=(lines[0],),
-        written=() if options.export is None else (options.export,),
+        facts={"scene": facts}, text="\n".join(lines), headings=(lines[0],), written=written
     )
 
 

@@ -17,6 +17,7 @@ from seqopt._cli.asked import (
     scene_facts,
     waits_said,
 )
+from seqopt._cli.given import take
 from seqopt._cli.options import (
     BUILT,
     CURING,
@@ -47,7 +48,7 @@ from seqopt.plan.judge._mortar.check import check_cured
 from seqopt.problem.standing import Standing
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
-from seqopt.sequence._timing import step_times
+from seqopt.sequence._timing import has_durations, step_times
 
 DESCRIPTION = (
     "Say how long a build takes and who does what when. A robot that holds nothing prepares what "
@@ -55,6 +56,7 @@ DESCRIPTION = (
     "the steps."
 )
 USAGE = tuple(usage.replace("--out FILE", "--out DIR") for usage in STEPS_USAGE)
+USUAL_SECONDS = "fetch=30,place=10,approach=10,grip=5,release=5"
 EXAMPLES = (
     "seqopt times timed.json --method cantilever --durations rob3:slower=2.5",
     "seqopt times my.json --plan plan.csv --reassign --out faster",
@@ -90,7 +92,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> Answer:
     """Say how long a build takes, and write its times if asked."""
     require_out(options, "plan.csv", "times.csv")
-    scene = in_seconds(options, asked_scene(options))
+    scene = asked_scene(options)
+    if not (options.durations or has_durations(scene)):
+        options.durations = [USUAL_SECONDS]
+        take(options, f"durations: not known, taken as {USUAL_SECONDS}; --durations says others")
+    scene = in_seconds(options, scene)
     network = build_network(scene)
     steps = asked_steps(options, network)
     standing = _standing(options)

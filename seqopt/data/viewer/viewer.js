@@ -51,6 +51,7 @@
       this.makeEdges();
       this.makeGrips();
       this.makeRobots();
+      this.marks = marks && marks(this, radius * 0.026);
       this.look();
       new ResizeObserver(() => this.resize()).observe(this.box);
       this.resize();
@@ -248,6 +249,7 @@
       const struck = step.bricks === structure.bricks.length && step.grips.every((node) => node === null);
       this.props.forEach(({ pole, brick }) => { pole.visible = !struck && rank(build, brick) < step.bricks; });
       this.showRobots(build, s, options);
+      if (this.marks) this.marks.show(step.bricks);
       this.draw();
     }
     showForces(build, s, step, options) {
@@ -274,7 +276,7 @@
       this.edges.instanceMatrix.needsUpdate = true;
       this.edges.instanceColor.needsUpdate = true;
     }
-    draw() { this.renderer.render(this.scene, this.camera); if (this.robots) this.nameRobots(); }
+    draw() { this.renderer.render(this.scene, this.camera); if (this.robots) this.nameRobots(); if (this.marks) this.marks.place(); }
   }
 
   // where everything is
@@ -301,6 +303,7 @@
   }
   const yard = 1.05 * Math.max(radius, ...stands.map((place) => place.distanceTo(middle)));
   const panes = [];
+  const marks = structure.marks && makeMarks(structure, () => refresh());
   let mirroring = false;
   function mirror(from) {
     if (mirroring) return;
@@ -427,7 +430,7 @@
     row.dataset.build = name;
   }
 
-  byId("name").textContent = `${structure.name}, step by step`;
+  byId("name").textContent = structure.marks ? structure.name : `${structure.name}, step by step`;
   byId("note").textContent = data.note;
   builds.forEach((build, i) => {
     byId("first").append(new Option(build.name, i));

@@ -26,11 +26,13 @@ from seqopt.plan.judge._budget_proof import least_within, too_small
 from seqopt.plan.judge._proof import Proof
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.search._margin_search import WORST, bisected, with_margin
-from seqopt.problem.problem import STATE_RESPONSES, Goal, Measure
+from seqopt.problem.problem import LARGEST, STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, length_text
 from seqopt.scene.arm import Arm
+from seqopt.scene.scene import Scene
+from seqopt.sequence._reach import enough_reach
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule
 
@@ -76,6 +78,7 @@ def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
 
 
 STEPS = (Goal(Measure.STEPS),)
+IGNORED = "payload=ignored"
 STANDING = "no requirement to stand"
 PROPS = "props that bear any force, both ways"
 CENTERING = "a prop at every brick, if not fewer"
@@ -206,6 +209,8 @@ def _opening(problem: States, look: Look) -> Iterator[str]:
     if able and look(_with_arms(problem, lambda _: None)).whole:
         alone = _with_arms(problem, lambda arm: arm and replace(arm, keeps_apart=False))
         yield APART if look(alone).whole else ARMS
+    if recipe_of(problem.engine) and not (scene.has_arms or problem.scenarios):
+        yield from enough_reach(scene, lambda other: look(_in_scene(problem, other)).whole)
     for limit in problem.limits:
         rest = tuple(other for other in problem.limits if other is not limit)
         if look(replace(problem, limits=rest)).whole:
@@ -221,9 +226,8 @@ def _propped(problem: States, look: Look) -> Iterator[str]:
     sites = (moves.begin, moves.finish) if isinstance(moves, FreeRules) else ()
     held = {node for site in sites if site is not None for node in site.holds(scene)}
     props = (prop for prop in scene.with_centering().props if prop.node not in held)
-    engine = engine_for(problem.engine, scene.with_props(*props))
-    rules = replace(moves, scene=engine.network.scene) if isinstance(moves, Schedule) else moves
-    if look(replace(problem, engine=engine, rules=rules, goals=STEPS)).whole:
+    propped = _in_scene(problem, scene.with_props(*props))
+    if look(replace(propped, goals=STEPS)).whole:
         yield CENTERING
 
 
@@ -231,7 +235,14 @@ def _with_arms(problem: States, changed: Callable[[Arm | None], Arm | None]) -> 
     """Return a problem of robots with other arms, or of what they reach without them."""
     scene = problem.network.scene
     other = scene.with_robots(*(replace(each, arm=changed(each.arm)) for each in scene.robots))
-    return replace(problem, engine=engine_for(problem.engine, other), scenarios=())
+    return _in_scene(replace(problem, scenarios=()), other)
+
+
+def _in_scene(problem: States, scene: Scene) -> States:
+    """Return a problem in another scene of the same bricks."""
+    engine, rules = engine_for(problem.engine, scene), problem.rules
+    moves = replace(rules, scene=engine.network.scene) if isinstance(rules, Schedule) else rules
+    return replace(problem, engine=engine, rules=moves)
 
 
 def _loosened(problem: States) -> Iterator[tuple[str, FreeRules]]:
@@ -249,7 +260,7 @@ def _pairs(problem: States, look: Look) -> Iterator[str]:
 
 
 def _enough(problem: States, way: str, look: Look) -> str:
-    """Return how far a limit has to be raised, where it is a limit that is loosened."""
+    """Return how far a limit has to be raised, or a payload, where it is that is loosened."""
     if way == STANDING and not any(demand.tilt for demand in problem.demands):
         own, bare = problem.standing or Standing(), replace(problem, settled=(), goals=STEPS)
 
@@ -262,6 +273,10 @@ def _enough(problem: States, way: str, look: Look) -> str:
             return way
         digit = 10.0 ** (math.floor(math.log10(enough)) - 2) if enough else 1.0
         return f"a bond of {math.ceil(enough / digit) * digit:.10g} Pa"
+    if way == IGNORED and isinstance(problem.rules, FreeRules):
+        rules = replace(problem.rules, payload=Payload.IGNORED)
+        newton = math.ceil(worst_least(replace(problem, rules=rules), LARGEST, look))
+        return f"a payload of {newton} N (--payload {newton})"
     found = [limit for limit in problem.limits if limit.response == way]
     if not found or not (way in STATE_RESPONSES or is_tolerance(way)):
         return way if not found else PROPS if way == PROP_EXCESS else f"no limit on {way}"

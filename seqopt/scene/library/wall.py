@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
-from seqopt.scene._checks import check, density, finite, sizes, whole_between
+from seqopt.scene._checks import check, density, finite, length, sizes, whole_between
 from seqopt.scene.library._joints import ground_under, joints_between
 from seqopt.scene.library.common import (
     DOWN,
@@ -22,12 +23,15 @@ from seqopt.scene.library.common import (
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
 
+WHOLE = 1e-3  # of a brick: lengths in mm come to whole bricks
+
 
 @dataclass(frozen=True, kw_only=True)
 class WallShape:
     """The numbers that shape a wall.
 
     ``columns``: bricks in a course. ``courses``: every second one is shifted by half a brick.
+    ``length``, ``height``: in place of these, how long a course is, and how high all are, m.
     ``dimensions``: length, width and height of a brick, m. ``gap``: width of the joints, m; 0 where
     bricks are laid dry. ``corbel``: how far each course projects beyond the one below it, across
     the wall, m. ``density``: kg/m³. ``law``: how stiff joints are.
@@ -38,8 +42,10 @@ class WallShape:
     (0.2, 0.1, 0.06)
     """
 
-    columns: int
-    courses: int
+    columns: int = 0
+    courses: int = 0
+    length: float | None = None
+    height: float | None = None
     dimensions: Vector = (0.2, 0.1, 0.06)
     gap: float = 0.0
     corbel: float = 0.0
@@ -48,9 +54,11 @@ class WallShape:
 
     def __post_init__(self) -> None:
         count = partial(whole_between, least=1)
+        check(self, "wall", dimensions=sizes, gap=joint_width, density=density, law=a_law)
+        self._count("columns", "length", self.dimensions[0])
+        self._count("courses", "height", self.dimensions[2])
         check(self, "wall", columns=count, courses=count)
         few_enough("wall", self.columns * self.courses)
-        check(self, "wall", dimensions=sizes, gap=joint_width, density=density, law=a_law)
         if self.gap >= 0.5 * self.dimensions[0]:
             raise SceneError(
                 f"wall: gap is {self.gap:g} m, half a brick or more; give less than "
@@ -62,6 +70,28 @@ class WallShape:
                 f"wall: corbel is {self.corbel:g} m, a brick's width or more, and courses would "
                 f"not lie on each other; give less than {self.dimensions[1]:g}"
             )
+
+    def _count(self, name: str, extent: str, each: float) -> None:
+        """Set how many bricks there are where it is said how long they are together."""
+        value = getattr(self, extent)
+        if value is None and not getattr(self, name):
+            raise SceneError(
+                f"wall: {name} is 0 or missing; give a whole number, or {extent} in m in its place"
+            )
+        if value is None:
+            return
+        if getattr(self, name):
+            raise SceneError(f"wall: {name} and {extent} are both given; give one")
+        check(self, "wall", **{extent: length})
+        count = (value + self.gap) / (each + self.gap)
+        if abs(count - round(count)) > WHOLE or round(count) < 1:
+            near = sorted({max(1, math.floor(count)), math.floor(count) + 1})
+            fits = [f"{n * (each + self.gap) - self.gap:.6g} ({n} {name})" for n in near]
+            raise SceneError(
+                f"wall: {extent} is {value:g} m, no whole number of bricks; give "
+                f"{' or '.join(fits)}"
+            )
+        object.__setattr__(self, name, round(count))
 
 
 def wall(shape: WallShape, name: str = "", *, robots: Sequence[Robot] | None = None) -> Scene:

@@ -149,13 +149,13 @@ def test_scenes_in_words_are_those_of_the_library(words, made):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ("tower:a=1", "'tower' is not known; give one of arch, barrel, chain, dome, wall"),
+        ("tower:a=1", "'tower' is not known; give one of arch, barrel, chain, dome, herringbone"),
         ("arch:spn=2", "'spn' is none of its numbers (did you mean span?); give span, rise"),
         ("arch:span=2,span=2", "'span' is given twice; give span, rise"),
         ("arch:span=x", "span is 'x'; give it as 0.5"),
         ("arch:span=2,rise=1,dimensions=1x2", "dimensions is '1x2'; give it as 0.2x0.1x0.06"),
         ("wall:columns=2.5", "columns is '2.5'; give it as 12"),
-        ("wall:columns=4", "courses is missing; a wall in running bond"),
+        ("wall:columns=4", "courses is 0 or missing; give a whole number"),
         ("barrel:test=9", "barrel vault: test is 9; give 1 to 8"),
     ],
 )

@@ -1,0 +1,94 @@
+"""Numbers that do not fit are answered by near ones that do: each is tried."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from seqopt.errors import SceneError
+from seqopt.scene._fitting import which_fit
+from seqopt.scene.scene_file import load_scene
+
+
+def refusal(words):
+    with pytest.raises(SceneError) as error:
+        load_scene(words)
+    return str(error.value)
+
+
+def replaced(words, name, value):
+    """Return words with another number."""
+    return re.sub(rf"\b{name}=[^,]+", f"{name}={value}", words)
+
+
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        ("chain:bricks=4", {"bricks"}),
+        ("arch:span=2,rise=1.4", {"span", "rise"}),
+        ("arch:span=2,rise=0.8,bricks=13,dimensions=0.3x0.1x0.06", {"span", "dimensions"}),
+        ("arch:span=2,rise=0.8,bricks=30", {"bricks"}),
+        ("dome:courses=4,around=7,bond=herringbone", {"around"}),
+        ("wall:columns=4,courses=3,corbel=0.2", {"corbel"}),
+    ],
+)
+def test_what_is_said_to_fit_fits(words, names):
+    found = dict(re.findall(r"(\w+)=([\dx.]+)", refusal(words).partition("; it fits with ")[2]))
+    assert {*found} >= names
+    for name, value in found.items():
+        assert load_scene(replaced(words, name, value)).bricks
+
+
+def test_the_least_change_is_named():
+    assert "it fits with bricks=6" in refusal("chain:bricks=4")
+    assert "interpenetrate" in refusal("chain:bricks=5")
+    assert "rise=1" in refusal("arch:span=2,rise=1.4")
+    assert "rises at most half" in refusal("arch:span=2,rise=1.01")
+
+
+def test_where_nothing_near_fits_nothing_is_named():
+    def never(_):
+        raise SceneError("no")
+
+    assert which_fit(never, {"span": 2.0, "bricks": 3, "curve": "pointed"}) == ""
+    assert which_fit(lambda _: 1, {"curve": "pointed"}) == ""
+
+
+@pytest.mark.parametrize("number", ["length", "height"])
+def test_a_length_of_whole_bricks_says_which_are(number):
+    other = "height" if number == "length" else "length"
+    words = f"wall:{number}=0.49,{other}=0.6,dimensions=0.2x0.1x0.06,gap=0.01"
+    good = {"length": "0.62", "height": "0.62"}[other]
+    words = replaced(words, other, good)
+    text = refusal(words)
+    fits = re.findall(r"([\d.]+) \((\d+) (columns|courses)\)", text)
+    assert len(fits) == 2
+    for value, count, name in fits:
+        scene = load_scene(replaced(words, number, value))
+        assert scene.name.split()[1 if name == "columns" else 3] == count
+
+
+def test_a_wall_from_both_sides_meets_in_the_middle():
+    scene = load_scene("wall:columns=4,courses=2,order=sides")
+    assert scene.build_order == (1, 4, 2, 3, 5, 8, 6, 7)
+    with pytest.raises(SceneError, match=r"order 'side' \(did you mean sides\?\)"):
+        load_scene("wall:columns=4,courses=2,order=side")
+
+
+def test_a_vault_closes_from_both_springings():
+    scene = load_scene("vault:span=1.5,rise=0.5,columns=2,order=ends")
+    courses = len(scene.bricks) // 2
+    assert {ground.brick for ground in scene.grounds} == {1, 2, 2 * courses - 1, 2 * courses}
+    assert {*scene.build_order[:4]} == {ground.brick for ground in scene.grounds}
+    (crown,) = {(name - 1) // 2 for name in scene.build_order[-2:]}
+    assert crown == courses // 2
+    bent = [brick.position[2] for brick in scene.bricks]
+    assert max(bent) == pytest.approx(0.5, rel=0.02)
+    assert bent == pytest.approx(bent[::-1])  # it is symmetric
+
+
+def test_a_vault_in_herringbone_grows_around_the_arch():
+    scene = load_scene("herringbone:bricks=40")
+    assert len(scene.bricks) == 40
+    assert scene.build_order[:25] == load_scene("arch25").build_order
