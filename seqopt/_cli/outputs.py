@@ -118,7 +118,7 @@ def plan_files(
         "scene.json": dump_scene(plan.engine.network.scene),
         **_task_files(plan),
         **_time_files(plan),
-        PAGE: plan_page(plan.engine, plan.title, tables["plan"], plan.result, prover),
+        PAGE: plan_page(plan, prover, table=tables["plan"]),
     }
 
 
