@@ -179,12 +179,11 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     marks = {name: said for name, said in marks.items() if result.table[name].any()}
     columns = ["problem", "objective", "gap", *WORDS, *marks, "models", "seconds"]
     shown = result.table[columns].replace({True: "yes", False: ""})
-    shown = shown.assign(
-        gap=100 * shown["gap"].astype(float), problem=shown["problem"].map(in_words)
-    )
+    shown = shown.assign(gap=100 * shown["gap"].astype(float))
     shown = _worded(shown.rename(columns=marks | {"gap": GAP}))
     shown = shown.join(_falls(builds))
     shown = shown.sort_values("problem", key=lambda each: ~each.isin(FIRST), kind="stable")
+    shown["problem"] = shown["problem"].map(in_words)
     shown = shown.rename_axis("method or formulation").reset_index()
     tables: list[tuple[str, pd.DataFrame | _Drawn]] = (
         [] if result.speed is None else [*_speed_parts(result.speed)]
@@ -219,8 +218,10 @@ def _speed_parts(speed: SpeedTable) -> Iterator[tuple[str, pd.DataFrame | _Drawn
 def folder_page(engine: Engine, folder: Path, prover: BuildProver) -> str:
     """Return the page of the plans in a folder that a command has written."""
     scene, builds = engine.network.scene, folder_builds(engine, folder, prover)
-    ways = f"{len(builds)} way{'s' * (len(builds) > 1)}"
-    sentence = f"{scene.name}, built in {ways}, step by step"
+    if len(builds) == 1:
+        sentence = builds[0].sentence(scene, _grips_off(engine, builds[0]))
+        return report_page(engine, builds, sentence, [_worst_table(scene, builds)])
+    sentence = f"{scene.name}, built in {len(builds)} ways, step by step"
     return _page(engine, builds, sentence, [_worst_table(scene, builds)])
 
 

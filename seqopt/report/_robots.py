@@ -22,7 +22,7 @@ from seqopt.sequence._postures import plan_postures
 from seqopt.sequence.exports import hold
 from seqopt.sequence.steps import Step
 
-ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#b85c00", "#444444", "#1f5fa8")
+ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#ad5600", "#444444", "#1f5fa8")
 _BESIDE = 0.3  # of a base from the structure, over the size of that
 _APART = 0.35  # of bases on one side from each other, likewise
 _HIGH = 0.12  # of a shoulder above its foot, over the reach

@@ -27,11 +27,11 @@ from seqopt.engines.interface import Engine, Want
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, _prop_faults, overloads
-from seqopt.report._opening._says import deciding_step, in_a_sentence, robot_words
+from seqopt.report._opening._says import deciding_step, far_off, in_a_sentence, robot_words
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
 from seqopt.report.text import in_words
 from seqopt.responses._tolerance import each_tolerance, held_in_steps, is_linear
-from seqopt.responses.quantities import _number_text, length_text
+from seqopt.responses.quantities import _number_text
 from seqopt.responses.table import OUTSIDE, Departure, force_column, step_fields
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Brick
@@ -245,7 +245,7 @@ def _grips_off(engine: Engine, build: Build) -> Floats | None:
 
 def _off_said(far: float) -> str:
     """Return how far grips of a step may be off, in words; none where nobody holds."""
-    return f"Grips may be {length_text(far)} off." if 0 < far < np.inf else ""
+    return f"Grips {far_off(far)}." if far < np.inf else ""
 
 
 def _marks(scene: Scene, build: Build) -> list[str]:

@@ -8,11 +8,12 @@
     F_min_N: "largest compression in an edge, N", F_avg_N: "mean force of the edges, N", T_pct: "edges in tension, %",
     "D_max_1e-3mm": "largest displacement", "D_avg_1e-3mm": "mean displacement", "D_std_1e-3mm": "spread of displacements",
     props: "props that hold", F_prop_N: "largest force of a prop, N", prop_excess_N: "more than props may bear, N",
+    optimized_robot: "robot whose grip is chosen",
   };
   // numbers as people write them, and lengths, which are kept in µm
   const plain = (v) => Number(v).toLocaleString("en-US", { maximumSignificantDigits: 6 });
   const length = (v) => (Math.abs(v) >= 1000 ? `${plain(v / 1000)} mm` : `${plain(v)} µm`);
-  const shownValue = (name, v) => (name.startsWith("D_") ? length(Number(v)) : plain(v));
+  const shownValue = (name, v) => (Number.isNaN(Number(v)) ? v : name.startsWith("D_") ? length(Number(v)) : plain(v));
   const CLAY = 0xcc8560, PROP = 0x8a8478, NEW = 0xe8b04a, TENSION = 0xc8102e, COMPRESSION = 0x1f5fa8, LARGEST = 32767;
 
   // fields come as whole numbers, compressed
@@ -208,10 +209,14 @@
       if (!mode || !this.build || bricks.length > SEEN) return;
       pen.scale(ratio, ratio);
       const eye = this.camera.position, bodies = bricks.map(body);
-      bodies.forEach((own) => {
+      const taken = [];
+      bodies.map((own) => [own.middle.distanceTo(eye), own]).sort((a, b) => a[0] - b[0]).forEach(([, own]) => {
         if (bodies.some((other) => other !== own && hides(other, eye, own.middle))) return;
         const i = structure.bricks.indexOf(own.brick), at = own.middle.clone().project(this.camera);
-        written(pen, mode === "order" ? rank(this.build, i) + 1 : own.brick.name, ((at.x + 1) * w) / 2, ((1 - at.y) * h) / 2 + 4, "#222");
+        const [x, y, words] = [((at.x + 1) * w) / 2, ((1 - at.y) * h) / 2 + 4, String(mode === "order" ? rank(this.build, i) + 1 : own.brick.name)];
+        if (taken.some(([a, b]) => Math.abs(a - x) < 7 * words.length && Math.abs(b - y) < 11)) return;
+        taken.push([x, y]);
+        written(pen, words, x, y, "#222");
       });
     }
     // what is seen, with its names, as one picture

@@ -65,15 +65,18 @@ def deciding_step(
     """Return the place of the step that decides.
 
     It is the first that exceeds a payload, or what props bear, or falls with the last mortar; where
-    none does, that of the largest value ``along`` the build, or of the largest share of a payload.
+    none does, that of the largest value ``along`` the build, or of the largest share of a payload,
+    among those in which a robot holds, if there are any.
     """
     over = (*overloads(scene, table), *_prop_faults(scene, table))
     wrong = [number for excess in over for number in excess.steps]
     wrong += [each.first for each in verdicts[-1:] if each.first]
     if wrong:
         return min(wrong) - int(table["step"].iloc[0])
-    values = payload_shares(scene, table).max(axis=1) if along is None else along
-    return int(np.nanargmax(np.where(np.isfinite(values), values, -np.inf)))
+    shares = payload_shares(scene, table).max(axis=1)
+    values = shares if along is None else along
+    asked = np.isfinite(values) & ((shares > 0) | (not shares.any()))
+    return int(np.where(asked, values, -np.inf).argmax())
 
 
 def in_a_sentence(
@@ -96,8 +99,8 @@ def in_a_sentence(
     outside = f"{OUTSIDE.capitalize()}: {'; '.join(map(str, departures))}. {REMEDY} "
     said = [f"{does} {scene.name} in {len(table):,} steps"]
     if wrong:
-        said = [f"Not buildable: {'; '.join(wrong)}", f"{scene.name}, {len(table):,} steps"]
-    held = [each for each in verdicts if not (wrong and each.first)]
+        said = [f"Not buildable: {'; '.join(wrong)}"]
+    held = verdicts[:-1] if fallen else verdicts
     said += [] if over else _carried(scene, table)
     said += [*_stands(held)] or ([] if verdicts else ["whether its steps stand was not asked"])
     said += [] if off is None or wrong else _off_said(scene, off)
@@ -155,10 +158,19 @@ def _stands(verdicts: Sequence[BuildVerdicts]) -> Iterator[str]:
 
 def _off_said(scene: Scene, off: Floats) -> list[str]:
     """Return how far grips may be off in every step, where robots hold."""
-    known = off[np.isfinite(off)]
-    least = float(known.min()) if len(known) else 0.0
-    if not least > 0:
-        return []
+    least = float(off.min(initial=np.inf))
     gives = any(robot.stiffness or robot.arm for robot in scene.robots)
-    far = length_text(float(f"{least:.2g}")) if least >= _SHORTEST else "less than 0.001 mm"
-    return [f"{'' if gives else 'rigid '}grips may be {far} off"]
+    return [f"{'' if gives else 'rigid '}grips {far_off(least)}"] if np.isfinite(least) else []
+
+
+def far_off(length: float) -> str:
+    """Return how far grips may be off, in words.
+
+    Examples
+    --------
+    >>> far_off(0.000312), far_off(2.7e-7), far_off(0.0)
+    ('may be 310 µm off', 'may not even be 0.001 mm off', 'may not be off at all')
+    """
+    if length >= _SHORTEST:
+        return f"may be {length_text(float(f'{length:.2g}'))} off"
+    return "may not even be 0.001 mm off" if length > 0 else "may not be off at all"
