@@ -380,16 +380,19 @@ def _tasks(engine: Engine, build: Build) -> dict[str, str]:
 
     Arms are in their postures; where nothing computes these, grips are proposals.
     """
-    scene = engine.network.scene
-    try:
-        tasks = [*_known_tasks(scene, build.steps)]
-    except (ExtraError, SceneError):
-        tasks = [*plan_tasks(scene, build.steps)]
-    texts = {"csv": tasks_csv(tasks), "json": tasks_json(scene, tasks)}
     return {
         kind: b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode("ascii")
-        for kind, text in texts.items()
+        for kind, text in _task_texts(engine.network.scene, build.steps).items()
     }
+
+
+def _task_texts(scene: Scene, steps: Sequence[Step]) -> dict[str, str]:
+    """Return what robots do in a build as CSV and JSON."""
+    try:
+        tasks = [*_known_tasks(scene, steps)]
+    except (ExtraError, SceneError):
+        tasks = [*plan_tasks(scene, steps)]
+    return {"csv": tasks_csv(tasks), "json": tasks_json(scene, tasks)}
 
 
 def _left_out(builds: Sequence[Build], numbers: int) -> str:
