@@ -216,7 +216,7 @@ def test_a_build_in_another_order_shows_its_own_bricks(engine25, builds, shown, 
     for build, brick in (("sequential", 1), ("backward", 25)):
         found, errors = shown(path, f"step=1&build={build}")
         assert errors == []
-        assert f"Brick {brick} is placed; 1 of 25 bricks stand." in found
+        assert f"Brick {brick} is placed by robot 1; 1 of 25 bricks stand." in found
 
 
 def tables_of(text):

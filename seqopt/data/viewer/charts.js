@@ -154,7 +154,7 @@ function makeCharts(page) {
   const OPENED = 400;
   function list(build, marking) {
     const out = document.createElement("details"), box = document.createElement("div"), table = document.createElement("table"), rows = [];
-    out.append(text("summary", `Every step of ${build.words}: what happens, which brick each robot holds with which share of its payload, and whether it stands`), box);
+    out.append(text("summary", `Every step: what happens, which brick each robot holds with which share of its payload, and whether it stands`), box);
     box.className = "scroll";
     box.tabIndex = 0;
     const head = document.createElement("tr");
@@ -179,7 +179,7 @@ function makeCharts(page) {
     out.open = build.steps.length <= OPENED;
     fill();
     marking.push((at) => rows.forEach((row, s) => {
-      if (row.classList.toggle("chosen", s === at)) box.scrollTop = row.offsetTop - box.offsetTop - box.clientHeight / 2;
+      if (row.classList.toggle("chosen", s === at)) box.scrollTop = row.offsetTop - box.clientHeight / 2;
     }));
     return out;
   }

@@ -384,7 +384,7 @@
       return { center, side, far: far || 3 * radius };
     };
     const own = from(corners), all = from([...corners, ...stands]);
-    return all.far <= 1.7 * own.far ? all : { ...own, far: 1.7 * own.far };
+    return all.far <= 2.6 * own.far ? all : { ...own, far: 2.6 * own.far };
   }
   const yard = 1.05 * Math.max(radius, ...stands.map((place) => place.distanceTo(middle)));
   const panes = [];
@@ -418,7 +418,13 @@
 
   function happens(build, s) {
     const step = build.steps[s], newest = structure.bricks.find((_, i) => rank(build, i) === step.bricks - (step.kind === "remove" ? 0 : 1));
-    return step.kind === "place" ? `brick ${newest.name} is placed` : step.kind === "remove" ? `brick ${newest.name} is taken away` : step.kind === "release" ? "a robot lets go" : "a robot takes a new grip";
+    const before = s ? build.steps[s - 1].grips : step.number === 1 ? step.grips.map(() => null) : step.grips;
+    const who = (own) => structure.robots.filter((_, r) => before[r] !== step.grips[r] && own(step.grips[r])).map((robot) => robot.words).join(" and ");
+    const taker = who((node) => node !== null && (step.kind !== "place" || structure.bricks[structure.nodes[node].brick] === newest));
+    if (step.kind === "place") return `brick ${newest.name} is placed${taker ? ` by ${taker}` : ""}`;
+    if (step.kind === "remove") return `brick ${newest.name} is taken away`;
+    if (step.kind === "release") return `${who((node) => node === null) || "a robot"} lets go`;
+    return `${taker || "a robot"} takes a new grip`;
   }
   const share = (build, s, r) => Math.abs(number(build, s, build.forces[r]) || 0) / structure.robots[r].payload;
   const percent = (v) => `${Math.round(100 * v)} %`;

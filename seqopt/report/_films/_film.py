@@ -21,6 +21,7 @@ from matplotlib.animation import FFMpegWriter
 from matplotlib.figure import Figure
 from PIL import Image  # comes with matplotlib
 
+from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import ExtraError, FileError
 from seqopt.report._pictures import VIEW, _build_box, _cell, _draw_step, _frame
@@ -103,6 +104,8 @@ class Film:
         """Yield a figure for every step: the same one, drawn anew."""
         cell = _cell(self.engine, self.steps, self.arms, forces=self.forces)
         (left, low), (right, high) = box = _build_box(cell)
+        if size is not None:
+            box = _filling(box, size[0] * 0.96 / (size[1] * 0.88))
         wide, tall = size or (_WIDTH, max(_WIDTH * (high - low) / (right - left), 2.0) + 0.5)
         figure = new_picture(wide, tall, "none")
         axes = figure.add_axes((0.02, 0.02, 0.96, 0.88))
@@ -114,6 +117,13 @@ class Film:
             draw_grips(axes, self.engine.network, step.grips, VIEW)
             _frame(axes, cell.scene, step, self.steps[-1].number, box)
             yield figure
+
+
+def _filling(box: tuple[Floats, Floats], ratio: float) -> tuple[Floats, Floats]:
+    """Return a box around another one, as wide over its height as asked."""
+    middle, size = (box[0] + box[1]) / 2, box[1] - box[0]
+    half = 0.5 * np.array([max(size[0], ratio * size[1]), max(size[1], size[0] / ratio)])
+    return middle - half, middle + half
 
 
 def _shown(figure: Figure) -> Image.Image:

@@ -103,7 +103,7 @@ def in_a_sentence(
     held = verdicts[:-1] if fallen else verdicts
     said += [] if over else _carried(scene, table)
     said += [*_stands(held)] or ([] if verdicts else ["whether its steps stand was not asked"])
-    said += [] if off is None or wrong else _off_said(scene, off)
+    said += [] if off is None or wrong else _off_said(scene, table, off)
     return (outside if departures else "") + "; ".join(said) + "."
 
 
@@ -156,11 +156,13 @@ def _stands(verdicts: Sequence[BuildVerdicts]) -> Iterator[str]:
             return  # with more than this it stands too
 
 
-def _off_said(scene: Scene, off: Floats) -> list[str]:
+def _off_said(scene: Scene, table: pd.DataFrame, off: Floats) -> list[str]:
     """Return how far grips may be off in every step, where robots hold."""
     least = float(off.min(initial=np.inf))
     gives = any(robot.stiffness or robot.arm for robot in scene.robots)
-    return [f"{'' if gives else 'rigid '}grips {far_off(least)}"] if np.isfinite(least) else []
+    where = f" in step {int(table['step'].iloc[off.argmin()])}" if least < _SHORTEST else ""
+    said = f"{'' if gives else 'rigid '}grips {far_off(least)}{where}"
+    return [said] if np.isfinite(least) else []
 
 
 def far_off(length: float) -> str:
