@@ -191,6 +191,7 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     tables += [(_with_legend("Methods and formulations; a click shows the build", shown), shown)]
     if result.printed is not None:
         printed = result.printed.add_suffix(", printed").rename_axis("largest").reset_index()
+        printed["largest"] = printed["largest"].str.replace("1e-3 mm", "µm")
         tables.append(("What the paper prints", printed))
     scatter, found = None, result.table.loc[result.table["gap"].notna(), ["seconds", "gap"]]
     if not found.empty:  # how long each formulation took and how far from the best its choice is
@@ -263,9 +264,9 @@ def front_page(
     shown = points.join(_falls(builds)).rename_axis("plan").reset_index()
     if any(departures):
         shown[OUTSIDE] = ["yes" if each else "" for each in departures]
-    sentence = (
-        f"{len(plans)} plans for {scene.name}, none of which is better than another in everything"
-    )
+    sentence = f"1 plan for {scene.name} is best in everything"
+    if len(plans) > 1:
+        sentence = f"{len(plans):,} plans for {scene.name}, of which none beats another everywhere"
     scatter = Scatter("The Pareto set: every point is a plan; a click shows it", points)
     shows = [(_with_legend("The Pareto set; a click shows a plan", shown), shown)]
     return _page(engine, builds, sentence, shows, scatter)

@@ -436,6 +436,9 @@ def _cell_text(value: object) -> object:
         return ""
     if isinstance(value, int | np.integer):
         return f"{value:,}"
-    text = _number_text(float(value))
-    small = "e" in text and np.isfinite(value)
+    number = float(value)
+    if 1e3 <= abs(number) < 1e12:
+        return f"{number:,.0f}"
+    text = _number_text(number)
+    small = "e" in text and np.isfinite(number)
     return np.format_float_positional(float(text), trim="-") if small else text

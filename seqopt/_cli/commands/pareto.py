@@ -43,6 +43,7 @@ from seqopt.plan.solving import states_of
 from seqopt.problem.problem import judged_by
 from seqopt.report._pages import PAGE, front_page
 from seqopt.report.comparison import fixed_methods, shown_table, worst_of
+from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import LinearRange, analyze, builds_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import FREE
@@ -131,7 +132,7 @@ def run(options: argparse.Namespace) -> Answer:
         scene = front.engines[chosen].network.scene  # in the order of what is picked
         values = shown_table(front.table).iloc[chosen]
         picked = {"point": chosen + 1, **values}
-        row = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
+        row = ", ".join(f"{name} {value_text(str(name), v)}" for name, v in values.items())
         said += f"; picked row {chosen + 1}: {row}"
     write_outputs(options, lambda: files | {"scene.json": dump_scene(scene)})
     if picked is not None:

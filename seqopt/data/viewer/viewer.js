@@ -419,11 +419,12 @@
   function happens(build, s) {
     const step = build.steps[s], newest = structure.bricks.find((_, i) => rank(build, i) === step.bricks - (step.kind === "remove" ? 0 : 1));
     const before = s ? build.steps[s - 1].grips : step.number === 1 ? step.grips.map(() => null) : step.grips;
-    const who = (own) => structure.robots.filter((_, r) => before[r] !== step.grips[r] && own(step.grips[r])).map((robot) => robot.words).join(" and ");
+    const who = (own) => structure.robots.filter((_, r) => before[r] !== step.grips[r] && own(step.grips[r])).map((robot) => robot.words).join(", ").replace(/, ([^,]*)$/, " and $1");
     const taker = who((node) => node !== null && (step.kind !== "place" || structure.bricks[structure.nodes[node].brick] === newest));
     if (step.kind === "place") return `brick ${newest.name} is placed${taker ? ` by ${taker}` : ""}`;
     if (step.kind === "remove") return `brick ${newest.name} is taken away`;
-    if (step.kind === "release") return `${who((node) => node === null) || "a robot"} lets go`;
+    const leaver = who((node) => node === null) || "a robot";
+    if (step.kind === "release") return `${leaver} ${leaver.includes(" and ") ? "let" : "lets"} go`;
     return `${taker || "a robot"} takes a new grip`;
   }
   const share = (build, s, r) => Math.abs(number(build, s, build.forces[r]) || 0) / structure.robots[r].payload;
