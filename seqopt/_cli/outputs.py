@@ -22,6 +22,7 @@ from seqopt.plan.plan import Plan
 from seqopt.report._pages import PAGE, plan_page
 from seqopt.report._speed._table import SpeedTable
 from seqopt.report.comparison import Comparison
+from seqopt.report.page import _task_texts
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
 from seqopt.sequence.exports._arm_tasks import _in_postures
 from seqopt.sequence.exports._tasks import plan_tasks, tasks_csv, tasks_json
@@ -119,7 +120,23 @@ def plan_files(
         "scene.json": dump_scene(plan.engine.network.scene),
         **_task_files(plan),
         **_time_files(plan),
-        PAGE: plan_page(plan.engine, plan.title, tables["plan"], plan.result, prover),
+        PAGE: plan_page(plan, prover, table=tables["plan"]),
+    }
+
+
+def _picked_files(
+    plan: ShownBuild, report: Mapping[str, object], prover: BuildProver
+) -> dict[str, bytes | str]:
+    """Return the files of a plan of a Pareto set, as those of any plan, by file name."""
+    scene, table = plan.engine.network.scene, plan.responses()
+    tasks = _task_texts(scene, plan.steps)
+    return {
+        "plan.csv": csv_text(table),
+        "summary.json": json.dumps(_plain(report), indent=2) + "\n",
+        "scene.json": dump_scene(scene),
+        **{f"tasks.{kind}": text for kind, text in tasks.items()},
+        **_time_files(plan),
+        PAGE: plan_page(plan, prover, table=table),
     }
 
 

@@ -12,23 +12,20 @@ import pandas as pd
 
 from seqopt._files import csv_text
 from seqopt._showing import Page, display
+from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
-from seqopt.errors import ExtraError, FileError, ProblemError
+from seqopt.errors import ExtraError, FileError, ProblemError, SeqoptError
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.front import Front
+from seqopt.plan.plan import Plan
+from seqopt.problem._arms import arm_faults
 from seqopt.problem.requirements import overloads
+from seqopt.report._opening._says import worst_along
 from seqopt.report._robots import _known_arms
 from seqopt.report._speed._table import SpeedTable
-from seqopt.report.comparison import (
-    CLOSED,
-    LARGEST,
-    Comparison,
-    fixed_methods,
-    largest,
-    shown_table,
-)
-from seqopt.report.page import Build, Scatter, _Drawn, report_page
-from seqopt.responses.quantities import _number_text, length_text
+from seqopt.report.comparison import CLOSED, Comparison, fixed_methods, largest, shown_table
+from seqopt.report.page import Build, Scatter, _Drawn, _grips_off, report_page
+from seqopt.report.text import in_words
 from seqopt.responses.table import OUTSIDE, REMEDY, Departure, LinearRange, analyze, builds_in_words
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
@@ -40,13 +37,15 @@ WORDS = {
     "F_rob": "grip force, N",
     "M_sup": "support moment, N m",
     "T_max": "tension, N",
-    "D_max": "displacement, 1e-3 mm",
+    "D_max": "displacement, µm",
 }  # as of seqopt.report.comparison.LARGEST
 OVER = "over payload"
 LEGEND = {OVER: "a robot would hold more than it can", OUTSIDE: "its numbers are not reliable"}
 PAGE = "report.html"
 FIRST = (CLOSED, FREE)  # of a comparison: its other rows may be more than are seen at once
-PLANS = ("plan.csv", "pick.csv", "steps_*.csv")  # of optimize, pareto and compare
+PLANS = ("plan.csv", "pick/plan.csv", "steps_*.csv")  # of optimize, pareto and compare
+GAP = "above the best, %"
+_MM = 1000.0  # µm
 PHONE = 3.75  # inches: as wide as a telephone shows at 100 pixels an inch
 SMALL = 60  # bricks up to which a plan is shown beside the fixed methods
 Tables = Mapping[str, pd.DataFrame]
@@ -67,7 +66,8 @@ def _builds(
         steps = parse_plan(scene, csv_text(table), name)
         stands = verdicts.get(name, ())
         left, arms = departures.get(name, ()), _known_arms(scene, steps)
-        out.append(Build(name, steps, table, stands, bounds, left, arms=arms))
+        faults = arm_faults(scene, steps) if arms else ()
+        out.append(Build(name, steps, table, stands, bounds, left, arms=arms, faults=faults))
     return out
 
 
@@ -98,6 +98,15 @@ def _page(
     return report_page(engine, builds, f"{_outside(builds)}{sentence}{over}.", tables, scatter)
 
 
+def _worded(table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table with responses in words; displacements in mm where the largest is one."""
+    out = table.rename(columns=WORDS)
+    if WORDS["D_max"] in out and out[WORDS["D_max"]].max() >= _MM:
+        out = out.assign(**{WORDS["D_max"]: out[WORDS["D_max"]] / _MM})
+        out = out.rename(columns={WORDS["D_max"]: "displacement, mm"})
+    return out
+
+
 def _worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFrame]:
     """Return the largest responses of builds, a row each, under their caption."""
     rows = {build.name: largest(scene, build.table) for build in builds}
@@ -105,12 +114,14 @@ def _worst_table(scene: Scene, builds: Sequence[Build]) -> tuple[str, pd.DataFra
     found.insert(0, "steps", [len(build.steps) for build in builds])
     over = [{n for each in build.overloads(scene) for n in each.steps} for build in builds]
     if any(over):
-        found[OVER] = [f"{len(steps):,} steps" if steps else "" for steps in over]
+        found[OVER] = [
+            f"{len(steps):,} step{'s' * (len(steps) != 1)}" * bool(steps) for steps in over
+        ]
     if any(build.departures for build in builds):
         found[OUTSIDE] = ["yes" if build.departures else "" for build in builds]
     found = found.join(_falls(builds))
     caption = _with_legend("Largest responses", found)
-    return caption, found.rename(columns=WORDS).rename_axis("build").reset_index()
+    return caption, _worded(found).rename_axis("build").reset_index()
 
 
 def _falls(builds: Sequence[Build]) -> pd.DataFrame:
@@ -122,56 +133,42 @@ def _falls(builds: Sequence[Build]) -> pd.DataFrame:
     return pd.DataFrame.from_dict(rows, orient="index")
 
 
-def _standing_said(build: Build) -> str:
-    """Return which steps of a build stand, as sentences; nothing if that was not asked."""
-    return "".join(f" {str(each)[:1].upper()}{str(each)[1:]}." for each in build.verdicts)
-
-
-def plan_page(  # a plan, what there is to say about it, and what is beside it
-    engine: Engine,
-    name: str,
-    table: pd.DataFrame,
-    said: str,
+def plan_page(
+    plan: ShownBuild,
     prover: BuildProver | None = None,
     *,
+    table: pd.DataFrame | None = None,
     others: Tables | None = None,
 ) -> str:
     """Return the page of a plan, beside others and, where the scene is small, fixed methods.
 
-    ``name`` is what found it, ``said`` what it is worth, and ``prover`` says which steps stand:
-    by default dry, and with epoxy, where the scene is small.
+    ``prover`` says which steps stand: by default dry, and with epoxy, where the scene is small;
+    ``table``: the responses of the plan, where they are known.
     """
+    engine, name = plan.engine, plan.title
     scene = engine.network.scene
-    tables = {name: table, **(others or {})}
-    if len(scene.bricks) <= SMALL:
-        tables |= {key: each for key, each in fixed_methods(engine).items() if key not in tables}
+    tables = {name: plan.responses() if table is None else table, **(others or {})}
     small = len(scene.bricks) <= SMALL
+    if small:
+        tables |= {key: each for key, each in fixed_methods(engine).items() if key not in tables}
     prover = prover or BuildProver(engine.network, SHOWN if small else {})
     verdicts = prover.of_tables(tables)
-    builds = _builds(scene, tables, LinearRange(engine).of_builds(tables), verdicts)
-    first = builds[0]
-    robots = int(sum(table[f"{robot.name}_node"].notna().any() for robot in scene.robots))
-    verb = "take down" if (table["type"] == "remove").any() else "build"
-    does = "1 robot builds" if robots == 1 else f"{robots} robots {verb}"
-    how = ""
-    if over := first.overloads(scene):
-        steps = {number for excess in over for number in excess.steps}
-        worst = max(over, key=lambda excess: excess.largest / excess.limit.bound)
-        does = f"{robots} robot{'s' * (robots != 1)} cannot {verb}"
-        how = (
-            f" like this: in {len(steps):,} of {len(table):,} a robot would hold more than its "
-            f"payload, up to {worst.largest:,.0f} N where {worst.robot} can hold "
-            f"{worst.limit.bound:.4g} N"
-        )
-    values = largest(scene, table)
-    shown = {n: f"{_number_text(values[n])} {LARGEST[n]}" for n in WORDS}
-    shown["D_max"] = length_text(1e-6 * values["D_max"])
-    most = ", ".join(f"{word.split(',')[0]} {shown[n]}" for n, word in WORDS.items())
-    sentence = (
-        f"{_outside(builds[:1])}{does} {scene.name} in {len(table):,} steps{how} ({name}: {said}). "
-        f"The largest of any step: {most}.{_standing_said(first)}"
-    )
-    return report_page(engine, builds, sentence, [_worst_table(scene, builds)])
+    first, *rest = _builds(scene, tables, LinearRange(engine).of_builds(tables), verdicts)
+    first = replace(first, along=_along(plan, first.table))
+    sentence = first.sentence(scene, _grips_off(engine, first))
+    found = f"Found by: {in_words(name)} ({plan.result})."
+    builds = [first, *rest]
+    return report_page(engine, builds, sentence, [_worst_table(scene, builds)], found=found)
+
+
+def _along(plan: ShownBuild, table: pd.DataFrame) -> Floats | None:
+    """Return what a plan made small of every step, where it is the largest that counts."""
+    if not isinstance(plan, Plan):
+        return None
+    criterion = getattr(plan.graph, "criterion", None) or plan.layers.criterion
+    with suppress(SeqoptError):  # what no table has
+        return worst_along(plan.engine.network.scene, table, plan.goals[0], criterion)
+    return None
 
 
 def comparison_page(engine: Engine, result: Comparison) -> str:
@@ -181,9 +178,12 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     marks = {"overloaded": OVER, "outside": OUTSIDE}
     marks = {name: said for name, said in marks.items() if result.table[name].any()}
     columns = ["problem", "objective", "gap", *WORDS, *marks, "models", "seconds"]
-    shown = result.table[columns].replace({True: "yes", False: ""}).rename(columns=WORDS | marks)
+    shown = result.table[columns].replace({True: "yes", False: ""})
+    shown = shown.assign(gap=100 * shown["gap"].astype(float))
+    shown = _worded(shown.rename(columns=marks | {"gap": GAP}))
     shown = shown.join(_falls(builds))
     shown = shown.sort_values("problem", key=lambda each: ~each.isin(FIRST), kind="stable")
+    shown["problem"] = shown["problem"].map(in_words)
     shown = shown.rename_axis("method or formulation").reset_index()
     tables: list[tuple[str, pd.DataFrame | _Drawn]] = (
         [] if result.speed is None else [*_speed_parts(result.speed)]
@@ -191,10 +191,11 @@ def comparison_page(engine: Engine, result: Comparison) -> str:
     tables += [(_with_legend("Methods and formulations; a click shows the build", shown), shown)]
     if result.printed is not None:
         printed = result.printed.add_suffix(", printed").rename_axis("largest").reset_index()
+        printed["largest"] = printed["largest"].str.replace("1e-3 mm", "µm")
         tables.append(("What the paper prints", printed))
     scatter, found = None, result.table.loc[result.table["gap"].notna(), ["seconds", "gap"]]
     if not found.empty:  # how long each formulation took and how far from the best its choice is
-        axes = ("seconds to choose, responses being known", "above the best, %")
+        axes = ("seconds to choose, responses being known", GAP)
         points = found.assign(gap=100 * found["gap"]).set_axis(axes, axis=1)
         scatter = Scatter("Speed against accuracy: a click shows the plan", points, axes[:1])
     sentence = f"{len(builds)} ways to build {scene.name}, step by step and side by side"
@@ -218,8 +219,10 @@ def _speed_parts(speed: SpeedTable) -> Iterator[tuple[str, pd.DataFrame | _Drawn
 def folder_page(engine: Engine, folder: Path, prover: BuildProver) -> str:
     """Return the page of the plans in a folder that a command has written."""
     scene, builds = engine.network.scene, folder_builds(engine, folder, prover)
-    ways = f"{len(builds)} way{'s' * (len(builds) > 1)}"
-    sentence = f"{scene.name}, built in {ways}, step by step"
+    if len(builds) == 1:
+        sentence = builds[0].sentence(scene, _grips_off(engine, builds[0]))
+        return report_page(engine, builds, sentence, [_worst_table(scene, builds)])
+    sentence = f"{scene.name}, built in {len(builds)} ways, step by step"
     return _page(engine, builds, sentence, [_worst_table(scene, builds)])
 
 
@@ -255,16 +258,15 @@ def front_page(
         (build,) = _builds(placed, {name: plan}, {name: left}, {name: stands})
         another = placed.build_order != scene.build_order
         builds.append(replace(build, order=placed.build_order) if another else build)
-    words = {**WORDS, "F_largest": WORDS["F_rob"]}  # another name for the same
+    words = {"F_largest": WORDS["F_rob"]}  # another name for the same
     points = table.rename(columns=words).set_axis(names)
-    lengths = [name for name in points if str(name).endswith("1e-3 mm")]
-    points = points.assign(**{str(name): 1e6 * points[name] for name in lengths})
+    points = _worded(points.assign(**{n: 1e6 * points[n] for n in ["D_max"] if n in points}))
     shown = points.join(_falls(builds)).rename_axis("plan").reset_index()
     if any(departures):
         shown[OUTSIDE] = ["yes" if each else "" for each in departures]
-    sentence = (
-        f"{len(plans)} plans for {scene.name}, none of which is better than another in everything"
-    )
+    sentence = f"1 plan for {scene.name} is best in everything"
+    if len(plans) > 1:
+        sentence = f"{len(plans):,} plans for {scene.name}, of which none beats another everywhere"
     scatter = Scatter("The Pareto set: every point is a plan; a click shows it", points)
     shows = [(_with_legend("The Pareto set; a click shows a plan", shown), shown)]
     return _page(engine, builds, sentence, shows, scatter)
@@ -283,4 +285,4 @@ def build_page(plan: ShownBuild, *others: ShownBuild) -> Page:
         names = chain([other.title], (f"{other.title} ({number})" for number in count(2)))
         tables[next(name for name in names if name not in tables)] = other.responses()
     table = tables.pop(plan.title)
-    return Page(plan_page(engine, plan.title, table, plan.result, others=tables))
+    return Page(plan_page(plan, table=table, others=tables))

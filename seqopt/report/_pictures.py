@@ -1,14 +1,9 @@
-"""Pictures and films of scenes, networks, the steps of builds and their grips (extra ``plot``)."""
+"""Pictures of scenes, networks, the steps of builds and their grips (extra ``plot``)."""
 
 from __future__ import annotations
 
-import io
-import tempfile
-from base64 import b64encode
 from collections.abc import Sequence
-from dataclasses import dataclass
 from numbers import Integral
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,11 +15,10 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
-from PIL import Image  # comes with matplotlib
 
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
-from seqopt.errors import FileError, StepError
+from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report._robots import Arms, Cell, _known_arms, _require_arms
@@ -50,7 +44,6 @@ from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
 VIEW = View(azimuth=25, elevation=18)
 NUMBERED = 30  # bricks up to which the nodes of a network are numbered
 FRAMES, MOST = 6, 24  # pictures of a build where no steps are named, and at most
-FILM_DPI, FILM_WIDTH, FILM_COLORS = 80, 6.0, 128  # inches
 SHADES = "YlGnBu"
 PALE = "#f2efe9"  # of a grip whose force is not known
 DARK = "#222222"
@@ -263,80 +256,6 @@ def _picked(steps: Sequence[Step], chosen: int | Sequence[int] | None) -> list[i
         if not isinstance(number, Integral) or not first <= int(number) <= last:
             raise StepError(f"step {short(number)}: the build has steps {first} to {last}")
     return [int(number) - first for number in numbers]
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Film:
-    """A build as a film: a notebook plays it, `save` writes it; see `steps_picture`."""
-
-    engine: Engine
-    steps: Sequence[Step]
-    forces: bool = False
-    magnify: float = 0.0
-    seconds: float = 0.4
-    arms: Arms | None = None
-
-    def __repr__(self) -> str:
-        name, count = self.engine.network.scene.name, len(self.steps)
-        return f"<Film of {name}: {count} steps; save('build.gif') writes it>"
-
-    def _repr_html_(self) -> str:
-        """Return the film as an animated GIF: it plays without scripts, and without a network."""
-        with tempfile.TemporaryDirectory() as folder:
-            film = self.save(Path(folder) / "film.gif").read_bytes()
-        source = f"data:image/gif;base64,{b64encode(film).decode()}"
-        return f'<img alt="{len(self.steps)} steps of a build" src="{source}">'
-
-    @styled
-    def save(self, path: str | Path) -> Path:
-        """Write the film to a file that ends in ``.gif``."""
-        path = Path(path)
-        if path.suffix != ".gif":
-            raise FileError(f"film {path}: give a name that ends in .gif")
-        cell = _cell(self.engine, self.steps, self.arms, forces=self.forces)
-        (left, low), (right, high) = box = _build_box(cell)
-        high_enough = max(FILM_WIDTH * (high - low) / (right - left), 2.0) + 0.5
-        figure = new_picture(FILM_WIDTH, high_enough, "none")
-        axes = figure.add_axes((0.02, 0.02, 0.96, 0.88))
-        frames = []
-        for at, step in enumerate(self.steps):
-            axes.clear()
-            if not self.forces:
-                _draw_robots(axes, cell, cell.arms(step, at), VIEW)
-            _draw_step(axes, self.engine, step, forces=self.forces, magnify=self.magnify)
-            draw_grips(axes, self.engine.network, step.grips, VIEW)
-            _frame(axes, cell.scene, step, self.steps[-1].number, box)
-            frames.append(_shown(figure))
-        try:
-            path.write_bytes(_animated(frames, self.seconds))
-        except OSError as error:
-            raise FileError(f"cannot write {path}: {error.strerror}; name another") from error
-        return path
-
-
-def _shown(figure: Figure) -> Image.Image:
-    """Return what a figure shows, as an image."""
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=FILM_DPI)
-    return Image.open(out).convert("RGB")
-
-
-def _animated(frames: Sequence[Image.Image], seconds: float) -> bytes:
-    """Return images as a GIF of few colors, the same in all: less than half of the bytes."""
-    wide, high = frames[0].size
-    some = [frames[k * (len(frames) - 1) // 3] for k in range(4)]
-    sample = Image.new("RGB", (wide, len(some) * high))
-    for k, frame in enumerate(some):
-        sample.paste(frame, (0, k * high))
-    colors, plain = sample.quantize(FILM_COLORS, Image.Quantize.FASTOCTREE), Image.Dither.NONE
-    palette = np.array(colors.getpalette()).reshape(-1, 3)
-    palette[palette.sum(axis=1).argmax()] = 255  # the background stays white
-    colors.putpalette(palette.ravel().tolist())
-    first, *more = (frame.quantize(palette=colors, dither=plain) for frame in frames)
-    out = io.BytesIO()
-    how: Any = {"save_all": True, "append_images": more, "loop": 0, "optimize": True}
-    first.save(out, format="GIF", duration=round(1000 * seconds), **how)
-    return out.getvalue()
 
 
 @styled

@@ -1,7 +1,7 @@
 """Robots as they are drawn: a simple arm from a base to its grip, where only a reach is known.
 
 An arm is a line of points, m: its foot, its joints, its wrist, and the tip of its tool. A robot
-that may be anywhere has no base: of it there is a tool while it holds.
+that may be anywhere is drawn beside the structure, at one of its ends.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from seqopt.sequence._postures import plan_postures
 from seqopt.sequence.exports import hold
 from seqopt.sequence.steps import Step
 
-ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#b85c00", "#444444", "#1f5fa8")
+ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#ad5600", "#444444", "#1f5fa8")
 _BESIDE = 0.3  # of a base from the structure, over the size of that
 _APART = 0.35  # of bases on one side from each other, likewise
 _HIGH = 0.12  # of a shoulder above its foot, over the reach
@@ -46,7 +46,7 @@ class Cell:
         self.scene, self._arms = scene, arms or {}
         self.up = np.array(scene.up)
         self.corners = np.vstack([vertices_of(brick)[0] for brick in scene.bricks])
-        self._found: dict[tuple[str, int | None], Floats | None] = {}
+        self._found: dict[tuple[str, int | None], Floats] = {}
 
     @cached_property
     def level(self) -> float:
@@ -103,7 +103,10 @@ class Cell:
 
     @cached_property
     def shoulders(self) -> dict[str, tuple[Floats, float]]:
-        """The shoulder (3,) and the reach, m, of every robot that has a base."""
+        """The shoulder (3,) and the reach, m, of every robot, where it may be anywhere as sketched.
+
+        Such a robot stands at the end of the structure at which fewer stand.
+        """
         out, beside = dict[str, tuple[Floats, float]](), list[tuple[Robot, Floats]]()
         for robot in self.scene.robots:
             reach = robot.reach
@@ -111,6 +114,10 @@ class Cell:
                 out[robot.name] = (np.array(reach.center), reach.radius)
             elif isinstance(reach, Side):
                 beside.append((robot, self._away(np.array(reach.toward))))
+        for robot in self.scene.robots:
+            if not isinstance(robot.reach, Sphere | Side):
+                ends = self._along * np.array([[1.0], [-1.0]])
+                beside.append((robot, min(ends, key=lambda end: sum(o @ end for _, o in beside))))
         for robot, away in beside:
             same = [each.name for each, other in beside if away @ other > 0.5]
             place = same.index(robot.name) - 0.5 * (len(same) - 1)
@@ -118,6 +125,25 @@ class Cell:
             far = float(np.linalg.norm(self.corners - foot, axis=1).max())
             out[robot.name] = (foot + _HIGH * far * self.up, far)
         return out
+
+    @cached_property
+    def _along(self) -> Floats:
+        """The level direction in which the structure is longest, (3,)."""
+        first = self._away(np.eye(3)[int(np.abs(self.up).argmin())])
+        sides = np.stack([first, np.cross(self.up, first)])
+        return np.asarray(sides[np.ptp(self.corners @ sides.T, axis=0).argmax()])
+
+    def reach(self, robot: Robot) -> list[float] | None:
+        """Return the middle of the circle on the ground up to which a robot reaches, and its size.
+
+        None where only a side is known, or the robot may be anywhere.
+        """
+        if not isinstance(robot.reach, Sphere):
+            return None
+        center = np.array(robot.reach.center)
+        high = float(center @ self.up) - self.level
+        wide = np.sqrt(max(robot.reach.radius**2 - high**2, 0.0))
+        return [*self._on_ground(center).round(4).tolist(), round(float(wide), 4)]
 
     def prop(self, prop: Prop) -> Floats:
         """Return the ends of a prop, its node first and its foot, (2, 3), m.
@@ -130,11 +156,8 @@ class Cell:
         far = height / rise if rise > _STEEP else _BESIDE * self.size
         return np.array([at, at - far * along])
 
-    def arm(self, robot: Robot, node: int | None) -> Floats | None:
-        """Return the points of a robot's arm that holds a node, or of one that is idle.
-
-        None if there is nothing to draw.
-        """
+    def arm(self, robot: Robot, node: int | None) -> Floats:
+        """Return the points of a robot's arm that holds a node, or of one that is idle."""
         key = (robot.name, node)
         if key not in self._found:
             self._found[key] = self._idle(robot) if node is None else self._holding(robot, node)
@@ -160,8 +183,6 @@ class Cell:
         held, brick = hold(self.scene, robot, node), self.scene.brick_of_node[node]
         tip = np.array(held.grip.point)
         wrist = tip - (held.depth + _TOOL * max(brick.dimensions)) * held.grip.axes[2]
-        if robot.name not in self.shoulders:
-            return np.array([wrist, tip])
         shoulder, reach = self.shoulders[robot.name]
         span = wrist - shoulder
         link = _SPARE * max(self._link(reach), 0.5 * float(np.linalg.norm(span)))
@@ -182,10 +203,8 @@ class Cell:
             return self._away(along)
         return np.asarray(flat / np.linalg.norm(flat))
 
-    def _idle(self, robot: Robot) -> Floats | None:
+    def _idle(self, robot: Robot) -> Floats:
         """Return the points of an arm that is folded over its base."""
-        if robot.name not in self.shoulders:
-            return None
         shoulder, reach = self.shoulders[robot.name]
         ahead = self._away(self.middle - shoulder)
         bent = [shoulder + self._link(reach) * (up * self.up + on * ahead) for up, on in _FOLDED]

@@ -48,7 +48,7 @@ TITLES = {
 COLUMNS = {
     "M_sup_Nm": "support moment\nM_sup [N m]",
     "F_max_N": "largest tension\nT_max [N]",
-    "D_max_1e-3mm": "largest displacement\nD_max [1e-3 mm]",
+    "D_max_1e-3mm": "largest displacement\nD_max [µm]",
 }
 ROW = 0.21  # inches of a bar
 PRINTED = "plan published by Bruun et al., its responses computed here"
@@ -58,7 +58,7 @@ LABELS = {
     "M_sup": "support moment M_sup [N m]",
     "T_max": "tension T_max [N]",
     "C_max": "compression C_max [N]",
-    "D_max": "displacement D_max [1e-3 mm]",
+    "D_max": "displacement D_max [µm]",
     "steps": "steps of the plan",
     "bond": "bond needed [kPa]",
     "friction": "friction needed",
@@ -101,13 +101,18 @@ def _softness_chart(
             panel.plot(own["stiffness"], own[response], **line)
             last = rigid.loc[rigid["build"] == name, response]
             panel.plot([end] * len(last), last, style.marker, color=style.color)
-        panel.set(xscale="log", yscale="log", title=f"{TITLES[response]} [{unit}]")
+        panel.set(xscale="log", yscale="log", title=f"{TITLES[response]} [{_read(unit)}]")
         plain(panel.yaxis)
     dress(*panels)
     for panel in panels[2:]:
         panel.set_xlabel("stiffness of grips [N/m]; marks on the right: rigid")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
+
+
+def _read(unit: str) -> str:
+    """Return a unit of tables as people read it."""
+    return unit.replace("1e-3 mm", "µm")
 
 
 @styled
@@ -121,7 +126,7 @@ def _maxima(result: Comparison) -> Figure:
         values = result.table[column].astype(float)
         bars = panel.barh([typed(name) for name in names], values, color=colors, height=0.7)
         panel.bar_label(bars, [f" {value:.3g}" for value in values], fontsize=SMALL)
-        panel.set_title(f"{TITLES[column]}, {column} [{unit}]")
+        panel.set_title(f"{TITLES[column]}, {column} [{_read(unit)}]")
         panel.margins(x=0.14)
         panel.tick_params(axis="y", length=0)
     panels[0].invert_yaxis()

@@ -27,9 +27,11 @@ from seqopt.engines.interface import Engine, Want
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, _prop_faults, overloads
+from seqopt.report._opening._says import deciding_step, far_off, in_a_sentence, robot_words
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
+from seqopt.report.text import in_words
 from seqopt.responses._tolerance import each_tolerance, held_in_steps, is_linear
-from seqopt.responses.quantities import _number_text, length_text
+from seqopt.responses.quantities import _number_text
 from seqopt.responses.table import OUTSIDE, Departure, force_column, step_fields
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Brick
@@ -47,7 +49,7 @@ RESPONSES = {
     "F_largest": "largest grip force, N",
     "M_sup_Nm": "largest support moment, N m",
     "F_max_N": "largest tension in an edge, N",
-    "D_max_1e-3mm": "largest displacement, 1e-3 mm",
+    "D_max_1e-3mm": "largest displacement, µm",
 }
 PARTS = {
     "style": "viewer.css",
@@ -70,7 +72,8 @@ class Build:
     responses; ``order`` names the bricks as they are placed, where that is not the scene's own
     order; ``falls`` (steps, B, 6): how steps fall, with the first mortar; ``arms``: the joints of
     robots whose postures are known, points (k, 3), m, from the base to the tip of the tool, an
-    entry a step, by the names of robots (of others a simple arm is drawn).
+    entry a step, by the names of robots (of others a simple arm is drawn); ``faults``: in which
+    steps arms cannot be, in words; ``along``: values of the steps of which the largest decides.
     """
 
     name: str
@@ -82,6 +85,13 @@ class Build:
     order: Order = ()
     falls: Floats | None = None
     arms: Arms = field(default_factory=dict)
+    faults: Sequence[str] = ()
+    along: Floats | None = None
+
+    def sentence(self, scene: Scene, off: Floats | None = None) -> str:
+        """Return what it is, as one sentence; ``off``: how far grips may be off in steps, m."""
+        known = self.verdicts, self.departures
+        return in_a_sentence(scene, self.table, *known, off, self.faults)
 
     def overloads(self, scene: Scene) -> tuple[Excess, ...]:
         """Return the payloads that steps exceed."""
@@ -126,6 +136,7 @@ class _Drawn:
 def _structure_data(network: Network) -> dict[str, object]:
     """Return a structure as lists, ready for JSON; edges end with their brick count."""
     scene = network.scene
+    cell = Cell(scene)
     return {
         "name": scene.name,
         "bricks": [
@@ -144,14 +155,18 @@ def _structure_data(network: Network) -> dict[str, object]:
             {"at": _rounded(ground.anchor), "brick": ground.brick} for ground in scene.grounds
         ],
         "robots": [
-            {"name": robot.name, "payload": robot.payload, "color": color}
+            {
+                "name": robot.name,
+                "words": robot_words(robot.name),
+                "payload": robot.payload,
+                "color": color,
+                "reach": cell.reach(robot),
+            }
             for robot, color in zip(scene.robots, cycle(ROBOT_COLORS), strict=False)
         ],
-        "props": [
-            {"line": _rounded(Cell(scene).prop(prop)), "node": prop.node} for prop in scene.props
-        ],
+        "props": [{"line": _rounded(cell.prop(prop)), "node": prop.node} for prop in scene.props],
         "up": list(scene.up),
-        "level": Cell(scene).level,
+        "level": cell.level,
     }
 
 
@@ -191,7 +206,8 @@ def _build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[st
     the ``scale`` of each step, or are None.
     """
     lines = [line.split(",") for line in csv_text(build.table).splitlines()]
-    own = engine.network.scene.build_order
+    scene, off = engine.network.scene, _grips_off(engine, build)
+    own = scene.build_order
     found: dict[str, Floats | None] = {"fall": build.falls}
     found |= _fields(engine, build) if fields else dict.fromkeys(FIELDS)
     return {
@@ -199,9 +215,16 @@ def _build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[st
         "bounds": dict(build.bounds),
         "rank": [build.order.index(name) for name in own] if build.order else None,
         "stands": _stands(build.verdicts),
-        "marks": _marks(engine.network.scene, build),
-        "off": _off(engine, build),
-        "arms": arm_data(engine.network.scene, build.steps, build.arms),
+        "marks": _marks(scene, build),
+        "verdicts": [
+            {"how": each.how, "of": [WORDS[verdict] for verdict in each.verdicts]}
+            for each in build.verdicts
+        ],
+        "decides": deciding_step(scene, build.table, build.verdicts, build.along),
+        "sentence": build.sentence(scene, off),
+        "words": in_words(build.name),
+        "off": [] if off is None else [_off_said(far) for far in off.tolist()],
+        "arms": arm_data(scene, build.steps, build.arms),
         "steps": [
             {
                 "number": step.number,
@@ -213,26 +236,33 @@ def _build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[st
         ],
         "columns": lines[0],
         "rows": lines[1:],
-        "forces": [force_column(robot) for robot in engine.network.scene.robots],
+        "forces": [force_column(robot) for robot in scene.robots],
         **{name: None if part is None else _packed(part) for name, part in found.items()},
     }
 
 
-def _off(engine: Engine, build: Build) -> list[str]:
-    """Return how far grips may be off in every step, in words; none where that is not known."""
+def _grips_off(engine: Engine, build: Build) -> Floats | None:
+    """Return how far grips may be off in every step, m; None where that is not known."""
     scene = engine.network.scene
     if not is_linear(engine) or len(scene.bricks) > _FEW or build.order:
-        return []
-    found = each_tolerance(engine, held_in_steps(scene, build.steps)).tolist()
-    words = (f"Grips may be {length_text(far)} off." for far in found)
-    return [said if 0 < far < np.inf else "" for far, said in zip(found, words, strict=True)]
+        return None
+    return each_tolerance(engine, held_in_steps(scene, build.steps))
+
+
+def _off_said(far: float) -> str:
+    """Return how far grips of a step may be off, in words; none where nobody holds."""
+    return f"Grips {far_off(far)}." if far < np.inf else ""
 
 
 def _marks(scene: Scene, build: Build) -> list[str]:
     """Return payloads that every step exceeds, and the linear range that it leaves, in words."""
     over, props, out = build.overloads(scene), _prop_faults(scene, build.table), []
     for step in build.steps:
-        said = [f"{each.robot} exceeds its payload" for each in over if step.number in each.steps]
+        said = [
+            f"{robot_words(each.robot)} exceeds its payload"
+            for each in over
+            if step.number in each.steps
+        ]
         said += ["a prop bears more than it may" for each in props if step.number in each.steps]
         left = [each.what for each in build.departures if step.number in each.steps]
         said += [f"{OUTSIDE}: {', '.join(left)}"] if left else []
@@ -282,6 +312,8 @@ def report_page(
     sentence: str,
     tables: Sequence[tuple[str, pd.DataFrame | _Drawn]] = (),
     scatter: Scatter | None = None,
+    *,
+    found: str = "",
 ) -> str:
     """Return a page that shows builds of one scene, as HTML that needs nothing else.
 
@@ -304,6 +336,7 @@ def report_page(
     return _filled(
         title=f"{escape(scene.name)}, step by step",
         sentence=escape(sentence + loading),
+        found=escape(found),
         tables="".join(_part(caption, part) for caption, part in tables),
         data=data.replace("<", "\\u003c"),  # so that it cannot end the script it stands in
     )
@@ -353,16 +386,19 @@ def _tasks(engine: Engine, build: Build) -> dict[str, str]:
 
     Arms are in their postures; where nothing computes these, grips are proposals.
     """
-    scene = engine.network.scene
-    try:
-        tasks = [*_known_tasks(scene, build.steps)]
-    except (ExtraError, SceneError):
-        tasks = [*plan_tasks(scene, build.steps)]
-    texts = {"csv": tasks_csv(tasks), "json": tasks_json(scene, tasks)}
     return {
         kind: b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode("ascii")
-        for kind, text in texts.items()
+        for kind, text in _task_texts(engine.network.scene, build.steps).items()
     }
+
+
+def _task_texts(scene: Scene, steps: Sequence[Step]) -> dict[str, str]:
+    """Return what robots do in a build as CSV and JSON."""
+    try:
+        tasks = [*_known_tasks(scene, steps)]
+    except (ExtraError, SceneError):
+        tasks = [*plan_tasks(scene, steps)]
+    return {"csv": tasks_csv(tasks), "json": tasks_json(scene, tasks)}
 
 
 def _left_out(builds: Sequence[Build], numbers: int) -> str:
@@ -378,7 +414,7 @@ def _asset(name: str) -> str:
 
 
 def _part(caption: str, part: pd.DataFrame | _Drawn) -> str:
-    """Return a table as HTML, numbers with four digits, or a picture."""
+    """Return a table as HTML, numbers as people write them, or a picture."""
     if isinstance(part, _Drawn):
         wide, narrow = (
             f"data:image/png;base64,{b64encode(png).decode('ascii')}"
@@ -389,7 +425,26 @@ def _part(caption: str, part: pd.DataFrame | _Drawn) -> str:
             f'<source media="(max-width: {NARROW}px)" srcset="{narrow}">'
             f'<img src="{wide}" alt="{escape(part.said)}"></picture></figure>'
         )
-    body = part.to_html(
-        index=False, border=0, na_rep="", float_format=_number_text, classes="wide"
-    ).replace(' style="text-align: right;"', "")  # as the page does itself
-    return f'<figure class="table"><figcaption>{escape(caption)}</figcaption>{body}</figure>'
+    body = (
+        part.map(_cell_text)
+        .to_html(index=False, border=0, classes="wide")
+        .replace(' style="text-align: right;"', "")
+    )  # as the page does itself
+    named = f"<figcaption>{escape(caption)}</figcaption>"
+    return f'<figure class="table" tabindex="0">{named}{body}</figure>'
+
+
+def _cell_text(value: object) -> object:
+    """Return a number with four digits, or a count with separators, without powers of ten."""
+    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.number):
+        return "" if value is None or value is pd.NA else value
+    if np.isnan(value):
+        return ""
+    if isinstance(value, int | np.integer):
+        return f"{value:,}"
+    number = float(value)
+    if 1e3 <= abs(number) < 1e12:
+        return f"{number:,.0f}"
+    text = _number_text(number)
+    small = "e" in text and np.isfinite(number)
+    return np.format_float_positional(float(text), trim="-") if small else text

@@ -225,7 +225,7 @@ def _softness_lines(table: pd.DataFrame, builds: Sequence[str]) -> list[str]:
     for response, unit in LARGEST.items():
         wide = table.pivot_table(response, "build", "stiffness", sort=False)
         heads = ["rigid" if k == np.inf else _in_short(k) for k in shown]
-        said = f"{WORDS[response]}, {unit}".replace("1e-3 mm", "0.001 mm")
+        said = f"{WORDS[response]}, {unit}".replace("1e-3 mm", "µm")
         lines.append(f"{said:<24}" + "".join(f"{head:>8}" for head in heads))
         for name in builds:
             values = wide.loc[name, list(shown)].to_numpy(float)

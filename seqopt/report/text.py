@@ -19,6 +19,7 @@ WORDS = {
     "published": "published plan",
     "modified-sequential": "modified sequential",
     "free": "free schedule",
+    "three-robot": "three-robot loop",
     "overlap_dp": "dynamic programming",
     "overlap_lp": "linear program",
     "overlap_mip": "integer program",
@@ -90,7 +91,7 @@ def _methods(comparison: Comparison, scene: Scene) -> str:
         if paper is not None:
             pairs = zip(maxima.iloc[row], paper.iloc[row], strict=True)
             cells = [f"{_number(own):>13}{_number(beside):>8}" for own, beside in pairs]
-        lines.append(f"{quantity:16}{''.join(cells)}")
+        lines.append(f"{str(quantity).replace('1e-3 mm', 'µm'):16}{''.join(cells)}")
     return "\n".join(lines)
 
 
@@ -109,7 +110,7 @@ def _formulations(table: pd.DataFrame, loop: LoopFacts, criterion: Criterion) ->
     for problem, rows in table.groupby("problem", sort=False):
         lines += [f"{problem}:", *(_line(f"  {name}", row) for name, row in rows.iterrows())]
     lines += [
-        "(N, N m, N, 1e-3 mm; ! a payload is exceeded; gap to the exact optimum of the same aim:",
+        "(N, N m, N, µm; ! a payload is exceeded; gap to the exact optimum of the same aim:",
         "minimax has its own, free the worst step over what the fixed methods reach; seconds to",
         "choose and to check: all formulations of the loop share",
         f"{loop.seconds['respond']:.4f} s for the responses of all choices, "
@@ -126,7 +127,7 @@ def _line(name: str, row: pd.Series[float]) -> str:
         f"{name:22}{cell(row['objective'], 11, '.2f')}{cell(row['gap'], 8, '.2%')}"
         f"{_number(row['F_rob']):>7}{'!' if row['overloaded'] else ' '}"
         + "".join(f"{_number(row[column]):>8}" for column in LARGEST if column != "F_rob")
-        + cell(row["models"], 8, ".0f")
+        + cell(row["models"], 8, ",.0f")
         + cell(row["seconds"], 9, ".4f")
     )
 
@@ -169,7 +170,7 @@ def _wrapped(text: str, indent: int = 2) -> str:
 
 def _number(value: object) -> str:
     number = float(str(value))
-    return "-" if np.isnan(number) else f"{number:.1f}" if abs(number) < 1e6 else f"{number:.0e}"
+    return "-" if np.isnan(number) else f"{number:.1f}" if abs(number) < 1e4 else f"{number:,.0f}"
 
 
 def in_words(name: str) -> str:

@@ -38,8 +38,9 @@ def is_tolerance(name: str) -> bool:
 
 
 def value_text(name: str, value: float) -> str:
-    """Return what an aim or a response is worth: of a tolerance as a length, else six digits."""
-    return length_text(value) if is_tolerance(name) else f"{value:.6g}"
+    """Return what an aim or a response is worth: a length in its unit, else six digits."""
+    length = is_tolerance(name) or name == "D_max"
+    return length_text(value) if length else f"{value:.6g}"
 
 
 @dataclass(frozen=True)

@@ -175,6 +175,8 @@ class _Kind:
 _MESHES = {".obj": True, ".off": True, ".ply": True, ".stl": True} | dict.fromkeys(
     (".3dm", ".3mf", ".glb"), False
 )  # and whether one has to say its unit
+
+
 def _herringbone(shape: VaultShape) -> Scene:
     """Return a herringbone vault around the arch of Bruun et al."""
     return herringbone_vault(_load_stored("arch25"), shape)

@@ -22,7 +22,8 @@ from seqopt.arms._drawn import idle_arm
 from seqopt.arms._model import ArmModel
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.plan._other.bases import without_arms
-from seqopt.report._pictures import VIEW, Film, steps_picture
+from seqopt.report._films._film import Film
+from seqopt.report._pictures import VIEW, steps_picture
 from seqopt.report._robots import _known_arms
 from seqopt.report.page import Build, _tasks
 from seqopt.sequence.exports._arm_tasks import _in_postures

@@ -185,7 +185,9 @@ def test_pareto_writes_table_plans_and_chart(capsys, tmp_path, arch):
         assert largest == pytest.approx(row["F_largest"], rel=1e-5)
         assert rows["M_sup_Nm"].max() <= row["M_sup"] * (1 + 1e-5)
     assert (out / "pareto.png").read_bytes()[:4] == b"\x89PNG"
-    picked = read_plan(load_scene(arch), out / "pick.csv")
+    picked = read_plan(load_scene(arch), out / "pick" / "plan.csv")
+    whole = {"plan.csv", "scene.json", "summary.json", "tasks.csv", "tasks.json", "report.html"}
+    assert {path.name for path in (out / "pick").iterdir()} == whole
     assert len(picked) == table["steps"][table["M_sup"].argmin()]
 
 

@@ -19,6 +19,7 @@ from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError
 from seqopt.network.build import build_network
+from seqopt.plan.build import GivenSequence
 from seqopt.report import page
 from seqopt.report._pages import OVER, comparison_page, plan_page
 from seqopt.report.page import LARGEST, Build, Scatter, _build_data, _structure_data, report_page
@@ -193,8 +194,8 @@ def test_a_browser_shows_the_numbers_of_the_step_that_is_asked_for(
         assert 'data-ready="true"' in text
         assert f"{name}, step {number} of 49" in text
         row = builds[name].table.iloc[number - 1]
-        for column in ("M_sup_Nm", "F_max_N", "D_max_1e-3mm"):
-            assert f">{row[column]:.6g}<" in text
+        for column, unit in (("M_sup_Nm", ""), ("F_max_N", ""), ("D_max_1e-3mm", " µm")):
+            assert f">{row[column]:.6g}{unit}<" in text
     broken = path.read_text("utf-8").replace('"steps":[', '"step":[')
     path.write_text(broken, "utf-8")
     assert 'data-ready="true"' not in shown(path)[0]  # the control
@@ -215,7 +216,7 @@ def test_a_build_in_another_order_shows_its_own_bricks(engine25, builds, shown, 
     for build, brick in (("sequential", 1), ("backward", 25)):
         found, errors = shown(path, f"step=1&build={build}")
         assert errors == []
-        assert f"Brick {brick} is placed; 1 of 25 bricks stand." in found
+        assert f"Brick {brick} is placed by robot 1; 1 of 25 bricks stand." in found
 
 
 def tables_of(text):
@@ -227,34 +228,40 @@ def tables_of(text):
 def test_what_robots_cannot_carry_is_said_first_in_the_table_and_at_the_step(engine25, builds):
     table = builds["sequential"].table.copy()
     table.loc[[3, 8], "F_rob1_N"] = [1565.0, 400.0]
-    text = plan_page(engine25, "cascade", table, "objective 1, gap 0 %")
+    text = plan_page(GivenSequence(engine25, builds["sequential"].steps, "cascade"), table=table)
     sentence = re.search('<p id="sentence">(.*?)</p>', text)[1]
-    assert sentence.startswith("2 robots cannot build arch25 in 49 steps like this: in 3 of 49 a ")
-    assert "up to 1,565 N where rob1 can hold 392.4 N (cascade: " in sentence
+    assert sentence.startswith("Not buildable: payload exceeded in 3 of 49 steps, first in step 4 ")
+    assert "(robot 1 would hold up to 1,565 N and can hold 392.4 N)" in sentence
     assert "a robot would hold more than it can. Such steps are marked in red<" in text
     rows = tables_of(text)
     at = rows[0].index(OVER)
     assert {row[0]: row[at] for row in rows[1:]}["cascade"] == "3 steps"
+    assert data_of(text)["builds"][0]["decides"] == 3
     marks = data_of(text)["builds"][0]["marks"]
     assert [k for k, said in enumerate(marks) if said] == [3, 8, 46]
-    assert marks[3] == "rob1 exceeds its payload"
+    assert marks[3] == "robot 1 exceeds its payload"
     assert data_of(text)["builds"][0]["bounds"] == {"F_largest": 392.4}
 
 
 def test_what_robots_carry_is_not_said_to_be_too_much(arch25):
     plan = optimize(arch25, "free")
-    text = plan_page(plan.engine, "free schedule", plan.responses(), plan.result)
-    assert '<p id="sentence">3 robots build arch25 in ' in text
-    assert not any(data_of(text)["builds"][0]["marks"])
+    text = plan_page(plan)
+    assert '<p id="sentence">3 robots build arch25 in 48 steps; all within payload, 75 % ' in text
+    data = data_of(text)["builds"][0]
+    assert not any(data["marks"])
+    assert data["sentence"] in text
+    held = plan.responses().iloc[: len(plan.steps) - 1]  # never the last step, which nobody holds
+    assert data["decides"] == held["D_max_1e-3mm"].argmax()  # the criterion's largest ratio here
 
 
 def test_large_numbers_are_readable(engine25, builds):
     table = builds["sequential"].table.copy()
     table.loc[3, "D_max_1e-3mm"] = 1.163e5
-    text = plan_page(engine25, "cascade", table, "").split('id="data"')[0]
-    assert "displacement 116.3 mm" in text
-    assert "116,300" in text
-    assert "e+0" not in text
+    text = plan_page(GivenSequence(engine25, builds["sequential"].steps, "cascade"), table=table)
+    text = text.split('id="data"')[0]
+    assert "<th>displacement, mm</th>" in text
+    assert "<td>116.3</td>" in text
+    assert not re.search(r"\de[+-]?\d|1e-3", text.split("</style>")[1])
 
 
 @pytest.mark.slow

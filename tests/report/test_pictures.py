@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import io
+import shutil
+import subprocess
 
 import pytest
 from PIL import Image
 
-from seqopt.errors import FileError, StepError
+from seqopt.errors import ExtraError, FileError, StepError
 from seqopt.plan.build import GivenSequence
-from seqopt.report._pictures import Film, spread_steps
+from seqopt.report._films._film import Film
+from seqopt.report._pictures import spread_steps
 from seqopt.sequence.two_robots import sequential
 
 
@@ -84,10 +87,26 @@ def test_a_film_has_a_picture_for_every_step(build, tmp_path):
         assert film.convert("RGB").getpixel((0, 0)) == (255, 255, 255)
         assert film.info["duration"] == 500
     assert short._repr_html_().startswith('<img alt="5 steps of a build" src="data:image/gif')
-    for wrong in ("build.mp4", "no folder/build.gif"):
-        with pytest.raises(FileError, match=r"ends in \.gif|cannot write"):
+    for wrong in ("build.avi", "no folder/build.gif"):
+        with pytest.raises(FileError, match=r"ends in \.gif, \.mp4|cannot write"):
             short.save(tmp_path / wrong)
     assert isinstance(build.animate(), Film)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="there is no ffmpeg")
+@pytest.mark.parametrize("ending", ["mp4", "webm"])
+def test_a_video_is_as_large_as_a_slide(build, tmp_path, ending, monkeypatch):
+    path = Film(build.engine, build.steps[:3]).save(tmp_path / f"build.{ending}")
+    asked = ["ffmpeg", "-i", str(path), "-vf", "fps=5", "-f", "image2", str(tmp_path / "%d.png")]
+    subprocess.run(asked, check=True, capture_output=True)
+    shown = [Image.open(io.BytesIO(p.read_bytes())) for p in sorted(tmp_path.glob("?.png"))]
+    assert len(shown) >= 4  # three steps of 0.4 s
+    assert {picture.size for picture in shown} == {(1920, 1080)}
+    assert shown[0].tobytes() != shown[-1].tobytes()
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(ExtraError, match=r"install it from ffmpeg\.org, or .* ends in \.gif"):
+        Film(build.engine, build.steps[:3]).save(path)
 
 
 def test_pictures_of_a_build_are_spread_over_it(build):

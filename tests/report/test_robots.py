@@ -44,15 +44,13 @@ def test_an_arm_leads_from_the_ground_to_the_node(scene):
         for node in scene.bricks[0].nodes:
             points = cell.arm(robot, node)
             np.testing.assert_allclose(points[-1], scene.node_position(node))
-            if robot.name in cell.shoulders:
-                foot, shoulder, elbow, wrist, _ = points
-                assert foot @ up == pytest.approx(cell.level)
-                np.testing.assert_allclose(shoulder, cell.shoulders[robot.name][0])
-                links = [np.linalg.norm(elbow - shoulder), np.linalg.norm(wrist - elbow)]
-                assert links[0] == pytest.approx(links[1], rel=1e-6)
-                assert elbow @ up >= min(shoulder @ up, wrist @ up) - 1e-9  # it hangs never through
-        idle = cell.arm(robot, None)
-        assert (idle is None) == (robot.name not in cell.shoulders)
+            foot, shoulder, elbow, wrist, _ = points
+            assert foot @ up == pytest.approx(cell.level)
+            np.testing.assert_allclose(shoulder, cell.shoulders[robot.name][0])
+            links = [np.linalg.norm(elbow - shoulder), np.linalg.norm(wrist - elbow)]
+            assert links[0] == pytest.approx(links[1], rel=1e-6)
+            assert elbow @ up >= min(shoulder @ up, wrist @ up) - 1e-9  # it hangs never through
+        assert cell.arm(robot, None)[0] @ up == pytest.approx(cell.level)  # it is idle
     assert (cell.corners @ up).min() == pytest.approx(cell.level)
 
 
@@ -68,7 +66,9 @@ def test_bases_are_where_reaches_say():
     assert feet["r2"][1] > high[1]
     assert np.linalg.norm(feet["r0"] - feet["r1"]) > 0.1 * cell.size
     np.testing.assert_allclose(feet["left"], ROBOTS[0].reach.center)
-    assert "mobile" not in feet
+    assert not low[0] < feet["mobile"][0] < high[0]  # at an end, being anywhere
+    assert cell.reach(ROBOTS[0]) == pytest.approx([-0.3, -0.5, cell.level, 2.0], abs=0.1)
+    assert cell.reach(ROBOTS[2]) is None
 
 
 def test_postures_that_are_known_are_drawn_as_they_are():
@@ -119,11 +119,7 @@ def test_a_browser_names_the_robots_that_it_draws(text, tmp_path):
         seen[state] = [name for attributes, name in names if "hidden" not in attributes]
         for kind in ("csv", "json"):
             assert re.search(f'<button id="{kind}"[^>]*hidden', page) is None
-    held = [r.name for r, node in zip(ROBOTS, STEPS[4].grips, strict=True) if node is not None]
-    assert seen == {
-        "step=5": ["left", "front", *(["mobile"] if "mobile" in held else [])],
-        "step=5&robots=off": [],
-    }
+    assert seen == {"step=5": ["left", "front", "mobile"], "step=5&robots=off": []}
 
 
 def test_figures_draw_the_ground_and_every_arm():

@@ -89,7 +89,7 @@ RESPONSES = {
     "F_rob": ("grip", "force, N", 15),
     "M_sup": ("support", "moment, N m", 14),
     "T_max": ("", "tension, N", 14),
-    "D_max": ("displacement,", "0.001 mm", 14),
+    "D_max": ("displacement,", "µm", 14),
 }  # above each column of responses, and how wide it is
 SOFTLY = "The same builds, by the stiffness of grips in N/m"
 SPEED = "Speed against accuracy"
@@ -319,7 +319,7 @@ def _cells(comparison: Comparison, name: str, row: pd.Series[float]) -> Iterator
     paper = _printed_largest(comparison, name)
     for response, (_, _, width) in RESPONSES.items():
         value = float(row[response])
-        said = f"{value:.1f}" if abs(value) < 1e6 else f"{value:.0e}"
+        said = f"{value:.1f}" if abs(value) < 1e4 else f"{value:,.0f}"
         said += f" ({paper[response]:.1f})" if response in paper else ""
         if response == "F_rob":
             said += "!" if row["overloaded"] else " "
@@ -366,7 +366,7 @@ def _choices(comparison: Comparison) -> Iterator[str]:
             steps = len(comparison.tables[str(name)])
             yield (
                 f"{f'  {name}':{NAME}}{row['objective']:10.2f}{100 * row['gap']:7.2f} %{steps:7}"
-                + _known(row["models"], 9, ".0f")
+                + _known(row["models"], 9, ",.0f")
                 + _known(row["seconds"], 9, ".3f")
                 + f"  {kinds.get(str(name), 'in print')}"
             )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import pandas as pd
 
@@ -27,20 +28,22 @@ from seqopt._cli.options import (
     robots_option,
     scene_options,
 )
-from seqopt._cli.outputs import figure_notes, write_outputs, written_to
+from seqopt._cli.outputs import _picked_files, figure_notes, write_outputs, written_to
 from seqopt._cli.posing import asked_problem
 from seqopt._cli.screens import question
 from seqopt._cli.values import parse_numbers
-from seqopt._files import csv_text
+from seqopt._files import csv_text, write_folder
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.graph.states.states import States
+from seqopt.plan.build import GivenSequence
 from seqopt.plan.front import Front, find_front, pick
 from seqopt.plan.solving import states_of
 from seqopt.problem.problem import Problem, judged_by
 from seqopt.report._pages import PAGE, front_page
 from seqopt.report.comparison import fixed_methods, shown_table, worst_of
+from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import LinearRange, analyze, builds_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import FREE
@@ -72,7 +75,7 @@ SCHEDULE = {
     f"sequence with open grips: {', '.join(SCHEDULES)}, or a CSV file"
 }
 CHOICE = {
-    "--pick NAME": "also write the plan with the least of a column of the table",
+    "--pick NAME": "also write a folder, pick, of the plan with the least of a column",
     "--round NAME=STEP ...": "round a number up to multiples of a step (SI units)",
     "--under BOUND ...": "for --pick: only plans below it: NAME=VALUE (SI units), or a method that "
     "is to be beaten in everything: sequential, cantilever, published",
@@ -103,6 +106,13 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.set_defaults(criteria=None, crown=None)
 
 
+@dataclass(frozen=True, repr=False)
+class _Picked(GivenSequence):
+    """A plan of a Pareto set."""
+
+    result: str = ""
+
+
 def run(options: argparse.Namespace) -> Answer:
     """Find all plans that no other beats in every aim, and write them."""
     return answered(options, *find(options))
@@ -131,15 +141,16 @@ def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Ans
     picked = None
     if options.pick:
         chosen = pick(front.table, options.pick, _under(options.under, methods))
-        files["pick.csv"] = csv_text(analyze(front.engines[chosen], front.steps[chosen]))
         scene = front.engines[chosen].network.scene  # in the order of what is picked
         values = shown_table(front.table).iloc[chosen]
         picked = {"point": chosen + 1, **values}
-        row = ", ".join(f"{name} {value:.6g}" for name, value in values.items())
+        row = ", ".join(f"{name} {value_text(str(name), v)}" for name, v in values.items())
         said += f"; picked row {chosen + 1}: {row}"
     written = write_outputs(options, lambda: files | {"scene.json": dump_scene(scene)})
     shown = "" if written else f"{_numbered(front).to_string(max_rows=MOST_ROWS)}\n"
     missing = figure_notes() if written else ()
+    if written and picked is not None:
+        _write_picked(options, front, chosen, picked, provers[front.engines[chosen]])
     answer = Answer(
         facts={
             "scene": scene_facts(scene),
@@ -153,6 +164,21 @@ def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Ans
         notes=(*level_notes(free.engine), *refused(next(iter(provers.values()))), *missing),
     )
     return marked(answer, left)
+
+
+def _write_picked(
+    options: argparse.Namespace,
+    front: Front,
+    chosen: int,
+    picked: Mapping[str, object],
+    prover: BuildProver,
+) -> None:
+    """Write the plan that is picked, a folder as of any plan."""
+    own = front.engines[chosen]
+    title = f"plan with the least {options.pick}"
+    plan = _Picked(own, front.steps[chosen], title, result=f"one of {len(front.steps)} plans")
+    report = {"scene": own.network.scene.name, "picked": picked, **provenance(own)}
+    write_folder(options.out / "pick", _picked_files(plan, report, prover))
 
 
 def _front_files(

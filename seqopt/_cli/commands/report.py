@@ -12,8 +12,10 @@ from seqopt._cli.options import BUILT, WRITTEN, declare, engine_options, form_op
 from seqopt._cli.outputs import figure_notes, keep_apart
 from seqopt._cli.screens import question
 from seqopt._files import require_folder, write_folder, write_text
+from seqopt._showing import display
 from seqopt.network.build import build_network
 from seqopt.report._pages import PAGE, folder_builds, folder_page
+from seqopt.stability._builds import BuildProver
 
 DESCRIPTION = (
     "Write a page with a step viewer of the plans in a folder: the structure in three dimensions, "
@@ -33,6 +35,8 @@ FOLDER = {
 }
 SHOWN = {
     "--out FILE": f"page to write (default: {PAGE} in DIR, of a scene its name with .html)",
+    "--film FILE": "also write a film of the first plan: .gif, or .mp4 or .webm of 1920 x 1080, "
+    "which need ffmpeg (needs matplotlib)",
     "--figures FOLDER": "also write figures there as PNG and SVG: steps, who holds what when, and "
     "responses along the build (needs matplotlib)",
 }
@@ -59,7 +63,7 @@ def run(options: argparse.Namespace) -> Answer:
         options.scene = str(own)
     scene = asked_scene(options)
     path = usual if options.out is None else options.out
-    keep_apart(options, path)
+    keep_apart(options, path, options.film)
     written: tuple[Path, ...] = (path,)
     if options.figures is not None:
         require_folder(options.figures)
@@ -68,6 +72,10 @@ def run(options: argparse.Namespace) -> Answer:
     engine = asked_engine(options, build_network(scene))
     prover = asked_prover(options, engine.network)
     write_text(path, folder_page(engine, options.folder, prover))
+    if options.film is not None:
+        options.tell("drawing the film")
+        first = folder_builds(engine, options.folder, BuildProver(engine.network, {}))[0]
+        written += (display("Film")(engine, first.steps).save(options.film),)
     if options.figures in written:
         from seqopt.report.charts import plan_figures  # noqa: PLC0415  # needs an extra
 

@@ -1,7 +1,7 @@
 "use strict";
 // What is drawn along the build, and a point for each build. `page` holds the data and what the viewer does.
 function makeCharts(page) {
-  const { structure, builds, shown, number, rank, responseAt, text, go, choose } = page;
+  const { structure, builds, shown, number, rank, responseAt, text, go, choose, happens, share, percent, held, plain, length } = page;
   const SVG = "http://www.w3.org/2000/svg";
   function draw(tag, attributes, parent, content) {
     const e = document.createElementNS(SVG, tag);
@@ -30,11 +30,11 @@ function makeCharts(page) {
   }
   function gantt(build) {
     const steps = build.steps.length, rows = structure.robots.length, width = 1180, height = 40 + 26 * rows, left = 70;
-    const { box, svg, x, cursor } = frame(`${build.name}: which brick each robot holds; darker where it carries more; a white dot where it places the brick${build.marks.some(Boolean) ? "; red below: over payload or outside the linear range" : ""}`, width, height, left, steps);
+    const { box, svg, x, cursor } = frame(`${build.words}: which brick each robot holds; darker where it carries more; a white dot where it places the brick${build.marks.some(Boolean) ? "; red below: over payload or outside the linear range" : ""}`, width, height, left, steps);
     const most = Math.max(1e-30, ...build.steps.flatMap((_, s) => build.forces.map((name) => Math.abs(number(build, s, name) || 0))));
     structure.robots.forEach((robot, r) => {
       const y = 22 + 26 * r;
-      draw("text", { x: left - 6, y: y + 14, "text-anchor": "end" }, svg, robot.name);
+      draw("text", { x: left - 6, y: y + 14, "text-anchor": "end" }, svg, robot.words);
       let s = 0;
       while (s < steps) {
         const node = build.steps[s].grips[r];
@@ -47,7 +47,7 @@ function makeCharts(page) {
           }
           const name = structure.bricks[structure.nodes[node].brick].name, span = x(end + 0.5) - x(s - 0.5);
           const mine = draw("rect", { x: x(s - 0.5), y, width: span, height: 20, fill: "none", stroke: "#222", "stroke-width": 0.7 }, svg);
-          draw("title", {}, mine, `${robot.name} holds brick ${name} at node ${node}, steps ${build.steps[s].number} to ${build.steps[end].number}`);
+          draw("title", {}, mine, `${robot.words} holds brick ${name} at node ${node}, steps ${build.steps[s].number} to ${build.steps[end].number}`);
           if (span > 9 * String(name).length) {
             draw("rect", { x: (x(s - 0.5) + x(end + 0.5)) / 2 - 4 * String(name).length - 1, y: y + 4, width: 8 * String(name).length + 2, height: 13, fill: "#fff", "fill-opacity": 0.85, rx: 2 }, svg);
             draw("text", { x: (x(s - 0.5) + x(end + 0.5)) / 2, y: y + 14.5, "text-anchor": "middle" }, svg, name);
@@ -55,7 +55,7 @@ function makeCharts(page) {
         }
         if (node !== null && build.steps[s].kind === "place" && rank(build, structure.nodes[node].brick) === build.steps[s].bricks - 1) {
           const dot = draw("circle", { cx: x(s), cy: y + 10, r: 3.2, fill: "#fff", stroke: "#222" }, svg);
-          draw("title", {}, dot, `${robot.name} places brick ${structure.bricks[structure.nodes[node].brick].name} in step ${build.steps[s].number}`);
+          draw("title", {}, dot, `${robot.words} places brick ${structure.bricks[structure.nodes[node].brick].name} in step ${build.steps[s].number}`);
         }
         s = end + 1;
       }
@@ -73,14 +73,16 @@ function makeCharts(page) {
   const drawn = () => [...new Set([...shown(), ...(builds.length > MOST ? [] : builds)])];
   function lines(name, title) {
     const builds = drawn(), steps = Math.max(...builds.map((b) => b.steps.length)), width = 430, height = 190, left = 44;
-    const { box, svg, x, cursor } = frame(title, width, height, left, steps);
-    const values = builds.map((build) => build.steps.map((_, s) => responseAt(build, s, name)));
+    let values = builds.map((build) => build.steps.map((_, s) => responseAt(build, s, name)));
+    const far = name.startsWith("D_") && Math.max(...values.flat()) >= 1000;  // then in mm
+    if (far) values = values.map((own) => own.map((v) => (v === null ? null : v / 1000)));
+    const { box, svg, x, cursor } = frame(far ? title.replace("µm", "mm") : title, width, height, left, steps);
     const bound = builds.map((build) => build.bounds[name]).find((b) => b !== undefined);
     const top = 1.06 * Math.max(1e-12, bound || 0, ...values.flat().filter((v) => v !== null));
     const y = (v) => height - 18 - (v / top) * (height - 40);
     for (const share of [0, 0.5, 1]) {
       draw("line", { class: "axis", x1: left, x2: width - 10, y1: y((share * top) / 1.06), y2: y((share * top) / 1.06), "stroke-opacity": share ? 0.25 : 1 }, svg);
-      draw("text", { x: left - 5, y: y((share * top) / 1.06) + 4, "text-anchor": "end" }, svg, Number(((share * top) / 1.06).toPrecision(3)));
+      draw("text", { x: left - 5, y: y((share * top) / 1.06) + 4, "text-anchor": "end" }, svg, plain(((share * top) / 1.06).toPrecision(3)));
     }
     if (bound) draw("line", { x1: left, x2: width - 10, y1: y(bound), y2: y(bound), stroke: "#a40018", "stroke-dasharray": "3 3" }, svg);
     builds.forEach((build, b) => {
@@ -98,13 +100,92 @@ function makeCharts(page) {
       svg.setAttribute("width", 34); svg.setAttribute("height", 10);
       draw("line", { x1: 2, x2: 30, y1: 5, y2: 5, stroke: color, "stroke-width": 2, "stroke-dasharray": dash }, svg);
       span.className = "key";
-      span.append(svg, " " + build.name);
+      span.append(svg, " " + build.words);
       out.append(span);
     });
     return out;
   }
 
+  // how much of its payload each robot uses
+  function use(build) {
+    const out = document.createElement("table");
+    out.innerHTML = "<tr><th>robot</th><th>payload, N</th><th>largest force, N</th><th>of payload</th><th>in step</th></tr>";
+    structure.robots.forEach((robot, r) => {
+      const row = document.createElement("tr"), name = document.createElement("td"), swatch = text("span", "", "swatch");
+      const all = build.steps.map((_, s) => share(build, s, r)), most = Math.max(...all), s = all.indexOf(most), over = most > 1 ? "over" : "";
+      swatch.style.background = robot.color;
+      name.append(swatch, robot.words);
+      row.append(name, text("td", plain(robot.payload.toPrecision(4))));
+      const cells = build.steps.some((step) => step.grips[r] !== null) ? [plain((most * robot.payload).toPrecision(4)), percent(most), linked(build, s)] : ["idle", "–", "–"];
+      row.append(...cells.map((cell) => { const td = text("td", "", over); td.append(cell); return td; }));
+      out.append(row);
+    });
+    return out;
+  }
+  function linked(build, s) {
+    const button = text("button", build.steps[s].number, "link");
+    button.type = "button";
+    button.addEventListener("click", () => go(s));
+    return button;
+  }
+  // what is wrong with each step, and whether it stands, along the slider
+  const LOOKS = { stands: "good", falls: "bad", "is undecided": "open" };
+  function strip(build, marking) {
+    const steps = build.steps.length, over = build.steps.map((_, s) => (structure.robots.some((_, r) => share(build, s, r) > 1 + 1e-9) ? "bad" : "good"));
+    const rows = [["payload", over, "exceeded"], ...build.verdicts.map(({ how, of }) => [how, of.map((word) => LOOKS[word]), "fall"])];
+    return rows.flatMap(([name, looks, wrong]) => {
+      const bad = looks.filter((look) => look === "bad").length, open = looks.filter((look) => look === "open").length;
+      const said = [bad ? `${plain(bad)} of ${plain(steps)} ${wrong === "fall" ? (bad === 1 ? "falls" : "fall") : "exceeded"}` : "", open ? `${plain(open)} not known` : ""].filter(Boolean).join(", ");
+      const label = text("span", `${name}: ${said || (wrong === "fall" ? "every step stands" : "every step within")}`, bad ? "over" : "");
+      if (bad) label.append(", first in step ", linked(build, looks.indexOf("bad")));
+      const svg = document.createElementNS(SVG, "svg");
+      for (const [key, v] of Object.entries({ viewBox: `0 0 ${steps} 10`, preserveAspectRatio: "none", role: "img", "aria-label": label.textContent })) svg.setAttribute(key, v);
+      for (let s = 0, end; s < steps; s = end) {
+        for (end = s + 1; end < steps && looks[end] === looks[s]; end += 1);
+        draw("rect", { x: s, y: looks[s] === "good" ? 3 : 0, width: end - s, height: looks[s] === "good" ? 4 : 10, class: looks[s] }, svg);
+      }
+      const here = draw("rect", { y: 0, width: Math.max(1, steps / 300) / 2, height: 10, fill: "#222" }, svg);
+      marking.push((at) => here.setAttribute("x", Math.min(at, steps - 1) + 0.25));
+      svg.addEventListener("click", (event) => { const { left, width } = svg.getBoundingClientRect(); go(Math.floor(((event.clientX - left) / width) * steps)); });
+      return [label, svg];
+    });
+  }
+  // every step in a row
+  const OPENED = 400;
+  function list(build, marking) {
+    const out = document.createElement("details"), box = document.createElement("div"), table = document.createElement("table"), rows = [];
+    out.append(text("summary", `Every step: what happens, which brick each robot holds with which share of its payload, and whether it stands`), box);
+    box.className = "scroll";
+    box.tabIndex = 0;
+    const head = document.createElement("tr");
+    head.append(...["step", "what happens", ...structure.robots.map((robot) => robot.words), ...build.verdicts.map(({ how }) => how)].map((name) => text("th", name)));
+    function fill() {
+      if (!out.open || rows.length) return;
+      table.append(head);
+      build.steps.forEach((step, s) => {
+        const row = document.createElement("tr"), first = document.createElement("td");
+        first.append(linked(build, s));
+        row.append(first, text("td", happens(build, s)));
+        structure.robots.forEach((_, r) => row.append(text("td", step.grips[r] === null ? "–" : `${held(step, r)}, ${percent(share(build, s, r))}`, share(build, s, r) > 1 ? "over" : "")));
+        build.verdicts.forEach(({ of }) => row.append(text("td", of[s] === "is undecided" ? "not known" : of[s], of[s] === "falls" ? "over" : "")));
+        row.dataset.step = step.number;
+        row.addEventListener("click", () => go(s));
+        rows.push(row);
+      });
+      table.append(...rows);
+      box.append(table);
+    }
+    out.addEventListener("toggle", fill);
+    out.open = build.steps.length <= OPENED;
+    fill();
+    marking.push((at) => rows.forEach((row, s) => {
+      if (row.classList.toggle("chosen", s === at)) box.scrollTop = row.offsetTop - box.clientHeight / 2;
+    }));
+    return out;
+  }
+
   // a point for each build, on axes that can be chosen
+  const worded = (name) => (builds.find((build) => build.name === name) || { words: name }).words;
   const NICE = [1, 2, 5];
   function ticks(low, high, log) {
     const out = [];
@@ -158,10 +239,10 @@ function makeCharts(page) {
       const x = axis(data, across, up, left, width - 20), y = axis(data, up, across, bottom, 26);
       draw("line", { class: "axis", x1: left, x2: width - 20, y1: bottom, y2: bottom }, svg);
       draw("line", { class: "axis", x1: left, x2: left, y1: 26, y2: bottom }, svg);
-      x.ticks.forEach((v) => draw("text", { x: x.at(v), y: bottom + 16, "text-anchor": "middle" }, svg, Number(v.toPrecision(4))));
+      x.ticks.forEach((v) => draw("text", { x: x.at(v), y: bottom + 16, "text-anchor": "middle" }, svg, plain(v.toPrecision(4))));
       y.ticks.forEach((v) => {
         draw("line", { class: "axis", x1: left, x2: width - 20, y1: y.at(v), y2: y.at(v), "stroke-opacity": 0.25 }, svg);
-        draw("text", { x: left - 6, y: y.at(v) + 4, "text-anchor": "end" }, svg, Number(v.toPrecision(4)));
+        draw("text", { x: left - 6, y: y.at(v) + 4, "text-anchor": "end" }, svg, plain(v.toPrecision(4)));
       });
       draw("text", { x: (left + width) / 2, y: height - 8, "text-anchor": "middle" }, svg, across);
       draw("text", { x: 14, y: (26 + bottom) / 2, "text-anchor": "middle", transform: `rotate(-90 14 ${(26 + bottom) / 2})` }, svg, up);
@@ -169,12 +250,12 @@ function makeCharts(page) {
       data.builds.forEach((name, i) => {
         const [a, b] = [data.values[across][i], data.values[up][i]];
         if (a === null || b === null) return;
-        const point = draw("circle", { cx: x.at(a), cy: y.at(b), r: 6, class: "point", "data-build": name, tabindex: 0, role: "button", "aria-label": `${name}: ${across} ${a}, ${up} ${b}` }, svg);
-        draw("title", {}, point, `${name}: ${Number(a.toPrecision(4))}, ${Number(b.toPrecision(4))}`);
+        const point = draw("circle", { cx: x.at(a), cy: y.at(b), r: 6, class: "point", "data-build": name, tabindex: 0, role: "button", "aria-label": `${worded(name)}: ${across} ${plain(a)}, ${up} ${plain(b)}` }, svg);
+        draw("title", {}, point, `${worded(name)}: ${plain(a.toPrecision(4))}, ${plain(b.toPrecision(4))}`);
         const chosen = () => choose(name);
         point.addEventListener("click", chosen);
         point.addEventListener("keydown", (event) => { if (["Enter", " "].includes(event.key)) { event.preventDefault(); event.stopPropagation(); chosen(); } });
-        if (data.builds.length <= FEW) name_point(svg, taken, x.at(a), y.at(b), name, width - 10);
+        if (data.builds.length <= FEW) name_point(svg, taken, x.at(a), y.at(b), worded(name), width - 10);
       });
       place.replaceChildren(box);
       mark();
@@ -191,5 +272,5 @@ function makeCharts(page) {
     out.mark = mark;
     return out;
   }
-  return { gantt, lines, legend, scatter, cursors };
+  return { gantt, lines, legend, scatter, cursors, use, strip, list };
 }

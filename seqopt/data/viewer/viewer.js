@@ -6,10 +6,14 @@
   const WORDS = {
     F_sup_N: "support force, N", M_sup_Nm: "support moment, N m", F_max_N: "largest tension in an edge, N",
     F_min_N: "largest compression in an edge, N", F_avg_N: "mean force of the edges, N", T_pct: "edges in tension, %",
-    "D_max_1e-3mm": "largest displacement, 1e-3 mm", "D_avg_1e-3mm": "mean displacement, 1e-3 mm", "D_std_1e-3mm": "spread of displacements, 1e-3 mm",
+    "D_max_1e-3mm": "largest displacement", "D_avg_1e-3mm": "mean displacement", "D_std_1e-3mm": "spread of displacements",
     props: "props that hold", F_prop_N: "largest force of a prop, N", prop_excess_N: "more than props may bear, N",
+    optimized_robot: "robot whose grip is chosen",
   };
-  const KINDS = { place: "place", release: "release", reposition: "reposition", remove: "remove" };
+  // numbers as people write them, and lengths, which are kept in µm
+  const plain = (v) => Number(v).toLocaleString("en-US", { maximumSignificantDigits: 6 });
+  const length = (v) => (Math.abs(v) >= 1000 ? `${plain(v / 1000)} mm` : `${plain(v)} µm`);
+  const shownValue = (name, v) => (Number.isNaN(Number(v)) ? v : name.startsWith("D_") ? length(Number(v)) : plain(v));
   const CLAY = 0xcc8560, PROP = 0x8a8478, NEW = 0xe8b04a, TENSION = 0xc8102e, COMPRESSION = 0x1f5fa8, LARGEST = 32767;
 
   // fields come as whole numbers, compressed
@@ -28,11 +32,14 @@
     constructor(place) {
       this.box = document.createElement("div");
       this.box.className = "pane";
+      this.names = document.createElement("canvas");
+      this.names.className = "names";
+      this.names.setAttribute("aria-hidden", "true");
       this.tag = document.createElement("div");
       this.tag.className = "tag";
       this.canvas = document.createElement("canvas");
       this.canvas.setAttribute("role", "img");
-      this.box.append(this.canvas, this.tag);
+      this.box.append(this.canvas, this.names, this.tag);
       place.append(this.box);
       this.scene = new THREE.Scene();
       this.scene.background = new THREE.Color(0xfbfaf8);
@@ -64,13 +71,21 @@
         const geometry = new THREE.BufferGeometry();
         geometry.setAttribute("position", new THREE.Float32BufferAttribute(new Float32Array(places.length * 3), 3));
         const mesh = new THREE.Mesh(geometry, new THREE.MeshLambertMaterial({ color: CLAY, side: THREE.DoubleSide }));
-        const rims = brick.faces.flatMap((f) => f.map((a, k) => [a, f[(k + 1) % f.length]]))
-          .filter(([a, b]) => { const key = Math.min(a, b) + ":" + Math.max(a, b); const seen = at.has(key); at.set(key, 1); return !seen; }).flat();
+        // an edge between faces that lie in one plane is none of the block's
+        brick.faces.forEach((f) => {
+          const normal = flat(brick.corners, f);
+          f.forEach((a, k) => {
+            const b = f[(k + 1) % f.length], key = [a, b].map((i) => brick.corners[i]).sort().join(";");
+            if (!at.has(key)) at.set(key, { ends: [a, b], normals: [] });
+            at.get(key).normals.push(normal);
+          });
+        });
+        const rims = [...at.values()].filter(({ normals }) => normals.length !== 2 || normals[0].dot(normals[1]) < 0.9999).flatMap(({ ends }) => ends);
         const lines = new THREE.BufferGeometry();
         lines.setAttribute("position", new THREE.Float32BufferAttribute(new Float32Array(rims.length * 3), 3));
         const outline = new THREE.LineSegments(lines, new THREE.LineBasicMaterial({ color: 0x4a2f22 }));
         this.scene.add(mesh, outline);
-        return { brick, mesh, outline, places, rims };
+        return { brick, mesh, outline, places, rims, here: brick.corners };
       });
     }
     makeEdges() {
@@ -122,6 +137,16 @@
       ground.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), up);
       this.scene.add(ground);
       const bar = new THREE.CylinderGeometry(1, 1, 1, 12), ball = new THREE.SphereGeometry(1, 16, 12), cone = new THREE.CylinderGeometry(0.35, 1, 1, 12);
+      this.reaches = structure.robots.filter(({ reach }) => reach && reach[3] > 0).map(({ reach, color }) => {
+        const [x, y, z, wide] = reach, turn = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 1, 0), up), ring = [];
+        const at = (k) => new THREE.Vector3(Math.cos((k * Math.PI) / 60), 0, Math.sin((k * Math.PI) / 60)).multiplyScalar(wide).applyQuaternion(turn).add(new THREE.Vector3(x, y, z));
+        for (let k = 0; k < 120; k += 1) ring.push(...at(k).toArray(), ...at(k + 1).toArray());
+        const line = new THREE.BufferGeometry();
+        line.setAttribute("position", new THREE.Float32BufferAttribute(new Float32Array(ring), 3));
+        const circle = new THREE.LineSegments(line, new THREE.LineBasicMaterial({ color }));
+        this.scene.add(circle);
+        return circle;
+      });
       const most = Math.max(2, ...builds.flatMap((build) => build.arms.lines.map((line) => line.length)));
       this.robots = structure.robots.map((robot) => {
         const paint = new THREE.MeshLambertMaterial({ color: robot.color, emissive: robot.color, emissiveIntensity: 0.4 }), dark = new THREE.MeshLambertMaterial({ color: 0x33312e });
@@ -130,7 +155,7 @@
         const foot = add(bar, dark), tool = add(cone, dark), name = document.createElement("span");
         name.className = "robot";
         name.style.color = robot.color;
-        name.textContent = robot.name;
+        name.textContent = robot.words;
         this.box.append(name);
         this.scene.add(group);
         return { group, bars, joints, foot, tool, name, at: new THREE.Vector3() };
@@ -146,6 +171,7 @@
         mesh.scale.set(wide, Math.max(long, 1e-9), wide);
         if (mesh.visible) mesh.quaternion.setFromUnitVectors(upright, along.divideScalar(long));
       };
+      this.reaches.forEach((circle) => { circle.visible = options.robots; });
       this.robots.forEach(({ group, bars, joints, foot, tool, name, at }, r) => {
         const line = options.robots ? build.arms.lines[build.arms.at[s][r]] : undefined;
         group.visible = line !== undefined;
@@ -173,6 +199,36 @@
         name.style.left = `${Math.round((seen.x + 1) * w / 2)}px`;
         name.style.top = `${Math.round((1 - seen.y) * h / 2)}px`;
       });
+    }
+    // numbers of the bricks whose middles no other brick hides
+    numberBricks() {
+      const { clientWidth: w, clientHeight: h } = this.box, ratio = Math.min(window.devicePixelRatio, 2), pen = this.names.getContext("2d");
+      this.names.width = w * ratio;
+      this.names.height = h * ratio;
+      Object.assign(this.names.style, { width: `${w}px`, height: `${h}px` });
+      const mode = byId("numbers").value, bricks = this.bricks.filter(({ mesh }) => mesh.visible);
+      if (!mode || !this.build || bricks.length > SEEN) return;
+      pen.scale(ratio, ratio);
+      const eye = this.camera.position, bodies = bricks.map(body);
+      const taken = [];
+      bodies.map((own) => [own.middle.distanceTo(eye), own]).sort((a, b) => a[0] - b[0]).forEach(([, own]) => {
+        if (bodies.some((other) => other !== own && hides(other, eye, own.middle))) return;
+        const i = structure.bricks.indexOf(own.brick), at = own.middle.clone().project(this.camera);
+        const [x, y, words] = [((at.x + 1) * w) / 2, ((1 - at.y) * h) / 2 + 4, String(mode === "order" ? rank(this.build, i) + 1 : own.brick.name)];
+        if (taken.some(([a, b]) => Math.abs(a - x) < 7 * words.length && Math.abs(b - y) < 11)) return;
+        taken.push([x, y]);
+        written(pen, words, x, y, "#222");
+      });
+    }
+    // what is seen, with its names, as one picture
+    picture() {
+      const out = document.createElement("canvas"), pen = out.getContext("2d"), ratio = this.canvas.width / this.box.clientWidth;
+      [out.width, out.height] = [this.canvas.width, this.canvas.height];
+      pen.drawImage(this.canvas, 0, 0);
+      pen.drawImage(this.names, 0, 0, out.width, out.height);
+      pen.scale(ratio, ratio);
+      this.robots.forEach(({ name }) => { if (!name.hidden) written(pen, name.textContent, parseFloat(name.style.left), parseFloat(name.style.top) - 18, name.style.color); });
+      return out.toDataURL("image/png");
     }
     // an arrow ends where its ground end pushes
     showReactions(build, s, shown) {
@@ -216,14 +272,16 @@
     }
     show(build, at, options) {
       const s = Math.min(at, build.steps.length - 1), step = build.steps[s], p = [0, 0, 0];
-      this.tag.textContent = `${build.name}: step ${step.number}, ${KINDS[step.kind] || step.kind}`;
+      this.build = build;
+      this.tag.textContent = `${build.words}: step ${step.number}, ${happens(build, s)}`;
       this.tag.classList.toggle("over", build.marks[s] !== "");
       if (build.marks[s]) this.tag.append(`; ${build.marks[s]}`);
       this.canvas.setAttribute("aria-label", `${structure.name}, ${this.tag.textContent}, ${step.bricks} bricks`);
-      this.bricks.forEach(({ brick, mesh, outline, places, rims }, i) => {
+      this.bricks.forEach((own, i) => {
+        const { brick, mesh, outline, places, rims } = own;
         mesh.visible = outline.visible = rank(build, i) < step.bricks;
         if (rank(build, i) >= step.bricks) return;
-        const here = brick.corners.map((corner) => [...this.moved(build, s, i, corner, options, p)]);
+        const here = own.here = brick.corners.map((corner) => [...this.moved(build, s, i, corner, options, p)]);
         for (const [object, order] of [[mesh, places], [outline, rims]]) {
           const array = object.geometry.attributes.position.array;
           order.forEach((corner, k) => array.set(here[corner], 3 * k));
@@ -276,7 +334,36 @@
       this.edges.instanceMatrix.needsUpdate = true;
       this.edges.instanceColor.needsUpdate = true;
     }
-    draw() { this.renderer.render(this.scene, this.camera); if (this.robots) this.nameRobots(); if (this.marks) this.marks.place(); }
+    draw() { this.renderer.render(this.scene, this.camera); if (this.robots) { this.nameRobots(); this.numberBricks(); } if (this.marks) this.marks.place(); }
+  }
+
+  // blocks as bodies, and what hides what
+  const SEEN = 200;
+  const SHORT = 60;
+  function flat(corners, face) {
+    const [a, b, c] = face.map((i) => new THREE.Vector3(...corners[i]));
+    return new THREE.Vector3().crossVectors(b.sub(a), c.sub(a)).normalize();
+  }
+  function body({ brick, here, places }) {
+    const points = here.map((place) => new THREE.Vector3(...place)), middle = points.reduce((sum, p) => sum.add(p), new THREE.Vector3()).divideScalar(points.length);
+    return { brick, points, places, middle, size: Math.max(...points.map((p) => p.distanceTo(middle))) };
+  }
+  function hides({ points, places, middle, size }, eye, target) {
+    const ray = target.clone().sub(eye), along = middle.clone().sub(eye).dot(ray) / ray.dot(ray);
+    if (along < 0 || along > 1.2 || eye.clone().addScaledVector(ray, along).distanceTo(middle) > size) return false;
+    for (let k = 0; k < places.length; k += 3) {
+      const [a, b, c] = [points[places[k]], points[places[k + 1]], points[places[k + 2]]];
+      const u = b.clone().sub(a), v = c.clone().sub(a), p = new THREE.Vector3().crossVectors(ray, v), det = u.dot(p);
+      if (Math.abs(det) < 1e-15) continue;
+      const t = eye.clone().sub(a), x = t.dot(p) / det, q = t.cross(u), y = ray.dot(q) / det, far = v.dot(q) / det;
+      if (x >= 0 && y >= 0 && x + y <= 1 && far > 0 && far < 0.995) return true;
+    }
+    return false;
+  }
+  function written(pen, words, x, y, color) {
+    Object.assign(pen, { font: "600 12px system-ui, sans-serif", textAlign: "center", lineWidth: 3, strokeStyle: "rgb(255 255 255 / 85%)", fillStyle: color, lineJoin: "round" });
+    pen.strokeText(words, x, y);
+    pen.fillText(words, x, y);
   }
 
   // where everything is
@@ -299,7 +386,7 @@
       return { center, side, far: far || 3 * radius };
     };
     const own = from(corners), all = from([...corners, ...stands]);
-    return all.far <= 1.7 * own.far ? all : { ...own, far: 1.7 * own.far };
+    return all.far <= 2.6 * own.far ? all : { ...own, far: 2.6 * own.far };
   }
   const yard = 1.05 * Math.max(radius, ...stands.map((place) => place.distanceTo(middle)));
   const panes = [];
@@ -332,30 +419,42 @@
   const responseAt = (build, s, name) => (name === "F_largest" ? largest(build, s) : number(build, s, name));
   const text = (tag, content, name) => { const e = document.createElement(tag); e.textContent = content; if (name) e.className = name; return e; };
 
+  function happens(build, s) {
+    const step = build.steps[s], newest = structure.bricks.find((_, i) => rank(build, i) === step.bricks - (step.kind === "remove" ? 0 : 1));
+    const before = s ? build.steps[s - 1].grips : step.number === 1 ? step.grips.map(() => null) : step.grips;
+    const who = (own) => structure.robots.filter((_, r) => before[r] !== step.grips[r] && own(step.grips[r])).map((robot) => robot.words).join(", ").replace(/, ([^,]*)$/, " and $1");
+    const taker = who((node) => node !== null && (step.kind !== "place" || structure.bricks[structure.nodes[node].brick] === newest));
+    if (step.kind === "place") return `brick ${newest.name} is placed${taker ? ` by ${taker}` : ""}`;
+    if (step.kind === "remove") return `brick ${newest.name} is taken away`;
+    const leaver = who((node) => node === null) || "a robot";
+    if (step.kind === "release") return `${leaver} ${leaver.includes(" and ") ? "let" : "lets"} go`;
+    return `${taker || "a robot"} takes a new grip`;
+  }
+  const share = (build, s, r) => Math.abs(number(build, s, build.forces[r]) || 0) / structure.robots[r].payload;
+  const percent = (v) => `${Math.round(100 * v)} %`;
+  const held = (step, r) => (step.grips[r] === null ? "–" : structure.bricks[structure.nodes[step.grips[r]].brick].name);
   function table(build, at) {
-    const s = Math.min(at, build.steps.length - 1), step = build.steps[s], out = document.createElement("div");
-    out.append(text("h2", `${build.name}, step ${step.number} of ${build.steps.length}`));
-    const newest = structure.bricks.find((_, i) => rank(build, i) === step.bricks - (step.kind === "remove" ? 0 : 1));
-    const what = step.kind === "place" ? `Brick ${newest.name} is placed` : step.kind === "remove" ? `Brick ${newest.name} is taken away` : step.kind === "release" ? "A robot lets go" : "A robot takes a new grip";
-    out.append(text("p", `${what}; ${step.bricks} of ${structure.bricks.length} bricks stand.` + (build.stands[s] ? ` It ${build.stands[s]}.` : "") + (build.off[s] ? ` ${build.off[s]}` : "")));
+    const s = Math.min(at, build.steps.length - 1), step = build.steps[s], out = document.createElement("div"), what = happens(build, s);
+    out.append(text("h2", `${build.words}, step ${step.number} of ${build.steps.length}`));
+    if (s === build.decides) out.append(text("p", build.marks[s] ? "The step that decides: the first where something is wrong." : "The step that decides: the worst of all.", "hint"));
+    out.append(text("p", `${what[0].toUpperCase()}${what.slice(1)}; ${step.bricks} of ${structure.bricks.length} bricks stand.` + (build.stands[s] ? ` It ${build.stands[s]}.` : "") + (build.off[s] ? ` ${build.off[s]}` : "")));
     if (build.marks[s]) out.append(text("p", build.marks[s], "over"));
     const grips = document.createElement("table"), rows = document.createElement("table");
-    grips.innerHTML = "<tr><th>robot</th><th>brick</th><th>node</th><th>force, N</th></tr>";
+    grips.innerHTML = "<tr><th>robot</th><th>brick</th><th>node</th><th>force, N</th><th>of payload</th></tr>";
     structure.robots.forEach((robot, r) => {
       const row = document.createElement("tr"), name = document.createElement("td"), swatch = text("span", "", "swatch");
       swatch.style.background = robot.color;
-      name.append(swatch, robot.name);
-      const node = step.grips[r], i = column(build, build.forces[r]);
-      const force = build.rows[s][i];
-      row.append(name, text("td", node === null ? "–" : structure.bricks[structure.nodes[node].brick].name), text("td", node === null ? "–" : node));
-      row.append(text("td", force === "" ? "–" : force, force !== "" && Math.abs(Number(force)) > robot.payload ? "over" : ""));
+      name.append(swatch, robot.words);
+      const node = step.grips[r], force = build.rows[s][column(build, build.forces[r])], over = force !== "" && Math.abs(Number(force)) > robot.payload ? "over" : "";
+      row.append(name, text("td", node === null ? "idle" : held(step, r)), text("td", node === null ? "–" : node));
+      row.append(text("td", force === "" ? "–" : plain(force), over), text("td", force === "" ? "–" : percent(share(build, s, r)), over));
       grips.append(row);
     });
     build.columns.forEach((name, i) => {
       if (["step", "type", "bricks"].includes(name) || /_(node|brick)$|_sup_\d/.test(name) || build.forces.includes(name) || build.rows[s][i] === "") return;
       const row = document.createElement("tr"), bound = build.bounds[name];
       row.append(text("td", WORDS[name] || name));
-      row.append(text("td", build.rows[s][i], bound !== undefined && Number(build.rows[s][i]) > bound ? "over" : ""));
+      row.append(text("td", shownValue(name, build.rows[s][i]), bound !== undefined && Number(build.rows[s][i]) > bound ? "over" : ""));
       rows.append(row);
     });
     out.append(grips, rows, ...supports(build, s));
@@ -370,7 +469,7 @@
     out.innerHTML = "<tr><th>support at brick</th><th>force, N</th><th>moment, N m</th></tr>";
     for (const g of acting) {
       const row = document.createElement("tr");
-      row.append(text("td", structure.grounds[g].brick), text("td", Number(size(build.push, g).toPrecision(3))), text("td", Number(size(build.turn, g).toPrecision(3))));
+      row.append(text("td", structure.grounds[g].brick), text("td", plain(size(build.push, g).toPrecision(3))), text("td", plain(size(build.turn, g).toPrecision(3))));
       out.append(row);
     }
     return [out];
@@ -389,10 +488,12 @@
     pair.forEach((build, i) => panes[i].show(build, at, options()));
     byId("where").textContent = `step ${at + 1} of ${Number(slider.max) + 1}`;
     byId("now").replaceChildren(...pair.map((build) => table(build, at)));
+    marking.forEach((mark) => mark(at));
     charts.cursors.forEach((move) => move(at));
     for (const id of ["copy", "csv", "json"]) byId(id).hidden = !pair[0].tasks;
     if (points) points.mark();
   }
+  let moved = false;  // by whom looks at it
   function go(s) { slider.value = Math.max(0, Math.min(Number(slider.max), s)); refresh(); }
   function pause() { clearInterval(timer); timer = null; byId("play").textContent = "play"; }
   function play() {
@@ -401,10 +502,20 @@
     byId("play").textContent = "pause";
     timer = setInterval(() => { if (Number(slider.value) >= Number(slider.max)) pause(); else go(Number(slider.value) + 1); }, 450);
   }
-  const charts = makeCharts({ structure, builds, shown, number, rank, responseAt, text, go, choose });
+  const charts = makeCharts({ structure, builds, shown, number, rank, responseAt, text, go, choose, happens, share, percent, held, plain, length });
+  const marking = [];
+  // what is said of the build that is chosen
+  function about() {
+    const [build] = shown(), whole = byId("sentence").textContent;
+    byId("about").textContent = whole.startsWith(build.sentence) ? "" : build.sentence[0].toUpperCase() + build.sentence.slice(1);
+    byId("use").replaceChildren(charts.use(build));
+    byId("strip").replaceChildren(...charts.strip(build, marking));
+    byId("steps").replaceChildren(charts.list(build, marking));
+  }
   const points = data.scatter && charts.scatter(data.scatter);
   function drawCharts() {
-    charts.cursors.length = 0;
+    charts.cursors.length = marking.length = 0;
+    about();
     const grid = document.createElement("div");
     grid.className = "grid";
     for (const [name, title] of Object.entries(responses)) grid.append(charts.lines(name, title));
@@ -417,13 +528,14 @@
     const i = builds.findIndex((build) => build.name === name);
     byId("first").value = i;
     drawCharts();
-    refresh();
+    if (moved) refresh();
+    else go(builds[i].decides);
     for (const row of document.querySelectorAll("#tables tr[data-build]")) row.classList.toggle("chosen", row.dataset.build === name);
   }
   for (const row of document.querySelectorAll("#tables tbody tr")) {
     const cell = row.cells[0], name = cell ? cell.textContent : "";
     if (!builds.some((build) => build.name === name)) continue;
-    const button = text("button", name, "link");
+    const button = text("button", builds.find((build) => build.name === name).words, "link");
     button.type = "button";
     button.addEventListener("click", () => choose(name));
     cell.replaceChildren(button);
@@ -432,9 +544,10 @@
 
   byId("name").textContent = structure.marks ? structure.name : `${structure.name}, step by step`;
   byId("note").textContent = data.note;
+  byId("sentence").classList.toggle("wrong", /^(Not buildable|Outside)/.test(byId("sentence").textContent));
   builds.forEach((build, i) => {
-    byId("first").append(new Option(build.name, i));
-    byId("second").append(new Option(build.name, i));
+    byId("first").append(new Option(build.words, i));
+    byId("second").append(new Option(build.words, i));
   });
   byId("second").prepend(new Option("nothing", "", true, true));
   byId("second").value = "";
@@ -442,14 +555,24 @@
   await Promise.all(builds.map(async ({ tasks }) => { for (const kind in tasks) tasks[kind] = new TextDecoder().decode(await unzip(tasks[kind])); }));
   for (const id of ["first", "second"]) byId(id).addEventListener("change", () => { drawCharts(); refresh(); });
   for (const id of ["magnify", "forces", "robots", "fall"]) byId(id).addEventListener("input", refresh);
-  slider.addEventListener("input", refresh);
-  byId("back").addEventListener("click", () => go(Number(slider.value) - 1));
-  byId("on").addEventListener("click", () => go(Number(slider.value) + 1));
+  byId("numbers").value = structure.bricks.length > SHORT ? "" : "names";
+  byId("numbers").addEventListener("input", () => panes.forEach((pane) => pane.draw()));
+  slider.addEventListener("input", () => { moved = true; refresh(); });
+  const step = (by) => { moved = true; go(Number(slider.value) + by); };
+  byId("back").addEventListener("click", () => step(-1));
+  byId("on").addEventListener("click", () => step(1));
+  // canvases are not printed everywhere: a picture of what is seen is
+  function pictured() {
+    byId("picture").src = panes[0].picture();
+    byId("picture").alt = panes[0].canvas.getAttribute("aria-label");
+  }
+  window.addEventListener("beforeprint", pictured);
+  byId("print").addEventListener("click", () => window.print());
   byId("play").addEventListener("click", play);
   byId("save").addEventListener("click", () => {
     const link = document.createElement("a");
     link.download = `${structure.name} step ${Number(slider.value) + 1}.png`;
-    link.href = panes[0].canvas.toDataURL("image/png");
+    link.href = panes[0].picture();
     link.click();
   });
   for (const [kind, type] of [["csv", "text/csv"], ["json", "application/json"]]) byId(kind).addEventListener("click", () => {
@@ -471,7 +594,7 @@
   });
   document.addEventListener("keydown", (event) => {
     if (["SELECT", "INPUT", "BUTTON"].includes(event.target.tagName) && event.target !== slider) return;
-    const keys = { ArrowLeft: () => go(Number(slider.value) - 1), ArrowRight: () => go(Number(slider.value) + 1), Home: () => go(0), End: () => go(Number(slider.max)), " ": play };
+    const keys = { ArrowLeft: () => step(-1), ArrowRight: () => step(1), Home: () => go(0), End: () => go(Number(slider.max)), " ": play };
     if (keys[event.key]) { event.preventDefault(); keys[event.key](); }
   });
   const asked = new URLSearchParams(location.hash.slice(1));
@@ -484,6 +607,8 @@
   byId("fall").checked = asked.has("fall");
   drawCharts();
   slider.max = Math.max(...shown().map((build) => build.steps.length)) - 1;
-  go(asked.has("step") ? Number(asked.get("step")) - 1 : Number(slider.max));
+  moved = asked.has("step");
+  go(moved ? Number(asked.get("step")) - 1 : shown()[0].decides);
+  pictured();
   document.body.dataset.ready = "true";
 })();

@@ -1,0 +1,184 @@
+"""What a page opens with: the step that decides, one sentence, and a summary on one sheet."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+
+import numpy as np
+import pytest
+
+from seqopt.problem.criteria import WORST_OVER_METHODS
+from seqopt.problem.requirements import SceneFacts
+from seqopt.report._opening._says import deciding_step, in_a_sentence, worst_along
+from seqopt.report.page import Build, report_page
+from seqopt.responses.table import Departure, analyze
+from seqopt.sequence.two_robots import sequential
+from seqopt.stability._builds import BuildVerdicts
+from seqopt.stability.assessment import Verdict
+from tests.browser import BROWSER, WORDS, browsed
+
+STANDS, FALLS, OPEN = Verdict.STANDS, Verdict.FALLS, Verdict.UNDECIDED
+browser = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
+
+
+@pytest.fixture(scope="module")
+def steps(engine25):
+    return sequential(engine25.network)
+
+
+@pytest.fixture(scope="module")
+def table(engine25, steps):
+    """A build within all payloads: what exceeds one is half of it."""
+    found = analyze(engine25, steps)
+    found.loc[46, "F_rob2_N"] = 196.2
+    return found
+
+
+def dry(*wrong, verdict=FALLS):
+    """Return verdicts of a build of 49 steps, some of which do not stand."""
+    found = tuple(verdict if number in wrong else STANDS for number in range(1, 50))
+    first = wrong[0] if wrong and verdict is FALLS else 0
+    return BuildVerdicts("dry", found, first, "7" * bool(first), "6-7" * bool(first))
+
+
+def test_one_sentence_says_what_can_be_acted_on(engine25, table):
+    scene = engine25.network.scene
+    off = np.full(49, 3.12e-4)
+    said = in_a_sentence(scene, table, [dry()], (), off)
+    assert said == (
+        "2 robots build arch25 in 49 steps; all within payload, 95 % at most (robot 1 in step 26); "
+        "every step stands, dry; rigid grips may be 310 µm off."
+    )
+    assert "; whether its steps stand was not asked." in in_a_sentence(scene, table)
+    assert "may not be off at all in step 1." in in_a_sentence(scene, table, [dry()], (), 0 * off)
+    unknown = in_a_sentence(scene, table, [dry(3, 4, verdict=OPEN)])
+    assert "of 2 steps it is not known whether they stand dry" in unknown
+    assert "every step" not in unknown
+
+
+def test_what_cannot_be_built_is_said_first(engine25, table):
+    scene, over = engine25.network.scene, table.copy()
+    over.loc[46, "F_rob2_N"] = 500.0
+    said = in_a_sentence(scene, over, [dry(9, 12)], (), np.ones(49))
+    assert said == (
+        "Not buildable: payload exceeded in 1 of 49 steps, first in step 47 (robot 2 would hold up "
+        "to 500 N and can hold 392.4 N); dry, 2 of 49 steps fall, the first is step 9 (brick 7, "
+        "joint 6-7)."
+    )
+    known = [dry(9), BuildVerdicts("epoxy", (STANDS,) * 49)]
+    said = in_a_sentence(scene, table, known)
+    assert said.startswith("2 robots build arch25 in 49 steps; ")  # with the mortar of the scene
+    assert "; dry, step 9 falls (brick 7, joint 6-7); every step stands with epoxy." in said
+    arms = in_a_sentence(scene, table, known, faults=["rob1 reaches no posture (step 3)"])
+    assert arms.startswith("Not buildable: rob1 reaches no posture (step 3); ")
+    left = in_a_sentence(scene, table, known, [Departure("rotation", "1 rad, too much", (3,))])
+    assert left.startswith("Outside the linear range: rotation of up to 1 rad, too much (step 3).")
+
+
+def test_the_step_that_decides_is_never_one_that_nobody_holds(engine25, table):
+    scene = engine25.network.scene
+    shares = [table[f"F_rob{k}_N"].abs().max() for k in (1, 2)]
+    assert deciding_step(scene, table, ()) == 25
+    assert table.loc[25, "F_rob1_N"] == max(shares)
+    last = np.arange(49.0)
+    assert deciding_step(scene, table, (), last) == 47  # in the last one all let go
+    assert deciding_step(scene, table, [dry(9)], last) == 8
+    assert (
+        deciding_step(scene, table, [dry(9), dry()], last) == 47
+    )  # it stands with the last mortar
+    over = table.copy()
+    over.loc[[3, 30], "F_rob1_N"] = 500.0
+    assert deciding_step(scene, over, [dry(9)], last) == 3
+
+
+def test_the_worst_along_a_build_is_that_of_its_aim(engine25, table):
+    scene, criterion = engine25.network.scene, WORST_OVER_METHODS.for_scene(SceneFacts(engine25))
+    ratios = worst_along(scene, table, "minmax", criterion)
+    terms = dict(criterion.limits)
+    at = int(ratios.argmax())
+    assert ratios[at] == pytest.approx(1e-6 * table["D_max_1e-3mm"][at] / terms["D_max"])
+    assert at == 46
+    tensions = worst_along(scene, table, "T_max", criterion)
+    np.testing.assert_allclose(tensions, table["F_max_N"])
+    assert worst_along(scene, table, "steps", criterion) is None
+
+
+@pytest.fixture
+def page(engine25, steps, table, tmp_path):
+    known = [dry(9), BuildVerdicts("epoxy", (STANDS,) * 49)]
+    build = Build("sequential", steps, table, known)
+    path = tmp_path / "report.html"
+    path.write_text(report_page(engine25, [build], "Two robots take turns."), "utf-8")
+    if "<p>here</p>" not in browsed(tmp_path, "data:text/html,<p>here</p>")[0]:
+        pytest.skip("Chromium does not run here")
+    return path
+
+
+@pytest.mark.slow
+@browser
+def test_a_browser_opens_the_step_that_decides_and_shows_every_verdict(page, tmp_path):
+    text, _ = browsed(tmp_path, f"file://{page}")
+    assert "sequential, step 26 of 49" in text
+    assert 'src="data:image/png' in text  # what is printed
+    assert "dry: 1 of 49 falls" in text
+    assert "with epoxy: every step stands" in text
+    rows = re.findall(r'<tr data-step="(\d+)".*?</tr>', text, re.S)
+    assert rows == [str(number) for number in range(1, 50)]
+    (ninth,) = re.findall(r'<tr data-step="9".*?</tr>', text, re.S)
+    assert ninth.index(">falls<") < ninth.index(">stands<")
+    assert "<td>robot 3</td>" in re.sub(r"<span[^>]*></span>", "", text)
+
+
+@pytest.mark.slow
+@browser
+def test_a_summary_is_one_sheet(page, tmp_path):
+    def sheets(path):
+        out = tmp_path / "summary.pdf"
+        words = [word for word in WORDS.split() if word != "--dump-dom"]
+        words += [f"--print-to-pdf={out}", f"--user-data-dir={tmp_path / 'profile'}"]
+        subprocess.run(
+            [BROWSER, *words, f"file://{path}"], check=True, capture_output=True, timeout=120
+        )
+        return len(re.findall(rb"/Type\s*/Page\b", out.read_bytes()))
+
+    assert sheets(page) == 1
+    text = page.read_text("utf-8")
+    text = re.sub('<meta http-equiv="Content-Security-Policy"[^>]*>', "", text)
+    page.write_text(text.replace("@media print", "@media speech"), "utf-8")
+    assert sheets(page) > 1  # the control
+
+
+FRAME = """<iframe src="inner.html" width="390" height="844"></iframe>
+<script>addEventListener("message", (e) => { document.body.dataset.wide = e.data; });</script>"""
+ASK = """<script>const timer = setInterval(() => {
+  if (document.body.dataset.ready !== "true") return;
+  clearInterval(timer);
+  parent.postMessage(document.documentElement.scrollWidth <= innerWidth, "*");
+}, 50);</script></body>"""
+
+
+@pytest.mark.slow
+@browser
+def test_a_telephone_scrolls_one_way(page, tmp_path):
+    text = re.sub('<meta http-equiv="Content-Security-Policy"[^>]*>', "", page.read_text("utf-8"))
+    (tmp_path / "frame.html").write_text(FRAME, "utf-8")
+    seen = []
+    for wrong in ("", "<style>#use { min-width: 600px; } #say { overflow: visible; }</style>"):
+        inner = text.replace("</body>", wrong + ASK)
+        (tmp_path / "inner.html").write_text(inner, "utf-8")
+        seen.append(browsed(tmp_path, f"file://{tmp_path / 'frame.html'}")[0])
+    assert 'data-wide="true"' in seen[0]
+    assert 'data-wide="false"' in seen[1]  # the control
+
+
+def test_numbers_of_pages_are_whole_words(engine25, steps, table):
+    """Robots and units as people write them; what a script reads stays as it is."""
+    text = report_page(engine25, [Build("sequential", steps, table)], "")
+    data = json.loads(re.search(r'<script id="data"[^>]*>(.*?)</script>', text, re.S)[1])
+    assert [robot["words"] for robot in data["structure"]["robots"]] == [
+        "robot 1", "robot 2", "robot 3",
+    ]  # fmt: skip
+    assert "D_max_1e-3mm" in data["builds"][0]["columns"]
+    assert not any("1e-3" in words for words in data["responses"].values())
