@@ -19,7 +19,7 @@ from seqopt.scene.parts import Side, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, StepKind
 
-EVERY = "#222222"  # of a node that every robot reaches
+EVERY = "#222222"  # of a node that several robots reach
 ORDER = "build order"
 
 
@@ -32,9 +32,10 @@ def scene_page(scene: Scene) -> str:
     counts = [step.number for step in steps]
     table = pd.DataFrame({"step": counts, "type": "place", "bricks": counts} | empty)
     build = Build(ORDER, steps, table, order=scene.build_order)
+    whole = {"tasks": None, "sentence": "", "decides": len(steps) - 1}  # it opens with all bricks
     data = {
         "structure": _structure_data(network) | {"marks": _marks(scene)},
-        "builds": [_build_data(make_engine(USUAL, network), build, fields=False) | {"tasks": None}],
+        "builds": [_build_data(make_engine(USUAL, network), build, fields=False) | whole],
         "responses": {},
         "scatter": None,
         "note": "Bricks appear in the order in which they are placed; a plan says who holds.",
@@ -43,7 +44,7 @@ def scene_page(scene: Scene) -> str:
     tables = {"Robots": _robots(scene), "Bricks, in the order of the build": _bricks(scene)}
     return _filled(
         title=escape(scene.name),
-        sentence=f"{len(scene.bricks)} bricks, {ends}, {robots}. seqopt optimize finds a plan.",
+        sentence=f"{len(scene.bricks)} bricks, {ends}, {robots}. seqopt optimize looks for a plan.",
         tables="".join(_part(caption, part) for caption, part in tables.items()),
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
     )

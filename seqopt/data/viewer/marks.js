@@ -1,8 +1,8 @@
 "use strict";
-// names of bricks, nodes at which robots can hold, and reaches: on the page of a scene alone
+// nodes at which robots can hold, and reaches: on the page of a scene alone
 function makeMarks(structure, redraw) {
   const { nodes, reaches } = structure.marks;
-  const shown = { names: structure.bricks.length <= 60, nodes: true, reaches: true };
+  const shown = { nodes: true, reaches: true };
   const row = document.createElement("div");
   row.className = "row";
   for (const kind of Object.keys(shown)) {
@@ -11,12 +11,13 @@ function makeMarks(structure, redraw) {
     box.id = `show-${kind}`;
     box.checked = shown[kind];
     box.addEventListener("input", () => { shown[kind] = box.checked; redraw(); });
-    label.append(box, ` ${{ names: "names of bricks", nodes: "nodes (black: every robot reaches it or several do; red: nobody)", reaches: "reaches" }[kind]}`);
+    label.append(box, ` ${{ nodes: "nodes (black: several robots reach it; red: nobody; else in the color of the one that does)", reaches: "reaches" }[kind]}`);
     row.append(label);
   }
   document.getElementById("controls").prepend(row);
-  for (const id of ["first", "second", "magnify", "forces"]) document.getElementById(id).parentElement.hidden = true;  // of builds
-  document.getElementById("charts").hidden = true;
+  const ofBuilds = ["first", "second", "magnify", "forces"].map((id) => document.getElementById(id).parentElement);
+  ofBuilds.push(...["charts", "strip", "steps", "about", "use", "found", "now", "print"].map((id) => document.getElementById(id)));
+  for (const part of ofBuilds) part.style.display = "none";
   document.querySelector("main").append(document.getElementById("tables").lastElementChild);
   const paint = (color) => new THREE.MeshBasicMaterial({ color, transparent: true, opacity: 0.1, side: THREE.DoubleSide, depthWrite: false });
   const reachOf = ({ center, radius, plane, color }) => {
@@ -38,13 +39,6 @@ function makeMarks(structure, redraw) {
     return out;
   };
   return (pane, size) => {
-    const names = structure.bricks.map((brick) => {
-      const span = document.createElement("span");
-      span.className = "brick";
-      span.textContent = brick.name;
-      pane.box.append(span);
-      return span;
-    });
     const dot = new THREE.SphereGeometry(size * 0.42, 12, 8), lost = new THREE.SphereGeometry(size * 0.6, 12, 8);
     const balls = nodes.map(({ at, brick, color }) => {
       const mesh = new THREE.Mesh(color ? dot : lost, new THREE.MeshBasicMaterial({ color: color || "#c8102e", depthTest: false, transparent: true }));
@@ -61,16 +55,6 @@ function makeMarks(structure, redraw) {
         count = bricks;
         balls.forEach(({ mesh, brick }) => { mesh.visible = shown.nodes && brick < count; });
         areas.forEach((area) => { area.visible = shown.reaches; });
-      },
-      place() {
-        const { clientWidth: w, clientHeight: h } = pane.box;
-        names.forEach((span, i) => {
-          span.hidden = !shown.names || i >= count;
-          if (span.hidden) return;
-          const seen = new THREE.Vector3(...structure.bricks[i].center).project(pane.camera);
-          span.style.left = `${Math.round((seen.x + 1) * w / 2)}px`;
-          span.style.top = `${Math.round((1 - seen.y) * h / 2)}px`;
-        });
       },
     };
   };

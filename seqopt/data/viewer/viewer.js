@@ -334,7 +334,7 @@
       this.edges.instanceMatrix.needsUpdate = true;
       this.edges.instanceColor.needsUpdate = true;
     }
-    draw() { this.renderer.render(this.scene, this.camera); if (this.robots) { this.nameRobots(); this.numberBricks(); } if (this.marks) this.marks.place(); }
+    draw() { this.renderer.render(this.scene, this.camera); if (this.robots) { this.nameRobots(); this.numberBricks(); } }
   }
 
   // blocks as bodies, and what hides what
