@@ -49,9 +49,10 @@ def test_a_browser_shows_a_scene_without_an_error(scene, tmp_path):
     text, said = browsed(tmp_path, path.as_uri())
     assert 'data-ready="true"' in text
     assert "Uncaught" not in said
-    assert re.findall(r'<span class="brick"[^>]*>(\d+)</span>', text) == [
-        str(brick.name) for brick in scene.placed
-    ]
+    count = len(scene.placed)
+    assert f"step {count} of {count}" in text  # it opens with all bricks
+    assert "build" not in text.partition('id="sentence"')[2].partition("</p>")[0]  # of no plan
+    assert re.search(r'id="now"[^>]*display: none', text)
 
 
 def test_the_command_names_the_page_by_the_scene(capsys, tmp_path, monkeypatch):
