@@ -16,7 +16,7 @@ from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.registry import recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.responses._tolerance import each_tolerance, held_in_table, is_linear
-from seqopt.responses.quantities import RESPONSES, length_text
+from seqopt.responses.quantities import RESPONSES, _plain, length_text
 from seqopt.responses.table import LinearRange, force_column
 from seqopt.scene.scene import Scene
 
@@ -117,7 +117,7 @@ def _left_out(
         yield "what earlier steps lock in"
     if not isinstance(within.engine, DiscreteEngine):
         most = max(float(table[moved.column].max()) / moved.scale for table in tables) / within.far
-        yield f"change of shape (bricks move by up to {100 * most:.2g} % of its limit)"
+        yield f"change of shape (bricks move by up to {_plain(100 * most, 2)} % of its limit)"
     yield "motion in time"
 
 

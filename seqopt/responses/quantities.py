@@ -45,6 +45,17 @@ def length_text(length: float) -> str:
     return f"{length * 1e3:.4g} mm"
 
 
+def _plain(value: float, digits: int) -> str:
+    """Return a number to so many digits, never with a power of ten.
+
+    Examples
+    --------
+    >>> _plain(168.2, 2), _plain(504_820.0, 3), _plain(0.2312, 2)
+    ('170', '505,000', '0.23')
+    """
+    return f"{float(f'{value:.{digits}g}'):,.10g}"
+
+
 def _steps_in_words(steps: Sequence[int]) -> str:
     """Return which steps these are, by their numbers; of many the first.
 

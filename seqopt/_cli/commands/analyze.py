@@ -48,7 +48,7 @@ from seqopt.problem.requirements import _prop_faults
 from seqopt.responses._enough import what_was_enough
 from seqopt.responses._staged import Placing, staged_fields
 from seqopt.responses._tolerance import COLUMN, stiffness_for, with_tolerances
-from seqopt.responses.quantities import _steps_in_words, length_text
+from seqopt.responses.quantities import _plain, _steps_in_words, length_text
 from seqopt.responses.table import LinearRange, archive, response_table, step_fields
 from seqopt.sequence.steps import Step
 from seqopt.work.progress import with_progress
@@ -160,7 +160,7 @@ def _tolerance_notes(
     if not short:
         return (f"{said}, no less than {length_text(wanted)}",)
     found = stiffness_for(engine, steps, wanted)
-    how = "however soft they are" if found is None else f"unless softer than {found:.3g} N/m"
+    how = "however soft they are" if found is None else f"unless softer than {_plain(found, 3)} N/m"
     return (f"{said}, less than {length_text(wanted)} in {_steps_in_words(short)}, {how}",)
 
 
