@@ -292,6 +292,7 @@ def test_orders_are_searched_with_arms_that_give_way():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_workers_and_scenarios_hold_in_the_same_postures():
     scene = soft()
     alone, shared = (seqopt.optimize(scene, "free", FORCE, workers=n) for n in (1, 2))

@@ -120,7 +120,10 @@ def test_what_does_not_fit_is_refused_before(capsys, tmp_path):
 
 @posix
 @pytest.mark.slow
-@pytest.mark.parametrize(("workers", "limits"), [("1", (60, 340, 370, 4096)), ("2", (300, 4096))])
+@pytest.mark.parametrize(
+    ("workers", "limits"),
+    [pytest.param("1", (60, 340, 370, 4096), marks=pytest.mark.long), ("2", (300, 4096))],
+)
 def test_a_run_under_a_memory_limit_ends_in_a_line(tmp_path, workers, limits):
     import resource  # noqa: PLC0415  # POSIX has it alone
 
@@ -143,7 +146,7 @@ def test_a_run_under_a_memory_limit_ends_in_a_line(tmp_path, workers, limits):
 
 @pytest.mark.slow
 @posix
-@pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.parametrize("workers", [pytest.param("1", marks=pytest.mark.long), "2"])
 def test_an_interrupt_names_what_was_chosen(tmp_path, workers):
     """A search without proof by the slow engine, ended on its way; every process is interrupted."""
     words = [*WORDS, "cascade", "--no-proof", "--engine", "frame", "--out", tmp_path / "out"]

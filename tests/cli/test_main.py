@@ -285,7 +285,11 @@ def test_compare_names_idle_robots_and_degenerate_methods(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("robots", "says"),
     [
-        ("rob3,rob2", ["two-robot loop, ", "- sequential: rob1 never grips"]),
+        pytest.param(
+            "rob3,rob2",
+            ["two-robot loop, ", "- sequential: rob1 never grips"],
+            marks=pytest.mark.long,
+        ),
         ("rob3,rob1,rob2", ["three-robot loop, ", "2,576"]),
     ],
 )

@@ -139,6 +139,7 @@ except RuntimeError as error:
 
 
 @pytest.mark.slow
+@pytest.mark.long  # of a tool for releases
 def test_what_becomes_of_a_module_that_is_changed():
     """As it is, one that raises, is wrong, never ends, dies, cannot be imported, is never used."""
     before = (ROOT / "seqopt" / "problem" / "criteria.py").read_text(encoding="utf-8")

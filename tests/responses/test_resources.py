@@ -45,7 +45,9 @@ def small_blocks(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "workers"), [("compliance", 2), ("auto", 3)])
+@pytest.mark.parametrize(
+    ("name", "workers"), [pytest.param("compliance", 2, marks=pytest.mark.long), ("auto", 3)]
+)
 def test_results_are_the_same_whatever_the_workers(small_blocks, loop25, name, workers):
     alone = make_engine(name, loop25.scene)
     shared = make_engine(name, loop25.scene)
@@ -212,7 +214,10 @@ def test_resources_that_cannot_be_meant_are_refused(wrong):
 
 @pytest.mark.parametrize(
     "criterion",
-    [pytest.param(c, marks=[pytest.mark.slow] * bool(i)) for i, c in enumerate(CRITERIA)],
+    [
+        pytest.param(c, marks=[pytest.mark.slow, pytest.mark.long] * bool(i))
+        for i, c in enumerate(CRITERIA)
+    ],
 )
 def test_costs_are_the_same_where_responses_are_not_kept(engine25, loop25, criterion):
     """Where there is memory for costs alone, responses come and go; nothing else changes."""

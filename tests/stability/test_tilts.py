@@ -141,6 +141,7 @@ def test_half_a_vault_with_epoxy_has_a_tilt():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_grip_sets_survive_no_more_however_a_scene_is_turned(arch25):
     """Of 13 bricks: what a screen says stands survives the tilt by the cone program."""
     network = build_network(arch25)
