@@ -112,7 +112,7 @@ def test_a_video_is_as_large_as_a_slide(build, tmp_path, ending, monkeypatch):
 
 def test_a_command_writes_a_film(tmp_path, capsys):
     folder, film = tmp_path / "plan", tmp_path / "build.gif"
-    assert main(["optimize", "chain:bricks=5", "--schedule", "free", "--out", str(folder)]) == 0
+    assert main(["optimize", "chain:bricks=7", "--schedule", "free", "--out", str(folder)]) == 0
     assert main(["report", str(folder), "--film", str(film), "--quiet"]) == 0
     assert str(film) in capsys.readouterr().out
     with Image.open(film) as found:
