@@ -9,6 +9,7 @@ import subprocess
 import pytest
 from PIL import Image
 
+from seqopt._cli.main import main
 from seqopt.errors import ExtraError, FileError, StepError
 from seqopt.plan.build import GivenSequence
 from seqopt.report._films._film import Film
@@ -107,6 +108,15 @@ def test_a_video_is_as_large_as_a_slide(build, tmp_path, ending, monkeypatch):
     monkeypatch.setenv("PATH", "")
     with pytest.raises(ExtraError, match=r"install it from ffmpeg\.org, or .* ends in \.gif"):
         Film(build.engine, build.steps[:3]).save(path)
+
+
+def test_a_command_writes_a_film(tmp_path, capsys):
+    folder, film = tmp_path / "plan", tmp_path / "build.gif"
+    assert main(["optimize", "chain:bricks=7", "--schedule", "free", "--out", str(folder)]) == 0
+    assert main(["report", str(folder), "--film", str(film), "--quiet"]) == 0
+    assert str(film) in capsys.readouterr().out
+    with Image.open(film) as found:
+        assert found.n_frames == len((folder / "plan.csv").read_text("utf-8").splitlines()) - 1
 
 
 def test_pictures_of_a_build_are_spread_over_it(build):
