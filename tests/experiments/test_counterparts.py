@@ -17,8 +17,8 @@ from experiments.study.parts.counterpart_page import (
     page,
     verdict,
 )
-from experiments.study.parts.counterpart_rows import COUNTERPARTS, cell, ours, tabulate
-from experiments.study.parts.paper_items import ITEMS
+from seqopt.report._paper.items import ITEMS
+from seqopt.report._paper.rows import COUNTERPARTS, cell, ours, tabulate
 from tests.builders import ROOT
 
 STORED = pd.read_csv(ROOT / "experiments" / "results" / "paper_counterparts.csv")

@@ -1,18 +1,21 @@
 """Pictures of the counterparts: printed values beside ours, with the agreement as a caption."""
 
+from __future__ import annotations
+
 import textwrap
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from experiments.study.parts import counterpart_model_charts as models
-from experiments.study.parts.counterpart_model_charts import OFF, OURS, STUDY, number_of, of, pair
-from experiments.study.parts.counterpart_page import NEAR, caption
-from experiments.study.parts.counterpart_rows import LOOP, RESPONSES, Ours, plan_rows
 from seqopt.engines.interface import Want
+from seqopt.report._paper import model_charts as models
+from seqopt.report._paper.agreement import NEAR, caption
+from seqopt.report._paper.model_charts import OFF, OURS, STUDY, number_of, of, pair
+from seqopt.report._paper.rows import LOOP, RESPONSES, Ours, plan_rows
 from seqopt.report._robots import ROBOT_COLORS
 from seqopt.report._style import INK, SMALL, dress, new_figure, plain, styled
 from seqopt.report.draw import View, draw_bricks, draw_grips
@@ -61,7 +64,8 @@ def grid(axes: Axes, rows: pd.DataFrame, title: str) -> None:
 
 
 def sequences(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
-    left, right = figure.subfigures(1, 2)
+    parts: Any = figure.subfigures(1, 2)
+    left, right = parts
     first, second = left.subplots(2, 1, height_ratios=[12, 9])
     both = of(table, "fig:2rob_methods")
     grid(first, both[both["quantity"] != "steps shared [%]"], "Figure 9: two robots")
@@ -70,7 +74,8 @@ def sequences(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
 
 
 def plan(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
-    above, below = figure.subfigures(2, 1, height_ratios=[1, 2.4])
+    parts: Any = figure.subfigures(2, 1, height_ratios=[1, 2.4])
+    above, below = parts
     grips_of_plan(above.subplots(), of(table, "table:experimental_data3"), own)
     along_steps("table:experimental_data3")(below, table, own)
 
