@@ -20,7 +20,8 @@ from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Finding, Options, none_of
 from experiments.harness.results import FIGURES, save_table, stored
-from experiments.study.parts.counterpart_page import DISAGREES, TITLES, page, statement, verdict
+from experiments.study.parts.counterpart_page import page
+from seqopt.report._paper.agreement import DISAGREES, TITLES, statement, verdict
 from seqopt.report._paper.charts import drawn
 from seqopt.report._paper.items import ITEMS, Item
 from seqopt.report._paper.rows import Ours, ours, tabulate

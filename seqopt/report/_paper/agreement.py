@@ -23,6 +23,7 @@ TITLES = {
 
 
 def verdict(rows: pd.DataFrame) -> str:
+    """Return how an item agrees, by its rows."""
     share = float((rows["error_pct"] <= NEAR).mean())
     return AGREES if share == 1 else PARTLY if share >= 0.5 else DISAGREES
 
@@ -33,6 +34,7 @@ def short(value: float) -> str:
 
 
 def beside(row: pd.Series) -> str:
+    """Return a printed value and ours, in words."""
     pair = f"printed {short(row['printed'])}, here {short(row['ours'])}"
     return f"{row['quantity']}, {row['at']}: {pair}"
 
@@ -54,6 +56,7 @@ def statement(item: Item, rows: pd.DataFrame) -> str:
 
 
 def stated(item: Item, table: pd.DataFrame) -> str:
+    """Return `statement` of an item from the rows of all."""
     return statement(item, table[table["id"] == item.label])
 
 
@@ -65,4 +68,5 @@ def yardstick(rows: pd.DataFrame) -> str:
 
 
 def caption(picture: str, table: pd.DataFrame) -> str:
+    """Return what a picture says of its items."""
     return " ".join(stated(item, table) for item in ITEMS if item.picture == picture)

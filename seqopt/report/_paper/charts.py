@@ -36,6 +36,7 @@ Draw = Callable[[Figure, pd.DataFrame, Ours], None]
 
 
 def text_of(value: float) -> str:
+    """Return a grip as it is printed: a node, O3, or a dash."""
     if value < 0:
         return "–"
     return f"O{value - 1000:g}" if value > 1000 else f"{value:g}"
@@ -64,6 +65,7 @@ def grid(axes: Axes, rows: pd.DataFrame, title: str) -> None:
 
 
 def sequences(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
+    """Draw the grips of schemes."""
     parts: Any = figure.subfigures(1, 2)
     left, right = parts
     first, second = left.subplots(2, 1, height_ratios=[12, 9])
@@ -74,6 +76,7 @@ def sequences(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
 
 
 def plan(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
+    """Draw grips and responses of the published plan."""
     parts: Any = figure.subfigures(2, 1, height_ratios=[1, 2.4])
     above, below = parts
     grips_of_plan(above.subplots(), of(table, "table:experimental_data3"), own)
@@ -100,6 +103,7 @@ def grips_of_plan(axes: Axes, rows: pd.DataFrame, own: Ours) -> None:
 
 
 def twisting(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
+    """Draw the twisting steps of both methods."""
     panels = figure.subplots(3, 2).ravel()
     names = ("M_sup [N m]", "D_max [1e-3 mm]", "T_max [N]")
     for axes, name in zip(panels, names, strict=False):
@@ -130,6 +134,7 @@ def twisting(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
 
 
 def maxima(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
+    """Draw largest and average values, ours over printed ones."""
     items = {
         "Table 6": of(table, "table:2robot_tension"),
         "Table 7": of(table, "table:2robot_forces"),
@@ -155,6 +160,7 @@ def maxima(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
 
 
 def loop(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
+    """Draw the four steps of one loop."""
     _, steps, _ = plan_rows(own)
     rows = of(table, "fig:3rob_sequence")
     for axes, step in zip(figure.subplots(2, 2).ravel(), LOOP, strict=True):
@@ -170,6 +176,7 @@ def along_steps(label: str) -> Draw:
     """Return the drawing of every response of a table over its steps."""
 
     def draw(figure: Figure | SubFigure, table: pd.DataFrame, _own: Ours) -> None:
+        """Draw a chart for every response."""
         names = [name for name in RESPONSES.values() if len(of(table, label, name))]
         panels = figure.subplots(-(-len(names) // 3), 3).ravel()
         for axes, name in zip(panels, names, strict=False):
@@ -209,6 +216,7 @@ PICTURES: dict[str, tuple[Draw, float]] = {
 
 @styled
 def drawn(name: str, table: pd.DataFrame, own: Ours) -> Figure:
+    """Return a picture by name, with its caption."""
     draw, height = PICTURES[name]
     figure = new_figure(height)
     draw(figure, table, own)

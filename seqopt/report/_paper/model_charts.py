@@ -47,6 +47,7 @@ BARS: tuple[dict[str, Any], ...] = (
 
 
 def geometry(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
+    """Draw the arch with its span and height."""
     side, plan = figure.subplots(1, 2, width_ratios=[1.2, 1])
     net = own.engine.network
     draw_bricks(side, net, 25, View(azimuth=0, elevation=0))
@@ -68,6 +69,7 @@ def geometry(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
 
 
 def vault_tests(figure: Figure, _table: pd.DataFrame, _own: Ours) -> None:
+    """Draw outlines, secants and stiffness of the vault tests."""
     panels = figure.subplot_mosaic([["outline", "outline"], ["secants", "bars"]])
     outline, secants, bars = panels["outline"], panels["secants"], panels["bars"]
     _outlines(outline)
@@ -114,6 +116,7 @@ def _outlines(outline: Axes) -> None:
 
 
 def discrete(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
+    """Draw displacements by both models, and their mean error."""
     panels = figure.subplots(2, 3).ravel()
     for axes, step in zip(panels, counterpart_rows.arches(own), strict=False):
         moved = counterpart_rows.node_displacements(own, step)

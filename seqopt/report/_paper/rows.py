@@ -75,6 +75,7 @@ class Ours:
 
 
 def ours() -> Ours:
+    """Return the models that counterparts are read from."""
     engine = ComplianceEngine(build_network(load_scene("arch25")))
     problem = candidate_layers(engine, three_robot_loop(engine.network), EQUATIONS)
     return Ours(engine, compare(engine, EQUATIONS), problem)
@@ -86,6 +87,7 @@ def arch_corners(scene: Scene) -> Floats:
 
 
 def geometry(own: Ours) -> Rows:
+    """Compare the size of the arch (figure 2)."""
     corners = arch_corners(own.scene)
     first, last = (np.array(ground.position) for ground in own.scene.grounds)
     along = (last - first) * [1, 1, 0]
@@ -116,12 +118,14 @@ def bed_of_springs() -> Floats:
 
 
 def secant(_own: Ours) -> Rows:
+    """Compare the secant of test 1 (figure 6)."""
     study = printed("arch_stiffness")
     k = float(bed_of_springs()[0])
     yield Row("analytical secant [kN/mm]", "test 1", study["k_m_kN_mm"][0], k, 0.5)
 
 
 def stiffness(_own: Ours) -> Rows:
+    """Compare the stiffness of the vault tests (table 2)."""
     study, k = printed("arch_stiffness"), bed_of_springs()
     error = 100 * (k / study["k_e_kN_mm"].to_numpy() - 1)
     for i, test in enumerate(study["test"]):
@@ -137,6 +141,7 @@ def arches(own: Ours) -> list[Step]:
 
 
 def nodes_compared(own: Ours) -> Rows:
+    """Compare how many nodes are compared (figure 8)."""
     study = printed("de_validation").set_index("bricks")["nodes"]
     for step in arches(own):
         count, at = len(inner_nodes(own.engine.network, step)), f"{step.bricks} bricks"
@@ -149,6 +154,7 @@ def _discrete(network: Network) -> DiscreteEngine:
 
 
 def discrete_elements(own: Ours) -> Rows:
+    """Compare mean errors against discrete elements (table 3)."""
     study = printed("de_validation").set_index("bricks")["error_percent"]
     discrete = _discrete(own.engine.network)
     for step in arches(own):
@@ -185,6 +191,7 @@ RESPONSES = {
 
 
 def two_robots(own: Ours) -> Rows:
+    """Compare grips of both methods around the crown (figure 9)."""
     states = {}
     for name, method in METHODS.items():
         steps = method(own.engine.network)
@@ -208,6 +215,7 @@ def cell(grip: object, base: int = 0) -> float:
 
 
 def twisting(own: Ours) -> Rows:
+    """Compare the twisting steps (table 4)."""
     table, study = own.steps("sequential"), printed("sequential_offcenter").set_index("step")
     calm = table.drop(list(TWISTING))
     for step in TWISTING:
@@ -221,6 +229,7 @@ def twisting(own: Ours) -> Rows:
 
 
 def lever_arm(own: Ours) -> Rows:
+    """Compare the lever arm (figure 10)."""
     table, study = own.steps("sequential"), printed_steps("sequential").set_index("step")
     for column in ("M_sup_Nm", "D_max_1e-3mm"):
         want = float(study[column].loc[35])
@@ -248,6 +257,7 @@ def cantilever_over_sequential(own: Ours) -> Rows:
 
 
 def tension(own: Ours) -> Rows:
+    """Compare tension (table 6)."""
     study = printed("table_6_tension").set_index("what")
     for method, start in (("sequential", 1), ("cantilever", 5)):
         largest = own.steps(method)["F_max_N"]
@@ -258,6 +268,7 @@ def tension(own: Ours) -> Rows:
 
 
 def robot_forces(own: Ours) -> Rows:
+    """Compare the largest forces of robots (table 7)."""
     study = printed("table_7_robot_forces").set_index("method")
     for method, robot in product(study.index, study.columns):
         force = own.methods.maxima.loc[f"F_{robot} [N]", method]
@@ -265,6 +276,7 @@ def robot_forces(own: Ours) -> Rows:
 
 
 def improvement(own: Ours) -> Rows:
+    """Compare the largest responses of three methods (table 10)."""
     study = own.methods.printed
     for quantity, method in product(own.methods.maxima.index, own.methods.maxima.columns):
         want = np.nan if study is None else study.loc[quantity, method]
@@ -293,6 +305,7 @@ def modified(own: Ours) -> Rows:
 
 
 def cascade(own: Ours) -> Rows:
+    """Compare the scheme of the cascade (table 9)."""
     study = printed("table_9_cascade")
     steps = three_robot_loop(own.engine.network).steps
     yield from scheme(study, [steps[number - 1] for number in study["step"]])
@@ -308,6 +321,7 @@ def plan_rows(own: Ours) -> tuple[pd.DataFrame, list[Step], pd.DataFrame]:
 
 
 def loop(own: Ours) -> Rows:
+    """Compare one loop (figure 13)."""
     study, steps, ranks = plan_rows(own)
     yield from scheme(study[study["step"].isin(LOOP)], [steps[number - 1] for number in LOOP])
     place = float(ranks.loc[ranks["step"] == LOOP[0], "rank_in_window"].iloc[0])
@@ -315,6 +329,7 @@ def loop(own: Ours) -> Rows:
 
 
 def plan(own: Ours) -> Rows:
+    """Compare the published plan, its responses and its ranks (table B.1)."""
     study, steps, ranks = plan_rows(own)
     yield from scheme(study, steps)
     yield from steps_of(own, "published")
