@@ -11,12 +11,12 @@ function makeMarks(structure, redraw) {
     box.id = `show-${kind}`;
     box.checked = shown[kind];
     box.addEventListener("input", () => { shown[kind] = box.checked; redraw(); });
-    label.append(box, ` ${{ names: "names of bricks", nodes: "nodes (black: every robot reaches it or several do; red: nobody)", reaches: "reaches" }[kind]}`);
+    label.append(box, ` ${{ names: "names of bricks", nodes: "nodes (in the color of the robot that alone reaches it; black: several do; red: nobody)", reaches: "reaches" }[kind]}`);
     row.append(label);
   }
   document.getElementById("controls").prepend(row);
   for (const id of ["first", "second", "magnify", "forces"]) document.getElementById(id).parentElement.hidden = true;  // of builds
-  document.getElementById("charts").hidden = true;
+  document.body.classList.add("scene");
   document.querySelector("main").append(document.getElementById("tables").lastElementChild);
   const paint = (color) => new THREE.MeshBasicMaterial({ color, transparent: true, opacity: 0.1, side: THREE.DoubleSide, depthWrite: false });
   const reachOf = ({ center, radius, plane, color }) => {
