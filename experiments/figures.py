@@ -24,7 +24,6 @@ from matplotlib.patches import Rectangle
 from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import FIGURES, save_figure
-from experiments.harness.yardstick import VALUES
 from seqopt import FreeRules, build_network, load_scene, pose, three_robot_loop
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
@@ -37,6 +36,7 @@ from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, forc
 from seqopt.report.text import in_words
 from seqopt.scene.boxes import boxes
 from seqopt.scene.library import DomeShape, WallShape, chain, dome, wall
+from seqopt.study._yardstick import VALUES
 from seqopt.study.published import WORST_RATIO, as_printed, printed_steps
 
 VIEW = View(azimuth=35, elevation=22)

@@ -30,8 +30,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from experiments.discrete.parts.arch_pads import JOINTS, STEPS, Reading, readings
-from experiments.discrete.parts.arches_lmgc90 import PAD, READINGS, error, moved, witness
+from experiments.discrete.parts.arch_pads import JOINTS, Reading, readings
+from experiments.discrete.parts.arches_lmgc90 import PAD, READINGS, witness
 from experiments.discrete.parts.discrete_chart import chart
 from experiments.harness.claim import Claim, Finding, Option, Options
 from experiments.harness.lmgc90 import python_with_lmgc90
@@ -43,6 +43,7 @@ from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.study._discrete_arches import STEPS, error, moved
 from seqopt.study.published import STUDY_PADS, printed
 
 SIDES = 1e-3 * np.arange(4.0, 51.0)  # m, of the scan

@@ -119,7 +119,8 @@ def _robots(scene: Scene) -> pd.DataFrame:
                 "nodes it reaches": f"{reached} of {free}",
             }
         )
-    return pd.DataFrame(rows)
+    table = pd.DataFrame(rows)
+    return table if scene.has_arms else table.drop(columns="base of its arm, m")
 
 
 def _bricks(scene: Scene) -> pd.DataFrame:

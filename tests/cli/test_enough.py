@@ -38,11 +38,12 @@ def said(text, pattern):
     return found
 
 
-def test_a_payload_that_is_enough_for_a_free_schedule():
+@pytest.mark.parametrize("asked", [{}, pytest.param({"stands": "dry"}, marks=pytest.mark.slow)])
+def test_a_payload_that_is_enough_for_a_free_schedule(asked):
     def make(payload):
         scene = seqopt.load_scene(ARCH)
         robots = (replace(robot, payload=payload) for robot in scene.robots)
-        return seqopt.optimize(scene.with_robots(*robots), "free", aim="steps")
+        return seqopt.optimize(scene.with_robots(*robots), "free", aim="steps", **asked)
 
     (newton,) = said(refusal(make, 20.0), r"a payload of (\d+) N \(--payload \1\)")
     assert make(float(newton)).steps

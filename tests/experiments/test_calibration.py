@@ -10,21 +10,6 @@ import pytest
 from scipy import stats
 
 from experiments.calibration.calibration import intervals, squares, turning_share
-from experiments.calibration.parts.barrel_vaults import (
-    BED,
-    Chain,
-    chain,
-    errors,
-    fit,
-    laws,
-    load_stiffness,
-    median_scale,
-    planar_parts,
-    planar_stiffness,
-    scene,
-    square_scale,
-    vaults,
-)
 from experiments.calibration.parts.calibration_readings import GROUPS, RATIO, against_study, closest
 from experiments.calibration.parts.calibration_spread import (
     ANEW,
@@ -39,6 +24,21 @@ from experiments.calibration.parts.calibration_spread import (
 from experiments.harness.results import RESULTS
 from seqopt.network._mechanics import spring_maps
 from seqopt.network.build import build_network
+from seqopt.study._barrel_vaults import (
+    BED,
+    Chain,
+    chain,
+    errors,
+    fit,
+    laws,
+    load_stiffness,
+    median_scale,
+    planar_parts,
+    planar_stiffness,
+    scene,
+    square_scale,
+    vaults,
+)
 from seqopt.study.published import printed
 
 VAULTS = vaults()

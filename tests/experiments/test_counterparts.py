@@ -9,16 +9,10 @@ import pandas as pd
 import pytest
 
 from experiments.study.paper_counterparts import KNOWN, faults
-from experiments.study.parts.counterpart_page import (
-    AGREES,
-    DISAGREES,
-    PARTLY,
-    TITLES,
-    page,
-    verdict,
-)
-from experiments.study.parts.counterpart_rows import COUNTERPARTS, cell, ours, tabulate
-from experiments.study.parts.paper_items import ITEMS
+from experiments.study.parts.counterpart_page import page
+from seqopt.report._paper.agreement import AGREES, DISAGREES, PARTLY, TITLES, verdict
+from seqopt.report._paper.items import ITEMS
+from seqopt.report._paper.rows import COUNTERPARTS, cell, ours, tabulate
 from tests.builders import ROOT
 
 STORED = pd.read_csv(ROOT / "experiments" / "results" / "paper_counterparts.csv")

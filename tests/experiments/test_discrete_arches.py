@@ -18,16 +18,15 @@ from experiments.discrete.discrete_arches import (
 )
 from experiments.discrete.parts.arch_pads import (
     CORNERS,
-    STEPS,
     AtCorners,
     Reading,
     pads_at_corners,
     readings,
 )
-from experiments.discrete.parts.arches_lmgc90 import error, moved
 from experiments.harness.results import RESULTS
 from seqopt.engines.discrete.engine import Across, Pinch, _pad_stiffness
 from seqopt.sequence.two_robots import sequential
+from seqopt.study._discrete_arches import STEPS, error, moved
 from seqopt.study.published import STUDY_PADS, printed
 
 

@@ -156,7 +156,6 @@ JOINTS = {
     "halves in series": BedStiffness(STUDY_BED.normal / 2, STUDY_BED.tangential / 2),
     CORNERS: STUDY_BED,
 }
-STEPS = {17: 33, 18: 35, 23: 45, 24: 47}  # steps of the sequential method, by bricks
 
 
 @dataclass(frozen=True)

@@ -24,10 +24,10 @@ from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.engines.discrete._system import BedStiffness
 from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
-from seqopt.engines.interface import Engine, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network._mechanics import node_motion
 from seqopt.network.network import GROUND, Network
+from seqopt.study._discrete_arches import error, inner_nodes, moved
 from seqopt.study.published import STUDY_BED, STUDY_PADS
 
 PAD = 0.02  # m, side of the square that a pad touches: not printed
@@ -96,28 +96,10 @@ def on_ground(result: dict[str, Any], blocks: int) -> Floats:
     return out
 
 
-def inner_nodes(network: Network, step: Step) -> list[int]:
-    """Return the inner nodes that no robot holds: as many as the paper compares (table 3)."""
-    inner = network.inner[: step.bricks].ravel()
-    return [int(i) for i in inner if network.node_name[i] not in step.held]
-
-
-def moved(engine: Engine, step: Step) -> Floats:
-    """Return how far the inner nodes move by an engine, m."""
-    fields = engine.solve(step.bricks, [list(step.held)], Want.DISPLACEMENTS)
-    inner = fields.displacement[0][inner_nodes(engine.network, step)]
-    return np.asarray(np.linalg.norm(inner, axis=1))
-
-
 def moved_by_twists(network: Network, step: Step, twist: Floats) -> Floats:
     """Return how far the inner nodes move with twists (B, 6) of the bricks, m."""
     every = (node_motion(network, step.bricks) @ twist.ravel()).reshape(-1, 3)
     return np.asarray(np.linalg.norm(every[inner_nodes(network, step)], axis=1))
-
-
-def error(own: Floats, other: Floats) -> float:
-    """Return the mean difference of displacements from others, as the paper's, %."""
-    return 100 * float(np.mean((own - other) / other))
 
 
 def spread_engine(network: Network, pinch: Pinch, spread: str) -> DiscreteEngine:

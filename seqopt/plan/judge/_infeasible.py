@@ -79,6 +79,8 @@ def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
 
 STEPS = (Goal(Measure.STEPS),)
 IGNORED = "payload=ignored"
+PAYLOADS = "robots that carry more"  # where states must stand, held by what robots carry
+LARGE = 1e6  # N
 STANDING = "no requirement to stand"
 PROPS = "props that bear any force, both ways"
 CENTERING = "a prop at every brick, if not fewer"
@@ -202,8 +204,7 @@ def _opening(problem: States, look: Look) -> Iterator[str]:
         if rule not in done and look(replace(problem, rules=rules)).whole:
             done.add(rule)
             yield text
-    if problem.demands and look(replace(problem, standing=None, settled=())).whole:
-        yield STANDING
+    yield from _supporting(problem, look)
     scene = problem.network.scene  # robots without arms hold as others with joints that are rigid
     able = scene.has_arms and not scene.grip_kinds.arms.any() and recipe_of(problem.engine)
     if able and look(_with_arms(problem, lambda _: None)).whole:
@@ -215,6 +216,16 @@ def _opening(problem: States, look: Look) -> Iterator[str]:
         rest = tuple(other for other in problem.limits if other is not limit)
         if look(replace(problem, limits=rest)).whole:
             yield limit.response
+
+
+def _supporting(problem: States, look: Look) -> Iterator[str]:
+    """Yield what alone is enough for states to stand: no need to, or robots that carry more."""
+    if problem.demands and look(replace(problem, standing=None, settled=())).whole:
+        yield STANDING
+    kept = isinstance(problem.rules, FreeRules) and problem.rules.payload is Payload.KEPT
+    able = problem.demands and kept and recipe_of(problem.engine) and not problem.scenarios
+    if able and look(_carrying(problem, LARGE)).whole:
+        yield PAYLOADS
 
 
 def _propped(problem: States, look: Look) -> Iterator[str]:
@@ -273,10 +284,17 @@ def _enough(problem: States, way: str, look: Look) -> str:
             return way
         digit = 10.0 ** (math.floor(math.log10(enough)) - 2) if enough else 1.0
         return f"a bond of {math.ceil(enough / digit) * digit:.10g} Pa"
+    if way == PAYLOADS:
+        return _enough_payload(problem, lambda payload: look(_carrying(problem, payload)).whole)
     if way == IGNORED and isinstance(problem.rules, FreeRules):
         rules = replace(problem.rules, payload=Payload.IGNORED)
         newton = math.ceil(worst_least(replace(problem, rules=rules), LARGEST, look))
         return f"a payload of {newton} N (--payload {newton})"
+    return _enough_limit(problem, way, look)
+
+
+def _enough_limit(problem: States, way: str, look: Look) -> str:
+    """Return how far a limit has to be raised; other ways as they are."""
     found = [limit for limit in problem.limits if limit.response == way]
     if not found or not (way in STATE_RESPONSES or is_tolerance(way)):
         return way if not found else PROPS if way == PROP_EXCESS else f"no limit on {way}"
@@ -285,6 +303,28 @@ def _enough(problem: States, way: str, look: Look) -> str:
     if is_tolerance(way):
         return f"a tolerance of {length_text(1 / least)} instead of {length_text(found[0].bound)}"
     return f"{way}={least:.6g} instead of {found[0].bound:g}"
+
+
+def _carrying(problem: States, payload: float) -> States:
+    """Return a problem in which every robot may carry so much, N."""
+    scene = problem.network.scene
+    return _in_scene(
+        problem, scene.with_robots(*(replace(r, payload=payload) for r in scene.robots))
+    )
+
+
+def _enough_payload(problem: States, exists: Callable[[float], bool]) -> str:
+    """Return the least payload of all robots with which something exists, to three digits."""
+    low = max(robot.payload for robot in problem.network.scene.robots)
+    high = 2 * low
+    while not exists(high):
+        low, high = high, 2 * high
+    step = 10.0 ** max(0, math.floor(math.log10(high)) - 2)
+    least, most = math.floor(low / step), math.ceil(high / step)
+    while most - least > 1:
+        middle = (least + most) // 2
+        least, most = (least, middle) if exists(middle * step) else (middle, most)
+    return f"a payload of {most * step:.10g} N (--payload {most * step:.10g})"
 
 
 def worst_least(problem: States, response: str, look: Look = explore) -> float:

@@ -1,5 +1,7 @@
 """Pictures of what the model rests on: geometry, vault tests and discrete elements."""
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np
@@ -7,12 +9,11 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.calibration.parts.barrel_vaults import Vault, chain, vaults
-from experiments.harness.charts import ticks
-from experiments.study.parts import counterpart_rows
-from experiments.study.parts.counterpart_rows import Ours, arch_corners, bed_of_springs
+from seqopt.report._paper import rows as counterpart_rows
+from seqopt.report._paper.rows import Ours, arch_corners, bed_of_springs
 from seqopt.report._style import BLUE, INK, VERMILION, dress, look, plain
 from seqopt.report.draw import View, draw_bricks
+from seqopt.study._barrel_vaults import Vault, chain, vaults
 from seqopt.study.published import printed
 
 OURS, STUDY, OFF = BLUE, "#222222", VERMILION
@@ -30,7 +31,7 @@ def number_of(rows: pd.DataFrame) -> pd.Series:
     return rows["at"].str.extract(r"(\d+)")[0].astype(int)
 
 
-def pair(axes: Axes, x: object, rows: pd.DataFrame, color: str = OURS, name: str = "") -> None:
+def pair(axes: Axes, x: Any, rows: pd.DataFrame, color: str = OURS, name: str = "") -> None:
     """Draw our values filled and printed ones around them; marks differ by color."""
     ours, ring = {OFF: ("^", "^"), INK: ("s", "s")}.get(color, (".", "o"))
     axes.plot(x, rows["ours"], ours, ms=4, color=color, ls="none", label=f"{name}here")
@@ -46,6 +47,7 @@ BARS: tuple[dict[str, Any], ...] = (
 
 
 def geometry(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
+    """Draw the arch with its span and height."""
     side, plan = figure.subplots(1, 2, width_ratios=[1.2, 1])
     net = own.engine.network
     draw_bricks(side, net, 25, View(azimuth=0, elevation=0))
@@ -67,12 +69,13 @@ def geometry(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
 
 
 def vault_tests(figure: Figure, _table: pd.DataFrame, _own: Ours) -> None:
+    """Draw outlines, secants and stiffness of the vault tests."""
     panels = figure.subplot_mosaic([["outline", "outline"], ["secants", "bars"]])
     outline, secants, bars = panels["outline"], panels["secants"], panels["bars"]
     _outlines(outline)
     study = printed("arch_stiffness")
     at = study["test"].to_numpy(float)
-    shown = {
+    shown: dict[str, tuple[Any, dict[str, Any]]] = {
         "measured": (study["k_e_kN_mm"], {"color": "k", "ls": "-", "lw": 2.5}),
         "Bruun et al.": (study["k_m_kN_mm"], {"color": "0.5", "ls": "--", "lw": 1.5}),
         "here": (bed_of_springs(), {"color": OURS, "ls": ":", "lw": 2}),
@@ -85,7 +88,9 @@ def vault_tests(figure: Figure, _table: pd.DataFrame, _own: Ours) -> None:
     bars.set(yscale="log", xlabel="test", ylabel="stiffness [kN/mm]", title="stiffness")
     bars.set_ylim(top=3000)
     bars.set_xticks(at)
-    ticks([50, 100, 200, 500], bars.yaxis)
+    shown_ticks = [50, 100, 200, 500]
+    bars.yaxis.set_ticks(shown_ticks, [f"{tick:g}" for tick in shown_ticks])
+    bars.yaxis.set_ticks([], minor=True)
     dress(outline, secants, bars)
     outline.legend(loc="center left", bbox_to_anchor=(1, 0.5))
     secants.legend()
@@ -111,6 +116,7 @@ def _outlines(outline: Axes) -> None:
 
 
 def discrete(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
+    """Draw displacements by both models, and their mean error."""
     panels = figure.subplots(2, 3).ravel()
     for axes, step in zip(panels, counterpart_rows.arches(own), strict=False):
         moved = counterpart_rows.node_displacements(own, step)

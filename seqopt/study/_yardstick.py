@@ -1,5 +1,7 @@
 """How far a table of responses is from a printed one, beyond the rounding of print."""
 
+from __future__ import annotations
+
 import numpy as np
 import pandas as pd
 

@@ -5,6 +5,8 @@ sketches and definitions have no numbers; plots of data and drawings with dimens
 count the environments of the LaTeX source on arXiv.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 STEPS = "values (T_pct to two edges)"  # what is counted in the tables of all steps
@@ -106,64 +108,3 @@ ITEMS = (
          "[Where it disagrees](#where-it-disagrees) explains the differences.",
          counted=STEPS),
 )  # fmt: skip
-
-# Tables that are small and used here only, as printed. Empty cells do not grip.
-COMPARED = """step,M_C,M_S,M_ratio,D_C,D_S,D_ratio,T_C,T_S,T_ratio
-9,2.9,6.8,0.43,0.4,1.3,0.31,68.6,36.9,1.9
-11,1.6,8.3,0.19,0.6,2.2,0.27,69.1,45.5,1.5
-21,20.7,21.5,0.96,8.5,12.8,0.66,78.4,23.7,3.3
-23,18.6,22.0,0.85,7.3,16.9,0.43,90.8,11.4,8.0
-33,4.6,21.3,0.22,11.2,70.8,0.16,29.6,0.8,37.0
-35,5.3,29.6,0.18,10.4,97.5,0.11,59.3,0.8,74.1
-45,3.7,56.4,0.07,15.9,264.4,0.06,34.8,0.8,43.5
-47,0.9,66.0,0.01,11.1,306.5,0.04,69.6,0.8,87.0
-"""
-TENSION = """what,sequential,cantilever
-average,38.0,53.7
-average before the crown,55.2,80.0
-average after the crown,17.4,30.6
-maximum,114.4,111.5
-"""
-ROBOTS = """method,rob1,rob2
-sequential,369,406
-cantilever,362,409
-"""
-MODIFIED = """step,bricks,rob1,rob2,rob3
-8,4,8,7,
-,4,8,7,O1
-9,4,8,,O1
-,5,8,11,O1
-10,5,8,11,
-,5,8,11,O2
-11,5,,11,O2
-,6,13,11,O2
-12,6,13,11,
-"""
-CASCADE = """step,bricks,rob1,rob2,rob3
-1,1,1,,
-2,2,1,2,
-3,3,1,2,O1
-4,3,,2,O1
-5,4,7,2,O1
-6,4,7,,O1
-7,4,7,O2,O1
-8,4,7,O2,
-9,5,7,O2,8
-10,5,,O2,8
-11,5,O3,O2,8
-12,5,O3,,8
-13,6,O3,11,8
-14,6,O3,11,
-15,6,O3,11,O4
-16,6,,11,O4
-17,7,13,11,O4
-18,7,13,,O4
-19,7,13,O5,O4
-20,7,13,O5,
-21,8,13,O5,15
-58,17,,O14,33
-59,17,O15,O14,33
-60,17,O15,,33
-61,18,O15,35,33
-62,18,O15,35,
-"""

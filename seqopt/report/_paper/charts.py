@@ -1,18 +1,21 @@
 """Pictures of the counterparts: printed values beside ours, with the agreement as a caption."""
 
+from __future__ import annotations
+
 import textwrap
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from experiments.study.parts import counterpart_model_charts as models
-from experiments.study.parts.counterpart_model_charts import OFF, OURS, STUDY, number_of, of, pair
-from experiments.study.parts.counterpart_page import NEAR, caption
-from experiments.study.parts.counterpart_rows import LOOP, RESPONSES, Ours, plan_rows
 from seqopt.engines.interface import Want
+from seqopt.report._paper import model_charts as models
+from seqopt.report._paper.agreement import NEAR, caption
+from seqopt.report._paper.model_charts import OFF, OURS, STUDY, number_of, of, pair
+from seqopt.report._paper.rows import LOOP, RESPONSES, Ours, plan_rows
 from seqopt.report._robots import ROBOT_COLORS
 from seqopt.report._style import INK, SMALL, dress, new_figure, plain, styled
 from seqopt.report.draw import View, draw_bricks, draw_grips
@@ -33,6 +36,7 @@ Draw = Callable[[Figure, pd.DataFrame, Ours], None]
 
 
 def text_of(value: float) -> str:
+    """Return a grip as it is printed: a node, O3, or a dash."""
     if value < 0:
         return "–"
     return f"O{value - 1000:g}" if value > 1000 else f"{value:g}"
@@ -61,7 +65,9 @@ def grid(axes: Axes, rows: pd.DataFrame, title: str) -> None:
 
 
 def sequences(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
-    left, right = figure.subfigures(1, 2)
+    """Draw the grips of schemes."""
+    parts: Any = figure.subfigures(1, 2)
+    left, right = parts
     first, second = left.subplots(2, 1, height_ratios=[12, 9])
     both = of(table, "fig:2rob_methods")
     grid(first, both[both["quantity"] != "steps shared [%]"], "Figure 9: two robots")
@@ -70,7 +76,9 @@ def sequences(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
 
 
 def plan(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
-    above, below = figure.subfigures(2, 1, height_ratios=[1, 2.4])
+    """Draw grips and responses of the published plan."""
+    parts: Any = figure.subfigures(2, 1, height_ratios=[1, 2.4])
+    above, below = parts
     grips_of_plan(above.subplots(), of(table, "table:experimental_data3"), own)
     along_steps("table:experimental_data3")(below, table, own)
 
@@ -95,6 +103,7 @@ def grips_of_plan(axes: Axes, rows: pd.DataFrame, own: Ours) -> None:
 
 
 def twisting(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
+    """Draw the twisting steps of both methods."""
     panels = figure.subplots(3, 2).ravel()
     names = ("M_sup [N m]", "D_max [1e-3 mm]", "T_max [N]")
     for axes, name in zip(panels, names, strict=False):
@@ -125,6 +134,7 @@ def twisting(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
 
 
 def maxima(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
+    """Draw largest and average values, ours over printed ones."""
     items = {
         "Table 6": of(table, "table:2robot_tension"),
         "Table 7": of(table, "table:2robot_forces"),
@@ -150,6 +160,7 @@ def maxima(figure: Figure, table: pd.DataFrame, _own: Ours) -> None:
 
 
 def loop(figure: Figure, table: pd.DataFrame, own: Ours) -> None:
+    """Draw the four steps of one loop."""
     _, steps, _ = plan_rows(own)
     rows = of(table, "fig:3rob_sequence")
     for axes, step in zip(figure.subplots(2, 2).ravel(), LOOP, strict=True):
@@ -165,6 +176,7 @@ def along_steps(label: str) -> Draw:
     """Return the drawing of every response of a table over its steps."""
 
     def draw(figure: Figure | SubFigure, table: pd.DataFrame, _own: Ours) -> None:
+        """Draw a chart for every response."""
         names = [name for name in RESPONSES.values() if len(of(table, label, name))]
         panels = figure.subplots(-(-len(names) // 3), 3).ravel()
         for axes, name in zip(panels, names, strict=False):
@@ -204,6 +216,7 @@ PICTURES: dict[str, tuple[Draw, float]] = {
 
 @styled
 def drawn(name: str, table: pd.DataFrame, own: Ours) -> Figure:
+    """Return a picture by name, with its caption."""
     draw, height = PICTURES[name]
     figure = new_figure(height)
     draw(figure, table, own)

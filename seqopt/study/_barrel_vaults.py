@@ -8,16 +8,20 @@ and let the energy of the springs (Castigliano) give the three unknowns and the 
 Lengths are in m, forces in N.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from seqopt import ArchShape, Scene, arch_scene, build_network
 from seqopt.arrays import Floats
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._operator import OperatorBuilder
+from seqopt.network.build import build_network
+from seqopt.scene.arch import ArchShape, arch_scene
+from seqopt.scene.scene import Scene
 from seqopt.study.published import SOURCE, printed
 
 

@@ -1,34 +1,46 @@
 """Printed and computed values, side by side, of every figure and table of the paper.
 
-Every function yields the rows of one item of `experiments.study.parts.paper_items`, named by its
+Every function yields the rows of one item of `seqopt.report._paper.items`, named by its
 label in `COUNTERPARTS`.
 """
 
-import io
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from experiments.calibration.parts.barrel_vaults import BED, chain, fit, laws, vaults
-from experiments.discrete.parts.arch_pads import STEPS, Reading
-from experiments.discrete.parts.arches_lmgc90 import error, inner_nodes, moved
-from experiments.harness.scenes import arch25
-from experiments.harness.yardstick import ROUNDING, VALUES
-from experiments.study.parts.paper_items import CASCADE, COMPARED, MODIFIED, ROBOTS, TENSION
-from seqopt import Scene, Step
 from seqopt.arrays import Floats
+from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import rank_choice
+from seqopt.network.build import build_network
+from seqopt.network.network import Network
 from seqopt.report.comparison import Comparison, compare
 from seqopt.scene.boxes import boxes
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule import OpenGrip, OpenStep
+from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study.published import EQUATIONS, as_printed, printed, printed_steps, published_choice
+from seqopt.study._barrel_vaults import BED, chain, fit, laws, vaults
+from seqopt.study._discrete_arches import STEPS, error, inner_nodes, moved
+from seqopt.study._yardstick import ROUNDING, VALUES
+from seqopt.study.published import (
+    EQUATIONS,
+    STUDY_BED,
+    as_printed,
+    printed,
+    printed_steps,
+    published_choice,
+)
 
 Rows = Iterator["Row"]
 
@@ -57,13 +69,14 @@ class Ours:
         """The paper's arch as it ships."""
         return self.engine.network.scene
 
-    def steps(self, method: str) -> pd.DataFrame:
+    def steps(self, method: str) -> Any:  # a table: pandas does not say that cells are numbers
         """Return the responses of a method by step, the support's as the paper prints them."""
         return as_printed(self.scene, self.methods.tables[method]).set_index("step")
 
 
 def ours() -> Ours:
-    engine = arch25()
+    """Return the models that counterparts are read from."""
+    engine = ComplianceEngine(build_network(load_scene("arch25")))
     problem = candidate_layers(engine, three_robot_loop(engine.network), EQUATIONS)
     return Ours(engine, compare(engine, EQUATIONS), problem)
 
@@ -74,6 +87,7 @@ def arch_corners(scene: Scene) -> Floats:
 
 
 def geometry(own: Ours) -> Rows:
+    """Compare the size of the arch (figure 2)."""
     corners = arch_corners(own.scene)
     first, last = (np.array(ground.position) for ground in own.scene.grounds)
     along = (last - first) * [1, 1, 0]
@@ -104,12 +118,14 @@ def bed_of_springs() -> Floats:
 
 
 def secant(_own: Ours) -> Rows:
+    """Compare the secant of test 1 (figure 6)."""
     study = printed("arch_stiffness")
     k = float(bed_of_springs()[0])
     yield Row("analytical secant [kN/mm]", "test 1", study["k_m_kN_mm"][0], k, 0.5)
 
 
 def stiffness(_own: Ours) -> Rows:
+    """Compare the stiffness of the vault tests (table 2)."""
     study, k = printed("arch_stiffness"), bed_of_springs()
     error = 100 * (k / study["k_e_kN_mm"].to_numpy() - 1)
     for i, test in enumerate(study["test"]):
@@ -125,15 +141,22 @@ def arches(own: Ours) -> list[Step]:
 
 
 def nodes_compared(own: Ours) -> Rows:
+    """Compare how many nodes are compared (figure 8)."""
     study = printed("de_validation").set_index("bricks")["nodes"]
     for step in arches(own):
         count, at = len(inner_nodes(own.engine.network, step)), f"{step.bricks} bricks"
         yield Row("inner nodes that no robot holds", at, study[step.bricks], count)
 
 
+def _discrete(network: Network) -> DiscreteEngine:
+    """Return discrete elements as printed, with a robot that holds a node."""
+    return DiscreteEngine(network, bed=STUDY_BED, pinch=None)
+
+
 def discrete_elements(own: Ours) -> Rows:
+    """Compare mean errors against discrete elements (table 3)."""
     study = printed("de_validation").set_index("bricks")["error_percent"]
-    discrete = Reading().engine(own.engine.network)
+    discrete = _discrete(own.engine.network)
     for step in arches(own):
         mean = error(moved(own.engine, step), moved(discrete, step))
         yield Row("mean error [%]", f"{step.bricks} bricks", study[step.bricks], mean)
@@ -143,7 +166,7 @@ def node_displacements(own: Ours, step: Step) -> dict[str, pd.Series]:
     """Return displacements of the inner nodes that no robot holds, 1e-3 mm, by model."""
     net = own.engine.network
     names = [int(str(net.node_name[i])) for i in inner_nodes(net, step)]
-    models = {"double cross": own.engine, "discrete elements": Reading().engine(net)}
+    models: dict[str, Engine] = {"double cross": own.engine, "discrete elements": _discrete(net)}
     return {
         model: pd.Series(1e6 * moved(engine, step), names).sort_index()
         for model, engine in models.items()
@@ -167,11 +190,8 @@ RESPONSES = {
 }
 
 
-def read(text: str) -> pd.DataFrame:
-    return pd.read_csv(io.StringIO(text))
-
-
 def two_robots(own: Ours) -> Rows:
+    """Compare grips of both methods around the crown (figure 9)."""
     states = {}
     for name, method in METHODS.items():
         steps = method(own.engine.network)
@@ -195,10 +215,12 @@ def cell(grip: object, base: int = 0) -> float:
 
 
 def twisting(own: Ours) -> Rows:
+    """Compare the twisting steps (table 4)."""
     table, study = own.steps("sequential"), printed("sequential_offcenter").set_index("step")
     calm = table.drop(list(TWISTING))
     for step in TWISTING:
-        at, want, got = f"step {step}", study.loc[step], table.loc[step]
+        at, got = f"step {step}", table.loc[step]
+        want: Any = study.loc[step]
         for column in ("F_rob1_N", "F_rob2_N", "F_sup_N", "M_sup_Nm", "D_max_1e-3mm"):
             if not np.isnan(want[column]):
                 yield Row(RESPONSES[column], at, abs(want[column]), abs(got[column]))
@@ -207,9 +229,11 @@ def twisting(own: Ours) -> Rows:
 
 
 def lever_arm(own: Ours) -> Rows:
+    """Compare the lever arm (figure 10)."""
     table, study = own.steps("sequential"), printed_steps("sequential").set_index("step")
     for column in ("M_sup_Nm", "D_max_1e-3mm"):
-        yield Row(RESPONSES[column], "step 35", study.loc[35, column], table.loc[35, column])
+        want = float(study[column].loc[35])
+        yield Row(RESPONSES[column], "step 35", want, float(table.loc[35, column]))
     for step in TWISTING[4:]:
         force = table.loc[step, ["F_rob1_N", "F_rob2_N"]].abs().max()
         arm = 1e3 * float(table.loc[step, "M_sup_Nm"] / force)
@@ -220,7 +244,7 @@ def cantilever_over_sequential(own: Ours) -> Rows:
     """Compare both methods; ratios are those of values rounded to print, as the paper's are."""
     sides = {"C": own.steps("cantilever"), "S": own.steps("sequential")}
     columns = {"M": "M_sup_Nm", "D": "D_max_1e-3mm", "T": "F_max_N"}
-    for want in read(COMPARED).to_dict("records"):
+    for want in printed("table_5_cantilever_over_sequential").to_dict("records"):
         step = int(want["step"])
         for short, column in columns.items():
             got, name = {}, RESPONSES[column]
@@ -233,7 +257,8 @@ def cantilever_over_sequential(own: Ours) -> Rows:
 
 
 def tension(own: Ours) -> Rows:
-    study = read(TENSION).set_index("what")
+    """Compare tension (table 6)."""
+    study = printed("table_6_tension").set_index("what")
     for method, start in (("sequential", 1), ("cantilever", 5)):
         largest = own.steps(method)["F_max_N"]
         parts = (largest.loc[start:], largest.loc[start:CROWN], largest.loc[CROWN + 1 :])
@@ -243,13 +268,15 @@ def tension(own: Ours) -> Rows:
 
 
 def robot_forces(own: Ours) -> Rows:
-    study = read(ROBOTS).set_index("method")
+    """Compare the largest forces of robots (table 7)."""
+    study = printed("table_7_robot_forces").set_index("method")
     for method, robot in product(study.index, study.columns):
         force = own.methods.maxima.loc[f"F_{robot} [N]", method]
         yield Row(f"largest F_{robot} [N]", method, study.loc[method, robot], force, 0.5)
 
 
 def improvement(own: Ours) -> Rows:
+    """Compare the largest responses of three methods (table 10)."""
     study = own.methods.printed
     for quantity, method in product(own.methods.maxima.index, own.methods.maxima.columns):
         want = np.nan if study is None else study.loc[quantity, method]
@@ -272,13 +299,14 @@ def modified(own: Ours) -> Rows:
     """Start where five bricks stand, held by two robots as in the first row of the excerpt."""
     steps = modified_sequential(own.engine.network).steps
     start = next(i for i, step in enumerate(steps) if step.grips == (8, 7, None))
-    study = read(MODIFIED)
+    study = printed("table_8_modified_sequential")
     window = list(steps[start : start + len(study)])
     yield from scheme(study, window, base=window[1].moves[0])
 
 
 def cascade(own: Ours) -> Rows:
-    study = read(CASCADE)
+    """Compare the scheme of the cascade (table 9)."""
+    study = printed("table_9_cascade")
     steps = three_robot_loop(own.engine.network).steps
     yield from scheme(study, [steps[number - 1] for number in study["step"]])
 
@@ -293,13 +321,15 @@ def plan_rows(own: Ours) -> tuple[pd.DataFrame, list[Step], pd.DataFrame]:
 
 
 def loop(own: Ours) -> Rows:
+    """Compare one loop (figure 13)."""
     study, steps, ranks = plan_rows(own)
     yield from scheme(study[study["step"].isin(LOOP)], [steps[number - 1] for number in LOOP])
-    place = ranks.set_index("step").loc[LOOP[0], "rank_in_window"]
+    place = float(ranks.loc[ranks["step"] == LOOP[0], "rank_in_window"].iloc[0])
     yield Row("place of node O15 by the printed equations", "step 59", 1, place)
 
 
 def plan(own: Ours) -> Rows:
+    """Compare the published plan, its responses and its ranks (table B.1)."""
     study, steps, ranks = plan_rows(own)
     yield from scheme(study, steps)
     yield from steps_of(own, "published")
