@@ -40,12 +40,17 @@ class PartialAssemblies:
         self._turning = self._map.indices % 6 >= 3  # which entries are moments
 
     def __call__(self, bricks: int, grips: Sequence[int | None]) -> Assembly:
-        """Return a partial structure with the grips that hold it."""
+        """Return a partial structure with the grips that hold it.
+
+        Grips beyond those of the scene's robots bear what the strongest of these does.
+        """
         whole, scene = self._whole, self.network.scene
         contacts = len(self.network.springs.acting(bricks))
         corners = int(np.searchsorted(whole.contact, contacts))
-        pairs = zip(grips, scene.robots, strict=True)
-        held = [(node, robot.payload) for node, robot in pairs if node is not None]
+        payload = [robot.payload for robot in scene.robots]
+        payload += [max(payload, default=0.0)] * (len(grips) - len(payload))
+        pairs = zip(grips, payload, strict=True)
+        held = [(node, most) for node, most in pairs if node is not None]
         props = prop_grips(self.network, bricks, held=bool(held))
         nodes = [*(node for node, _ in held), *props.nodes]
         part: Assembly = Assembly.__new__(Assembly)
