@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, Ints, frozen
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._hands import Hands
+from seqopt.engines.interface import _couples
 from seqopt.engines.rigid._operator import ComplianceOperator
 
 
@@ -53,12 +52,6 @@ def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
     first, second = first[couple], second[couple]
     brick = bricks[first, sets]
     return Pairs(sets, first, second, brick, operator.axis[brick])
-
-
-@cache
-def _couples(grips: int) -> Ints:
-    """Return all couples (2, c) of a number of grips."""
-    return frozen(np.array([*combinations(range(grips), 2)], dtype=np.int64).reshape(-1, 2).T)
 
 
 def _count_grips(operator: ComplianceOperator, count: int) -> int:
