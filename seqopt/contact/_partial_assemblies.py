@@ -38,6 +38,7 @@ class PartialAssemblies:
         self._lever = np.maximum.accumulate(lever)
         self._map = whole.contact_map.tocsc()
         self._turning = self._map.indices % 6 >= 3  # which entries are moments
+        self._last: dict[tuple[int, float], sparse.csr_array] = {}  # asked again by its next step
 
     def __call__(self, bricks: int, grips: Sequence[int | None]) -> Assembly:
         """Return a partial structure with the grips that hold it.
@@ -78,8 +79,10 @@ class PartialAssemblies:
         levers = np.linalg.norm(part.grip_position - part.centroid[part.grip_block], axis=1)
         longest = max(self._lever[:corners].max(initial=0.0), levers.max(initial=0.0))
         scales = float(self._heaviest[bricks - 1]) or 1.0, float(longest) or 1.0
-        maps = self._contact_map(bricks, corners, scales[1])
-        part.__setstate__({"scales": scales, "contact_map": maps})
+        key = bricks, scales[1]
+        if key not in self._last:
+            self._last = {key: self._contact_map(bricks, corners, scales[1])}
+        part.__setstate__({"scales": scales, "contact_map": self._last[key]})
         return part
 
     def _contact_map(self, bricks: int, corners: int, length: float) -> sparse.csr_array:

@@ -44,7 +44,6 @@ WORDS = {
 }  # as of seqopt.report.comparison.LARGEST
 OVER = "over payload"
 LEGEND = {OVER: "a robot would hold more than it can", OUTSIDE: "its numbers are not reliable"}
-PAGE = "report.html"
 FIRST = (CLOSED, FREE)  # of a comparison: its other rows may be more than are seen at once
 PLANS = ("plan.csv", "pick.csv", "steps_*.csv")  # of optimize, pareto and compare
 PHONE = 3.75  # inches: as wide as a telephone shows at 100 pixels an inch

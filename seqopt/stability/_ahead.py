@@ -21,6 +21,7 @@ from seqopt.stability._verdict_chain import VerdictChain, Way
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.limit_analysis import compile_equilibrium
 
+_DEAR = 50  # bricks from which on a proof takes much longer than trying others
 _SPAN = 8  # brick counts whose grips hold a structure that is to fall all the same
 _MOST = 16  # brick counts for which nothing is sought at most after it was of no use
 _EARLIER = (Way.EARLIER_FORCES, Way.EARLIER_MOTION)
@@ -59,7 +60,7 @@ def quick_verdicts(network: Network, steps: Sequence[Step], mortar: Mortar) -> I
     patience, sought = {each: _Patience() for each in _Sought}, _Sought.FORCES
     for i, (bricks, group) in enumerate(groups):
         near = [step for _, each in groups[i : i + _SPAN] for step in each]
-        left = {each for each in _Sought if patience[each].ready()}
+        left = {each for each in _Sought if bricks > _DEAR and patience[each].ready()}
         for step in group:
             if not bricks:
                 yield Verdict.STANDS

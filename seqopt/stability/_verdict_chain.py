@@ -81,6 +81,7 @@ class VerdictChain:
         self._corner_force: Floats | None = None
         self._grip_force: dict[int, Floats] = {}
         self._motion: Floats | None = None
+        self._stood = False  # the last one, by forces
         self._kept: list[tuple[Floats, dict[int, Floats]]] = []  # of as many corners
 
     def __call__(
@@ -104,13 +105,17 @@ class VerdictChain:
         return assembly, proven, way
 
     def _claimed(self, assembly: Assembly, case: Case, held: Sequence[int]) -> Iterator[_Tried]:
-        """Yield what forces and motions that were found before prove."""
+        """Yield what forces and motions that were found before prove, those found last first."""
         none = np.zeros((len(assembly.corner), 3)), np.zeros((len(held), 3))
-        for motion in _extended(assembly, self._motion):
-            claim = Answer(Claim.SOLVED, 1.0, *none, motion)
-            yield judged(assembly, case, claim), Way.EARLIER_MOTION
-        for claim in self._kept_forces(assembly, held):
-            yield judged(assembly, case, claim), Way.EARLIER_FORCES
+        motions = _extended(assembly, self._motion)
+        falls = (Answer(Claim.SOLVED, 1.0, *none, motion) for motion in motions)
+        ways = [
+            (falls, Way.EARLIER_MOTION),
+            (self._kept_forces(assembly, held), Way.EARLIER_FORCES),
+        ]
+        for claims, way in reversed(ways) if self._stood else ways:
+            for claim in claims:
+                yield judged(assembly, case, claim), way
 
     def _sought(self, assembly: Assembly, case: Case, held: Sequence[int]) -> Iterator[_Tried]:
         """Yield what is proven by what is sought for it, what takes least first."""
@@ -153,7 +158,8 @@ class VerdictChain:
     def _learn(self, assembly: Assembly, proven: Proven, held: Sequence[int]) -> None:
         force, length = assembly.scales
         answer = proven.answer
-        if proven.held <= EXACT:
+        self._stood = proven.held <= EXACT
+        if self._stood:
             self._corner_force = force * answer.contact_force
             self._grip_force = dict(zip(held, force * answer.grip_force, strict=True))
             same = [each for each in self._kept if len(each[0]) == len(self._corner_force)]

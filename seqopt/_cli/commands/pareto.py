@@ -32,6 +32,7 @@ from seqopt._cli.posing import asked_problem
 from seqopt._cli.screens import question
 from seqopt._cli.values import parse_numbers
 from seqopt._files import csv_text, require_folder
+from seqopt._showing import PAGE
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError, did_you_mean
@@ -39,7 +40,7 @@ from seqopt.graph.states.states import States
 from seqopt.plan.front import Front, find_front, pick
 from seqopt.plan.solving import states_of
 from seqopt.problem.problem import judged_by
-from seqopt.report._pages import PAGE, front_page
+from seqopt.report._pages import front_page
 from seqopt.report.comparison import fixed_methods, shown_table, worst_of
 from seqopt.responses.table import LinearRange, analyze, builds_in_words
 from seqopt.scene.scene_file import dump_scene

@@ -11,8 +11,9 @@ from seqopt._cli.options import BUILT, WRITTEN, declare, engine_options, form_op
 from seqopt._cli.outputs import figure_notes, keep_apart
 from seqopt._cli.screens import question
 from seqopt._files import require_folder, write_folder, write_text
+from seqopt._showing import PAGE
 from seqopt.network.build import build_network
-from seqopt.report._pages import PAGE, folder_builds, folder_page
+from seqopt.report._pages import folder_builds, folder_page
 
 DESCRIPTION = (
     "Write a page with a step viewer of the plans in a folder: the structure in three dimensions, "

@@ -37,7 +37,7 @@ def _solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tu
     equations nearly repeat those before them.
     """
     size = system.shape[1]
-    if system.shape[2] <= _FEW and not negative:
+    if size and system.shape[2] <= _FEW and not negative:
         found = _solve_few(system)
         if found is not None:
             return found

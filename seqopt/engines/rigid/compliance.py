@@ -117,7 +117,8 @@ def _try_forces(
         force[part] = found.force
         good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN, own)
     force[~good] = 0.0
-    pairs = pairs.only(pairs.rigid(hands, *columns.shape))
+    if len(pairs.sets):
+        pairs = pairs.only(pairs.rigid(hands, *columns.shape))
     if not even:
         good &= ~_cancels(operator, index, force)
     lever = 1.0 if hands is None else hands.lever
