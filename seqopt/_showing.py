@@ -18,6 +18,7 @@ from typing import Any
 from seqopt._files import write_text
 from seqopt.errors import ExtraError
 
+PAGE = "report.html"  # the page in a folder that a command writes
 DISPLAYS = {
     "card": "seqopt.report._notebook",
     "scene_picture": "seqopt.report._pictures",

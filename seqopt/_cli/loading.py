@@ -12,10 +12,10 @@ from seqopt._cli.given import plan_name
 from seqopt._cli.outputs import require_out, write_outputs
 from seqopt._cli.values import asked_mortar
 from seqopt._files import csv_text
+from seqopt._showing import PAGE
 from seqopt.engines.registry import USUAL, make_engine, versions
 from seqopt.network.build import build_network
 from seqopt.report._failures import load_page
-from seqopt.report._pages import PAGE
 from seqopt.stability._load_factor import format_load_factors, load_factor_table, load_factors
 
 LOADS = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -38,7 +39,8 @@ def load(words: Sequence[str]) -> None:
     """
     asked = asked_command(words)
     if asked in COMMANDS:
-        import jsonschema  # noqa: F401, PLC0415  # scene files need it
+        if any(map(os.path.exists, words)):
+            import jsonschema  # noqa: F401, PLC0415  # scene files need it
 
         import seqopt._cli.watcher  # noqa: F401, PLC0415  # of which help needs nothing
 

@@ -7,26 +7,25 @@ import json
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from seqopt._cli.given import is_folder
 from seqopt._files import csv_text, require_apart, require_folder, write_csv, write_folder
+from seqopt._showing import PAGE
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.states.states import States
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.calling.formulation import trace_rows
 from seqopt.plan.out_of_sample import Trial
 from seqopt.plan.plan import Plan
-from seqopt.report._pages import PAGE, plan_page
-from seqopt.report._speed._table import SpeedTable
-from seqopt.report.comparison import Comparison
-from seqopt.report.page import _task_texts
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
-from seqopt.sequence.exports._arm_tasks import _in_postures
-from seqopt.sequence.exports._tasks import plan_tasks, tasks_csv, tasks_json
 from seqopt.stability._builds import BuildProver
+
+if TYPE_CHECKING:
+    from seqopt.report._speed._table import SpeedTable
+    from seqopt.report.comparison import Comparison
 
 ALWAYS = ("plan.csv", "summary.json", "scene.json", PAGE)  # names in the folder of any plan
 
@@ -99,6 +98,8 @@ def plan_files(
 
     The trial is of the plan in other scenarios; ``choices``: whether every choice is in a table.
     """
+    from seqopt.report._pages import plan_page  # noqa: PLC0415  # only where files are written
+
     tables = {"plan": plan.responses()}
     if not isinstance(plan.graph, States):
         tables["selection"] = plan.table()
@@ -128,6 +129,9 @@ def _picked_files(
     plan: ShownBuild, report: Mapping[str, object], prover: BuildProver
 ) -> dict[str, bytes | str]:
     """Return the files of a plan of a Pareto set, as those of any plan, by file name."""
+    from seqopt.report._pages import plan_page  # noqa: PLC0415  # only where files are written
+    from seqopt.report.page import _task_texts  # noqa: PLC0415
+
     scene, table = plan.engine.network.scene, plan.responses()
     tasks = _task_texts(scene, plan.steps)
     return {
@@ -157,6 +161,9 @@ def time_files(build: ShownBuild) -> dict[str, bytes | str]:
 
 def _task_files(plan: Plan) -> dict[str, str]:
     """Return what robots do, for those who program them, by file name."""
+    from seqopt.sequence.exports._arm_tasks import _in_postures  # noqa: PLC0415
+    from seqopt.sequence.exports._tasks import plan_tasks, tasks_csv, tasks_json  # noqa: PLC0415  # only where files are written
+
     scene = plan.engine.network.scene
     tasks = [*plan_tasks(scene, plan.steps)]
     if plan.arms is not None:

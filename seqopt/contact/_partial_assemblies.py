@@ -38,14 +38,20 @@ class PartialAssemblies:
         self._lever = np.maximum.accumulate(lever)
         self._map = whole.contact_map.tocsc()
         self._turning = self._map.indices % 6 >= 3  # which entries are moments
+        self._last: dict[tuple[int, float], sparse.csr_array] = {}  # asked again by its next step
 
     def __call__(self, bricks: int, grips: Sequence[int | None]) -> Assembly:
-        """Return a partial structure with the grips that hold it."""
+        """Return a partial structure with the grips that hold it.
+
+        Grips beyond those of the scene's robots bear what the strongest of these does.
+        """
         whole, scene = self._whole, self.network.scene
         contacts = len(self.network.springs.acting(bricks))
         corners = int(np.searchsorted(whole.contact, contacts))
-        pairs = zip(grips, scene.robots, strict=True)
-        held = [(node, robot.payload) for node, robot in pairs if node is not None]
+        payload = [robot.payload for robot in scene.robots]
+        payload += [max(payload, default=0.0)] * (len(grips) - len(payload))
+        pairs = zip(grips, payload, strict=True)
+        held = [(node, most) for node, most in pairs if node is not None]
         props = prop_grips(self.network, bricks, held=bool(held))
         nodes = [*(node for node, _ in held), *props.nodes]
         part: Assembly = Assembly.__new__(Assembly)
@@ -73,8 +79,10 @@ class PartialAssemblies:
         levers = np.linalg.norm(part.grip_position - part.centroid[part.grip_block], axis=1)
         longest = max(self._lever[:corners].max(initial=0.0), levers.max(initial=0.0))
         scales = float(self._heaviest[bricks - 1]) or 1.0, float(longest) or 1.0
-        maps = self._contact_map(bricks, corners, scales[1])
-        part.__setstate__({"scales": scales, "contact_map": maps})
+        key = bricks, scales[1]
+        if key not in self._last:
+            self._last = {key: self._contact_map(bricks, corners, scales[1])}
+        part.__setstate__({"scales": scales, "contact_map": self._last[key]})
         return part
 
     def _contact_map(self, bricks: int, corners: int, length: float) -> sparse.csr_array:

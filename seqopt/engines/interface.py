@@ -231,21 +231,29 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
     known, index = network.index_of_grip
     last = len(known) - 1
     at = (numbers.astype(np.int64, copy=False) - known[0]).clip(0, last)
-    if (known[at] != numbers).any():  # names are not consecutive, or wrong
+    other = known[at] != numbers
+    if other.any():  # names are not consecutive, or wrong
         at = np.searchsorted(known, numbers).clip(max=last)
+        other = known[at] != numbers
     columns = index[at]
-    wrong = (known[at] != numbers) | (columns >= 2 * bricks)
+    wrong = other | (columns >= 2 * bricks)
     if wrong.any():
         raise GripError(
             f"grip on node {numbers[wrong][0]}: with {bricks} bricks the free nodes are "
             f"{known[index < 2 * bricks].tolist()}"
         )
-    for i, j in combinations(range(columns.shape[1]), 2):
-        twice = columns[:, i] == columns[:, j]
-        if twice.any():
-            named = numbers[twice][0].tolist()
-            raise GripError(f"grip set {named}: a node is held twice; name it once")
+    first, second = _couples(columns.shape[1])
+    twice = columns[:, first] == columns[:, second]
+    if twice.any():
+        named = numbers[twice.any(axis=1)][0].tolist()
+        raise GripError(f"grip set {named}: a node is held twice; name it once")
     return np.asarray(columns, dtype=np.int64)
+
+
+@cache
+def _couples(grips: int) -> Ints:
+    """Return all couples (2, c) of a number of grips."""
+    return frozen(np.array([*combinations(range(grips), 2)], dtype=np.int64).reshape(-1, 2).T)
 
 
 @contextmanager

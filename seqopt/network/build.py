@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -116,9 +117,11 @@ def _since(spring: Joint | Ground, index_of: dict[int, int]) -> int:
 def _joint_names(springs: _Springs) -> list[tuple[object, ...]]:
     """Return a name for the joint node of every spring."""
     names: list[tuple[object, ...]] = []
+    alike = Counter[tuple[object, ...]]()
     for spring, _ in springs:
         name = spring.bricks if isinstance(spring, Joint) else ("ground", spring.brick)
-        same = sum(other[1:3] == name for other in names)
+        same = alike[name]
+        alike[name] += 1
         names.append(("joint", *name, same + 1) if same else ("joint", *name))
     return names
 

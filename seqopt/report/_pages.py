@@ -41,7 +41,6 @@ WORDS = {
 }  # as of seqopt.report.comparison.LARGEST
 OVER = "over payload"
 LEGEND = {OVER: "a robot would hold more than it can", OUTSIDE: "its numbers are not reliable"}
-PAGE = "report.html"
 FIRST = (CLOSED, FREE)  # of a comparison: its other rows may be more than are seen at once
 PLANS = ("plan.csv", "pick/plan.csv", "steps_*.csv")  # of optimize, pareto and compare
 GAP = "above the best, %"

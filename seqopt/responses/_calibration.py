@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.special import stdtrit
 
 from seqopt.arrays import Bools, Floats, Terse
 from seqopt.engines.interface import Want
@@ -151,6 +150,8 @@ def _judged(logs: Floats, errors: Floats, share: Floats, table: pd.DataFrame) ->
     rows = np.stack([1 - share, share], axis=1)
     half, most = np.full(2, np.inf), np.inf
     if tests > 1 + apart:
+        from scipy.special import stdtrit  # noqa: PLC0415  # slow to import, for this only
+
         sigma = np.sqrt((errors**2).sum() / (tests - 1 - apart))
         likely = float(stdtrit(tests - 1 - apart, 0.975))
         most = likely * sigma / np.sqrt(tests)

@@ -14,6 +14,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from seqopt.arms._permits import within_reach
+from seqopt.arrays import Bools
 from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import network_of
 from seqopt.network.network import Network, PartKind
@@ -147,9 +148,14 @@ def in_words(number: int) -> str:
 
 def lies_along(network: Network) -> frozenset[int]:
     """Return the names of bricks along the structure: joints meet both of their inner nodes."""
-    half = network.edge_kind == PartKind.JOINT.value
-    along = np.isin(network.inner, network.edge_nodes[half, 0]).all(axis=1)
+    along = _along(network, slice(None))
     return frozenset(network.scene.placed[i].name for i in np.flatnonzero(along).tolist())
+
+
+def _along(network: Network, bricks: slice) -> Bools:
+    """Return which of some bricks lie along the structure."""
+    half = network.edge_kind == PartKind.JOINT.value
+    return np.asarray(np.isin(network.inner[bricks], network.edge_nodes[half, 0]).all(axis=1))
 
 
 def _begins_elsewhere(network: Network) -> frozenset[int]:
@@ -220,13 +226,14 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     case takes the brick's own placing node where it is within reach.
     """
     scene = network.scene
-    free = within_reach(scene, robot)[scene.since[brick.name] - 1]
+    at = scene.since[brick.name] - 1
+    free = within_reach(scene, robot)[at]
     if not free:
         raise StepError(
             f"brick {brick.name}: {robot.name} reaches none of its free nodes {list(brick.nodes)}; "
             "extend a reach, or let another robot place it"
         )
-    if isinstance(robot.reach, Side) and brick.name not in lies_along(network):
+    if isinstance(robot.reach, Side) and not _along(network, slice(at, at + 1)).all():
         toward = np.array(robot.reach.toward)
         return max(free, key=lambda node: float(toward @ np.array(brick.node_position(node))))
     return brick.placing_node if brick.placing_node in free else free[0]

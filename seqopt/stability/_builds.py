@@ -17,6 +17,7 @@ from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.steps import Grips, Step
+from seqopt.stability._ahead import quick_verdicts
 from seqopt.stability._screens import OPEN, STANDS, Screen
 from seqopt.stability._step_verdicts import each_verdict
 from seqopt.stability.assessment import Verdict
@@ -155,8 +156,8 @@ def _one_by_one(
 ) -> _Found:
     """Yield the verdicts of partial structures, by what was found for those before."""
     told = steps if tell is None else tell()
-    for step, found in zip(told, each_verdict(network, steps, mortar), strict=True):
-        yield _state(step), found.verdict
+    for step, found in zip(told, quick_verdicts(network, steps, mortar), strict=True):
+        yield _state(step), found
 
 
 def _screened(network: Network, _: Sequence[Step], mortar: Mortar, tell: _Told) -> _Found:

@@ -56,7 +56,15 @@ def judged(assembly: Assembly, case: Case, answer: Answer) -> Proven | None:
     return Proven(proven, proven, np.nan, answer) if proven > _CLEAR else None
 
 
-def _labeled(proven: Proven | None, way: Way) -> tuple[Proven | None, Way]:
+_Tried = tuple[Proven | None, Way]
+
+
+def _first(tries: Iterator[_Tried]) -> tuple[Proven, Way] | None:
+    """Return the first try that proves something."""
+    return next(((proven, way) for proven, way in tries if proven is not None), None)
+
+
+def _labeled(proven: Proven | None, way: Way) -> _Tried:
     """Return what is proven and how: in a way if by forces."""
     return proven, Way.MOTION if proven is not None and proven.bound > 0 else way
 
@@ -73,31 +81,46 @@ class VerdictChain:
         self._corner_force: Floats | None = None
         self._grip_force: dict[int, Floats] = {}
         self._motion: Floats | None = None
+        self._stood = False  # the last one, by forces
         self._kept: list[tuple[Floats, dict[int, Floats]]] = []  # of as many corners
 
-    def __call__(self, bricks: int, grips: Grips) -> tuple[Assembly, Proven, Way]:
-        """Return a partial structure, its case proven, and how."""
+    def __call__(
+        self, bricks: int, grips: Grips, before: Callable[[], object] | None = None
+    ) -> tuple[Assembly, Proven, Way]:
+        """Return a partial structure, its case proven, and how.
+
+        ``before``: called where nothing that was found proves it; it may find more.
+        """
         assembly, held = self._parts(bricks, grips), [n for n in grips if n is not None]
         held += [-1 - i for i in range(len(assembly.payload) - len(held))]  # props
         case = self._ask(assembly)
-        tries = self._tries(assembly, case, held)
         with one_thread():
-            known = next(((proven, way) for proven, way in tries if proven is not None), None)
+            known = _first(self._claimed(assembly, case, held))
+            if known is None and before is not None:
+                before()
+                known = _first(self._claimed(assembly, case, held))
+            known = known or _first(self._sought(assembly, case, held))
         proven, way = known or (Prover(assembly, self._compile)(case), Way.CONES)
         self._learn(assembly, proven, held)
         return assembly, proven, way
 
-    def _tries(
-        self, assembly: Assembly, case: Case, held: Sequence[int]
-    ) -> Iterator[tuple[Proven | None, Way]]:
-        """Yield what claims prove, those that are made for the least first."""
+    def _claimed(self, assembly: Assembly, case: Case, held: Sequence[int]) -> Iterator[_Tried]:
+        """Yield what forces and motions that were found before prove, those found last first."""
         none = np.zeros((len(assembly.corner), 3)), np.zeros((len(held), 3))
-        for motion in _extended(assembly, self._motion):
-            claim = Answer(Claim.SOLVED, 1.0, *none, motion)
-            yield judged(assembly, case, claim), Way.EARLIER_MOTION
-        force, level = np.concatenate(none), np.ones((len(none[0]) + len(held), 3))
-        for claim in self._kept_forces(assembly, held):
-            yield judged(assembly, case, claim), Way.EARLIER_FORCES
+        motions = _extended(assembly, self._motion)
+        falls = (Answer(Claim.SOLVED, 1.0, *none, motion) for motion in motions)
+        ways = [
+            (falls, Way.EARLIER_MOTION),
+            (self._kept_forces(assembly, held), Way.EARLIER_FORCES),
+        ]
+        for claims, way in reversed(ways) if self._stood else ways:
+            for claim in claims:
+                yield judged(assembly, case, claim), way
+
+    def _sought(self, assembly: Assembly, case: Case, held: Sequence[int]) -> Iterator[_Tried]:
+        """Yield what is proven by what is sought for it, what takes least first."""
+        forces = len(assembly.corner) + len(held)
+        force, level = np.zeros((forces, 3)), np.ones((forces, 3))
         if case.tension[0] > 0 or case.cohesion[0] > 0:
             for answer in islice(approach(assembly, case, force, level), 1):
                 yield _labeled(judged(assembly, case, answer), Way.FORCES)
@@ -135,7 +158,8 @@ class VerdictChain:
     def _learn(self, assembly: Assembly, proven: Proven, held: Sequence[int]) -> None:
         force, length = assembly.scales
         answer = proven.answer
-        if proven.held <= EXACT:
+        self._stood = proven.held <= EXACT
+        if self._stood:
             self._corner_force = force * answer.contact_force
             self._grip_force = dict(zip(held, force * answer.grip_force, strict=True))
             same = [each for each in self._kept if len(each[0]) == len(self._corner_force)]

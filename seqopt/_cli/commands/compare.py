@@ -43,6 +43,7 @@ from seqopt._cli.outputs import (
 from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import _parse_grip_range, asked_criterion, parse_robots, speed_seconds
+from seqopt._showing import PAGE
 from seqopt.arms.reach import find_postures
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
@@ -50,7 +51,7 @@ from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import FormulationKind, formulations
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.requirements import Criterion
-from seqopt.report._pages import PAGE, comparison_page
+from seqopt.report._pages import comparison_page
 from seqopt.report.comparison import CLOSED, Comparison, compare
 from seqopt.report.softness import _softness_lines, held_softly, turning_points
 from seqopt.report.text import format_details

@@ -33,6 +33,7 @@ from seqopt._cli.posing import asked_problem
 from seqopt._cli.screens import question
 from seqopt._cli.values import parse_numbers
 from seqopt._files import csv_text, write_folder
+from seqopt._showing import PAGE
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError, did_you_mean
@@ -41,7 +42,7 @@ from seqopt.plan.build import GivenSequence
 from seqopt.plan.front import Front, find_front, pick
 from seqopt.plan.solving import states_of
 from seqopt.problem.problem import Problem, judged_by
-from seqopt.report._pages import PAGE, front_page
+from seqopt.report._pages import front_page
 from seqopt.report.comparison import fixed_methods, shown_table, worst_of
 from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import LinearRange, analyze, builds_in_words

@@ -12,9 +12,9 @@ from seqopt._cli.options import BUILT, WRITTEN, declare, engine_options, form_op
 from seqopt._cli.outputs import figure_notes, keep_apart
 from seqopt._cli.screens import question
 from seqopt._files import require_folder, write_folder, write_text
-from seqopt._showing import display
+from seqopt._showing import PAGE, display
 from seqopt.network.build import build_network
-from seqopt.report._pages import PAGE, folder_builds, folder_page
+from seqopt.report._pages import folder_builds, folder_page
 from seqopt.stability._builds import BuildProver
 
 DESCRIPTION = (

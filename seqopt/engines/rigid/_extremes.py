@@ -144,11 +144,17 @@ def extremes_in(fields: Fields, want: Want) -> Extremes:
     if want & Want.EDGES:
         found[:2] = fields.edge_force.min(axis=1), fields.edge_force.max(axis=1)
     if want & Want.DISPLACEMENTS:
-        found[2] = np.linalg.norm(fields.displacement, axis=2).max(axis=1)
+        found[2] = _squared(fields.displacement).max(axis=1)
     if want & Want.SUPPORT:
-        found[3] = np.linalg.norm(fields.support[..., 3:], axis=2).max(axis=1)
-    size = np.linalg.norm(fields.grip_force, axis=2)
+        found[3] = _squared(fields.support[..., 3:]).max(axis=1)
+    np.sqrt(found[2:], out=found[2:])
+    size = np.sqrt(_squared(fields.grip_force))
     return Extremes(found[0], found[1], found[2], found[3], size)
+
+
+def _squared(vectors: Floats) -> Floats:
+    """Return the squares of lengths (S, n) of vectors (S, n, 3), of which NumPy takes thrice."""
+    return np.asarray(np.einsum("snk,snk->sn", vectors, vectors))
 
 
 @cache

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import lapack
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._hands import Hands
@@ -18,6 +19,8 @@ from seqopt.engines.rigid._pairs import (
     _soften,
     pairs_of,
 )
+
+_FEW = 12  # systems up to which one call of LAPACK for each takes less than one for all
 
 
 def _solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tuple[Floats, Floats]:
@@ -34,6 +37,10 @@ def _solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tu
     equations nearly repeat those before them.
     """
     size = system.shape[1]
+    if size and system.shape[2] <= _FEW and not negative:
+        found = _solve_few(system)
+        if found is not None:
+            return found
     every = np.arange(size)
     diagonal = np.abs(system[every, every])  # a negative pivot stays negative beside it
     diagonal[size - negative :] = -scale
@@ -50,6 +57,20 @@ def _solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tu
             answer[:j] -= system[j, :j] * answer[j]
         pivots /= diagonal
     return answer, pivots
+
+
+def _solve_few(system: Floats) -> tuple[Floats, Floats] | None:
+    """Return the same of a few systems by LAPACK, one by one; None if one is not definite."""
+    size = system.shape[1]
+    answer, pivot = np.empty(system.shape[1:]), np.empty(system.shape[1:])
+    for s in range(system.shape[2]):
+        matrix = system[:size, :, s]
+        factor, unknown, failed = lapack.dposv(matrix, system[size, :, s], lower=1)
+        if failed:
+            return None
+        answer[:, s] = unknown
+        pivot[:, s] = factor.diagonal() ** 2 / matrix.diagonal()
+    return answer, pivot
 
 
 class _GripForces(NamedTuple):

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints, frozen
 from seqopt.engines._hands import Hands
+from seqopt.engines.interface import _couples
 from seqopt.engines.rigid._operator import ComplianceOperator
 
 
@@ -49,16 +49,19 @@ def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
     """Return all pairs of grips of the sets that share a brick."""
     first, second = _couples(columns.shape[1])
     bricks = columns.T // 2
-    couple, sets = np.divmod(np.flatnonzero(bricks[first] == bricks[second]), len(columns))
+    same = np.flatnonzero(bricks[first] == bricks[second])
+    if not len(same):
+        return _none(operator.axis.shape[1])
+    couple, sets = np.divmod(same, len(columns))
     first, second = first[couple], second[couple]
     brick = bricks[first, sets]
     return Pairs(sets, first, second, brick, operator.axis[brick])
 
 
 @cache
-def _couples(grips: int) -> Ints:
-    """Return all couples (2, c) of a number of grips."""
-    return frozen(np.array([*combinations(range(grips), 2)], dtype=np.int64).reshape(-1, 2).T)
+def _none(directions: int) -> Pairs:
+    none = frozen(np.empty(0, dtype=np.int64))
+    return Pairs(none, none, none, none, frozen(np.empty((0, directions))))
 
 
 def _count_grips(operator: ComplianceOperator, count: int) -> int:

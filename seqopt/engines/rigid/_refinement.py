@@ -33,6 +33,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._hands import Hands, _lever_of
 from seqopt.engines.interface import SPACE, Basis, Fields, join_sets, merge_sets, no_sets
 from seqopt.engines.rigid._grip_equations import grip_forces, still_forces
+from seqopt.engines.rigid._hanging import Hanging, HangingSystem
 from seqopt.engines.rigid._mechanism import Shared, Ungripped, require_resistance, ungripped_system
 from seqopt.engines.rigid._mixed import (
     LAST_CORRECTION,
@@ -146,7 +147,7 @@ _TIED = 0.1  # most that what resists loose motions may be of the springs that t
 
 
 def _held_operator(
-    system: _HeldSystem, inner: sparse.csr_array | None = None
+    system: _HeldSystem | HangingSystem, inner: sparse.csr_array | None = None
 ) -> ComplianceOperator:
     """Return the operator of a partial structure whose loose motions are unknowns of grip sets.
 
@@ -225,17 +226,31 @@ _HARDLY_HELD = 1e-9  # a pivot of loose motions below which they are looked into
 class Refinement:
     """Answers grip sets of one partial structure to rounding, whatever is loose in it.
 
-    ``tied``: whether springs are known to tie every brick to the ground.
+    ``tied``: whether springs are known to tie every brick to the ground; ``hanging``: of the
+    network.
     """
 
     def __init__(
-        self, network: Network, bricks: int, shared: Shared | None = None, *, tied: bool = False
+        self,
+        network: Network,
+        bricks: int,
+        shared: Shared | None = None,
+        *,
+        tied: bool = False,
+        hanging: Hanging | None = None,
     ) -> None:
-        self.network, self.bricks = network, bricks
+        self.network, self.bricks, self._hanging = network, bricks, hanging
         self.parts = ungripped_system(network, bricks, shared)
-        self.held, self.inner = _hold_loose(self.parts, tied=tied), _loaded(self.parts)
+        self.held = self._system(tied=tied)
+        self.inner = _loaded(self.parts)
         weighed = sparse.csr_array(self.parts.load[None])
         self.pulls = sparse.vstack([self.inner / self.parts.unit, weighed], format="csr")
+
+    def _system(self, *, tied: bool) -> _HeldSystem | HangingSystem:
+        hanging, firm = self._hanging, tied and bool((self.parts.stiffness >= _SOFT).all())
+        if hanging is not None and firm and self.bricks <= hanging.bricks:
+            return HangingSystem(self.parts, hanging)
+        return _hold_loose(self.parts, tied=tied)
 
     @cached_property
     def own(self) -> ComplianceOperator:

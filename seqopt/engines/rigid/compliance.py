@@ -44,6 +44,7 @@ from seqopt.engines.rigid._extremes import (
 )
 from seqopt.engines.rigid._grip_equations import _GripForces, grip_forces, share_pairs, trusted
 from seqopt.engines.rigid._growth import grow_tree
+from seqopt.engines.rigid._hanging import Hanging
 from seqopt.engines.rigid._mechanism import Shared, share
 from seqopt.engines.rigid._mixed import LAST_CORRECTION
 from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder
@@ -116,7 +117,8 @@ def _try_forces(
         force[part] = found.force
         good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN, own)
     force[~good] = 0.0
-    pairs = pairs.only(pairs.rigid(hands, *columns.shape))
+    if len(pairs.sets):
+        pairs = pairs.only(pairs.rigid(hands, *columns.shape))
     if not even:
         good &= ~_cancels(operator, index, force)
     lever = 1.0 if hands is None else hands.lever
@@ -182,6 +184,8 @@ class ComplianceEngine(NamedEngine):
         self._basis, self._accuracy = basis, accuracy
         self._tree, self._even = grow_tree(self.network), _count_even(self.network)
         self._kept: dict[int, ComplianceOperator] = {}  # the one that was asked last comes last
+        self._bytes: dict[int, int] = {}  # of them, when they were counted last
+        self._asked: set[int] = set()  # brick counts since then
         self._refinement: Refinement | None = None  # of the brick count that was asked last
 
     @failing_in_a_line()
@@ -252,6 +256,7 @@ class ComplianceEngine(NamedEngine):
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
         known = self._kept.pop(bricks, None)
+        self._bytes.pop(bricks, None)
         if known is None or not known.covers(columns // 2):
             held = np.union1d(columns // 2, np.arange(0) if known is None else known.held)
             if 2 * len(held) >= bricks:
@@ -260,18 +265,27 @@ class ComplianceEngine(NamedEngine):
             with one_thread():
                 known = self._builder.operator(bricks, held)
         self._kept[bricks] = known
+        self._asked.add(bricks)
         return known
 
     def _make_room(self) -> None:
         """Drop operators that were not asked for longest, until the rest takes little memory."""
-        total = sum(operator.nbytes for operator in self._kept.values())
-        while total > _KEPT:
-            total -= self._kept.pop(next(iter(self._kept))).nbytes
+        for bricks in self._asked & self._kept.keys():  # what is not asked does not grow
+            self._bytes[bricks] = self._kept[bricks].nbytes
+        self._asked.clear()
+        while sum(self._bytes.values()) > _KEPT:
+            first = next(iter(self._kept))
+            del self._kept[first], self._bytes[first]
 
     @cached_property
     def _shared(self) -> Shared:
         """What the systems that correct answers are cut from, whatever the brick count."""
         return share(self._network)
+
+    @cached_property
+    def _hanging(self) -> Hanging:
+        """The bricks with which no loop is closed yet."""
+        return Hanging(self._network)
 
     @cached_property
     def _builder(self) -> OperatorBuilder:
@@ -285,7 +299,9 @@ class ComplianceEngine(NamedEngine):
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
                 tied = operator is not None  # the tree that it grew on reaches them all
-                self._refinement = Refinement(self._network, bricks, self._shared, tied=tied)
+                self._refinement = Refinement(
+                    self._network, bricks, self._shared, tied=tied, hanging=self._hanging
+                )
             answer = self._refinement.solve(columns, operator, largest, self._basis, hands)
         return keep_wanted(answer, want)
 
