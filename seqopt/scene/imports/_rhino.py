@@ -34,8 +34,12 @@ def read_3dm(content: bytes, source: str) -> Content:
         raise SceneError(f"{source}: no 3dm file that can be read")
     unit = str(file.Settings.ModelUnitSystem).rsplit(".", 1)[-1]
     left = Counter[str]()
-    found = object_content(_objects(file, source, left), source)
-    said = (f"{count} objects are left out: {what}" for what, count in left.items())
+    solids = [*_objects(file, source, left)]
+    said = [f"{count} objects are left out: {what}" for what, count in left.items()]
+    if not solids:
+        why = "; ".join(said) or "it is empty"
+        raise SceneError(f"{source}: no closed mesh or solid is visible; {why}")
+    found = object_content(solids, source)
     return replace(
         found,
         unit=None if unit in ("None", "Unset") else known_unit(unit, source),

@@ -228,7 +228,11 @@ def test_round_rhino_solids_need_the_mesh_of_the_file(tmp_path):
             lambda *_: rhino.Brep.CreateTrimmedPlane(rhino.Plane.WorldXY(), profile()),
             "'foot' is an open surface; close it",
         ),
-        ("Meters", lambda *_: rhino.Point(rhino.Point3d(0, 0, 0)), "it has no faces"),
+        (
+            "Meters",
+            lambda *_: rhino.Point(rhino.Point3d(0, 0, 0)),
+            "solid is visible; 1 objects are left out: curves, points",
+        ),
     ],
 )
 def test_what_a_rhino_file_lacks_is_one_line(tmp_path, unit, shape, said):
