@@ -22,7 +22,7 @@ from seqopt.scene.imports._mesh_files import known_unit, require_readers
 from seqopt.scene.imports._meshes import object_content
 
 _DEEPEST = 20  # blocks of Rhino within each other
-_SAME = 1e-6  # by how much an edge may bend, over the size of the object
+_SAME = 1e-4  # by how much faces and edges may bend, over the size; Rhino joins what is off by less
 _Solid = tuple[Floats, list[Sequence[int]]]
 
 
