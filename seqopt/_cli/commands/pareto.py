@@ -135,7 +135,7 @@ def run(options: argparse.Namespace) -> Answer:
         row = ", ".join(f"{name} {value_text(str(name), v)}" for name, v in values.items())
         said += f"; picked row {chosen + 1}: {row}"
     write_outputs(options, lambda: files | {"scene.json": dump_scene(scene)})
-    if picked is not None and options.out is not None:
+    if picked is not None:
         own = front.engines[chosen]
         title = f"plan with the least {options.pick}"
         plan = _Picked(own, front.steps[chosen], title, result=f"one of {len(front.steps)} plans")
