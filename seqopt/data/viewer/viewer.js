@@ -506,7 +506,6 @@
   const marking = [];
   // what is said of the build that is chosen
   function about() {
-    if (structure.marks) return;  // of a scene without a plan nothing is said
     const [build] = shown(), whole = byId("sentence").textContent;
     byId("about").textContent = whole.startsWith(build.sentence) ? "" : build.sentence[0].toUpperCase() + build.sentence.slice(1);
     byId("use").replaceChildren(charts.use(build));
@@ -557,8 +556,7 @@
   for (const id of ["first", "second"]) byId(id).addEventListener("change", () => { drawCharts(); refresh(); });
   for (const id of ["magnify", "forces", "robots", "fall"]) byId(id).addEventListener("input", refresh);
   byId("tables").classList.toggle("long", document.querySelectorAll("#tables figure:first-child tr").length > 9);
-  byId("numbers").value = structure.marks || structure.bricks.length > SHORT ? "" : "names";
-  byId("numbers").parentElement.hidden = byId("print").hidden = Boolean(structure.marks);
+  byId("numbers").value = structure.bricks.length > SHORT ? "" : "names";
   byId("numbers").addEventListener("input", () => panes.forEach((pane) => pane.draw()));
   slider.addEventListener("input", () => { moved = true; refresh(); });
   const step = (by) => { moved = true; go(Number(slider.value) + by); };
@@ -611,7 +609,7 @@
   drawCharts();
   slider.max = Math.max(...shown().map((build) => build.steps.length)) - 1;
   moved = asked.has("step");
-  go(moved ? Number(asked.get("step")) - 1 : structure.marks ? Number(slider.max) : shown()[0].decides);
+  go(moved ? Number(asked.get("step")) - 1 : shown()[0].decides);
   pictured();
   document.body.dataset.ready = "true";
 })();
