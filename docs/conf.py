@@ -41,6 +41,7 @@ nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
 nb_merge_streams = True
+nb_output_stderr = "remove"  # how far a command is
 
 nitpicky = True
 nitpick_ignore_regex = [("py:class", r"(numpy|collections)\..*")]  # they have pages elsewhere

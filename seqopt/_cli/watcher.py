@@ -33,7 +33,8 @@ class Watcher:
     """
 
     def __init__(self, *, shows: bool = True) -> None:
-        self._shows = shows and (is_terminal(sys.stderr) or hasattr(sys.stderr, "pub_thread"))
+        self._notebook = hasattr(sys.stderr, "pub_thread")  # every refresh is kept in its file
+        self._shows = shows and (is_terminal(sys.stderr) or self._notebook)
         self._start = self._told = time.perf_counter()
         self._began: dict[str, tuple[float, float]] = {}  # of each stage, and its last share
         self._stage = Stage("working", -1.0)  # no share is below zero
@@ -68,7 +69,8 @@ class Watcher:
             if new.share >= 0:
                 self._began[new.what] = began, new.share
             self._stage, self._told = new, time.perf_counter()
-            self._show()
+            if not self._notebook:
+                self._show()
 
     def _tick(self) -> None:
         """Look at the clock now and then: a stage may be silent for long."""

@@ -6,6 +6,7 @@ import io
 import os
 import re
 import sys
+import threading
 
 import pytest
 
@@ -182,3 +183,31 @@ def test_what_is_compared_fits_eighty_columns(capsys, monkeypatch):
     assert wide == []
     assert "406.1 (406.0)!" in out  # the paper's figure beside, and a payload exceeded
     assert "114.6 (114.4)" in out
+
+
+class Cell(io.StringIO):
+    """Standard error as a notebook has it, and a mark of when something was shown."""
+
+    pub_thread = None
+
+    def __init__(self):
+        super().__init__()
+        self.shown = threading.Event()
+
+    def write(self, text):
+        if "responses" in text:
+            self.shown.set()
+        return super().write(text)
+
+
+def test_a_notebook_is_told_now_and_then(monkeypatch):
+    monkeypatch.setattr(watcher, "PATIENCE", 0.0)
+    monkeypatch.setattr(watcher, "TICK", 0.05)
+    stream = Cell()
+    monkeypatch.setattr(sys, "stderr", stream)
+    with Watcher() as tell:
+        for share in range(2000):
+            tell(Stage("responses", share / 2000, 12.0))
+        assert stream.shown.wait(60)
+    assert stream.getvalue().count("responses:") < 1000  # not for each of what it was told
+    assert left_on(stream.getvalue()) == ""
