@@ -9,7 +9,9 @@ force there means; to 1e-12 where these do not nearly cancel, as on long chains 
 Method: random sets of three grips on `arch25` with 17 and with 25 bricks, a chain of 99 and the
 vault with 100 and with 337. NumPy and compiled loops take turns in one process on one core, whole
 calls of the engine with all checks, as seconds of the processor; the least of rounds. Beside them
-the fields with the same extremes taken from them, batches of a hundred sets, and single calls. The
+the fields with the same extremes taken from them, batches of a hundred sets, and single calls; and,
+where a C++ compiler is there, the loop that one would write in that language, without all checks
+(`experiments.engines.parts.plain_loop`): ``times_cpp`` is what a whole call takes beside it. The
 least arithmetic is what `experiments.peers.peers` says: operations at the rate of a dense product,
 and here nothing that is written.
 
@@ -24,6 +26,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
+from experiments.engines.parts.plain_loop import PlainLoop, compiled
 from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
 from experiments.harness.scenes import grip_sets
 from experiments.harness.timing import best
@@ -86,6 +89,8 @@ def row(name: str, bricks: int, count: int, rounds: int) -> dict[str, object]:
         "numpy": lambda: engine._extremes(bricks, sets, WANT),
         "compiled": lambda: ask(sets),
     }
+    if compiled() is not None:
+        many["cpp"] = PlainLoop(engine, bricks, sets)
     gap = difference(engine, bricks, sets)
     found = {f"{k}_us": 1e6 * v / len(sets) for k, v in taken(many, rounds).items()}
     few = {"hundred": lambda: ask(sets[:FEW]), "one": lambda: ask(sets[:1])}
@@ -102,6 +107,8 @@ def experiment(options: Options) -> Finding:
     cases = [("arch25", 17, 500)] if quick else CASES
     table = pd.DataFrame([row(*case, 2 if quick else 7) for case in cases])
     table["times_numpy"] = table["numpy_us"] / table["compiled_us"]
+    if "cpp_us" in table:
+        table["times_cpp"] = table["compiled_us"] / table["cpp_us"]
     print(table.to_string(index=False, float_format="%.3g"))
     return on_this_run(holds=holds(table), extremes=table)
 

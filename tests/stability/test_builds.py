@@ -18,8 +18,9 @@ from seqopt.report.comparison import compare
 from seqopt.report.page import Build, _build_data
 from seqopt.responses.table import analyze
 from seqopt.scene.scene_file import dump_scene
-from seqopt.stability import _builds
+from seqopt.stability import _ahead, _builds
 from seqopt.stability._builds import SHOWN, BuildProver, BuildVerdicts
+from seqopt.stability._verdict_chain import VerdictChain
 from seqopt.stability.assessment import Verdict, assess, verdict
 
 FLAT = "arch:span=2,rise=0.8,pattern=VLR"
@@ -96,6 +97,37 @@ def test_progress_is_told_as_verdicts_are_found(flat, builds, monkeypatch, most)
     prover.of_builds(builds)
     assert known[0] == 0
     assert len(set(known)) > 10  # not told all at once, before the first is found
+
+
+@pytest.mark.parametrize("held", [None, 0, 2])
+def test_what_is_tried_ahead_changes_no_verdict(flat, builds, found, monkeypatch, held):
+    calls, real = [], VerdictChain.__call__
+
+    def counted(self, *asked):
+        calls.append(asked)
+        return real(self, *asked)
+
+    monkeypatch.setattr(VerdictChain, "__call__", counted)
+    monkeypatch.setattr(_ahead, "_DEAR", 0)
+    if held is not None:  # of no use
+        nodes = flat.scene.placed[0].nodes[:held]
+        grips = (*(None for _ in flat.scene.robots), *nodes)
+        monkeypatch.setattr(_ahead, "_held", lambda *_: grips)
+    for name, steps in builds.items():
+        for said in found[name]:
+            mortar = SHOWN[said.mortar]
+            assert tuple(_ahead.quick_verdicts(flat, steps, mortar)) == said.verdicts
+    assert len(calls) > 2 * sum(map(len, builds.values()))  # some were tried ahead
+
+
+def test_patience_grows_with_what_is_of_no_use():
+    patience, waited = _ahead._Patience(), []
+    for _ in range(4):
+        waited.append(next(n for n in range(99) if patience.ready()))
+        patience.learn(useful=False)
+    assert waited == [0, 1, 2, 4]
+    patience.learn(useful=True)
+    assert patience.ready()
 
 
 def test_equal_structures_are_asked_once(flat, builds, found, monkeypatch):

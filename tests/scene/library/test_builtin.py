@@ -16,9 +16,11 @@ from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.scene.boxes import _separations, boxes
 from seqopt.scene.scene_file import (
+    _DATA,
     ABOUT,
     _find_warnings,
     _parse_scene,
+    _stored,
     builtin_scenes,
     dump_scene,
     load_scene,
@@ -58,6 +60,13 @@ def test_every_built_in_scene_is_named_drawn_from_text_and_not_odd(name):
     assert "\n" not in ABOUT[name]
     assert _parse_scene(dump_scene(scene)) == scene
     assert load_scene(name) == scene
+
+
+@pytest.mark.parametrize("name", _stored())
+def test_scenes_that_ship_as_files_obey_the_schema(name):
+    """So that loading them need not ask."""
+    text = _DATA.joinpath("scenes", f"{name}.json").read_text("utf-8")
+    assert _parse_scene(text) == load_scene(name)
 
 
 @pytest.mark.parametrize("name", builtin_scenes())

@@ -1,0 +1,19 @@
+"""The loop in C++ answers what the engine does, so that their times may be compared."""
+
+from __future__ import annotations
+
+import pytest
+
+from experiments.engines.parts.plain_loop import PlainLoop, compiled
+from experiments.harness.scenes import grip_sets
+
+pytestmark = pytest.mark.skipif(compiled() is None, reason="there is no C++ compiler")
+
+
+def test_it_agrees_with_the_engine(engine25):
+    sets = grip_sets(engine25.network, 9, 40)
+    loop = PlainLoop(engine25, 9, sets)
+    loop()
+    assert loop.off(engine25, 9, sets).max() <= 1e-9
+    loop.out[:, 1] *= 1.001
+    assert loop.off(engine25, 9, sets)[1] > 1e-4
