@@ -10,9 +10,11 @@ from itertools import cycle
 import numpy as np
 import pandas as pd
 
+from seqopt.arms._listing import reach_table
 from seqopt.engines.registry import USUAL, make_engine
+from seqopt.errors import ExtraError, SceneError
 from seqopt.network.build import build_network
-from seqopt.report._robots import ROBOT_COLORS, Cell
+from seqopt.report._robots import ROBOT_COLORS, Cell, _known_arms
 from seqopt.report.page import Build, _build_data, _filled, _part, _rounded, _structure_data
 from seqopt.responses.table import force_column
 from seqopt.scene.parts import Side, Sphere
@@ -31,7 +33,8 @@ def scene_page(scene: Scene) -> str:
     empty = {n: np.nan for r in scene.robots for n in (f"{r.name}_node", force_column(r))}
     counts = [step.number for step in steps]
     table = pd.DataFrame({"step": counts, "type": "place", "bricks": counts} | empty)
-    build = Build(ORDER, steps, table, order=scene.build_order)
+    arms = _known_arms(scene, steps)
+    build = Build(ORDER, steps, table, order=scene.build_order, arms=arms)
     whole = {"tasks": None, "sentence": "", "decides": len(steps) - 1}  # it opens with all bricks
     data = {
         "structure": _structure_data(network) | {"marks": _marks(scene)},
@@ -51,14 +54,27 @@ def scene_page(scene: Scene) -> str:
 
 
 def _reaching(scene: Scene) -> dict[int, list[int]]:
-    """Return which robots reach every node that is not blocked."""
+    """Return which robots reach every node that is not blocked, with arms if they have any."""
     every = (node for brick in scene.placed for node in brick.nodes)
     found: dict[int, list[int]] = {node: [] for node in every if node not in scene.blocked_nodes}
+    by_arm = _by_arms(scene)
     for k, robot in enumerate(scene.robots):
-        for nodes in scene.within_reach(robot):
-            for node in nodes:
+        for node in (node for nodes in scene.within_reach(robot) for node in nodes):
+            if robot.arm is None or node in by_arm.get(robot.name, ()):
                 found[node].append(k)
     return found
+
+
+def _by_arms(scene: Scene) -> dict[str, set[int]]:
+    """Return the nodes that arms reach, by robot; nothing where it cannot be computed here."""
+    if not scene.has_arms:
+        return {}
+    try:
+        table = reach_table(scene)
+    except (ExtraError, SceneError):
+        return {}
+    able = table[table["to_bricks"] > 0]
+    return {str(name): {*map(int, rows["node"])} for name, rows in able.groupby("robot")}
 
 
 def _marks(scene: Scene) -> dict[str, object]:
@@ -99,16 +115,18 @@ def _reaches(scene: Scene) -> Iterator[tuple[int, dict[str, object]]]:
 
 def _robots(scene: Scene) -> pd.DataFrame:
     """Return a row for every robot: what it may carry, and what it reaches."""
-    free = len(_reaching(scene))
+    able = _reaching(scene)
     rows = []
-    for robot in scene.robots:
+    for k, robot in enumerate(scene.robots):
         reach = robot.reach
         said = "everywhere"
         if isinstance(reach, Sphere):
             said = "{:g} m around ({:g}, {:g}, {:g})".format(reach.radius, *reach.center)
         elif isinstance(reach, Side):
             said = "the side toward ({:g}, {:g}, {:g})".format(*reach.toward)
-        reached = sum(len(nodes) for nodes in scene.within_reach(robot))
+        if robot.arm is not None:
+            said = "that of its arm"
+        reached = sum(k in who for who in able.values())
         arm = "" if robot.arm is None else "({:g}, {:g}, {:g})".format(*robot.arm.position)
         rows.append(
             {
@@ -116,7 +134,7 @@ def _robots(scene: Scene) -> pd.DataFrame:
                 "payload, N": f"{robot.payload:g}",
                 "reach": said,
                 "base of its arm, m": arm,
-                "nodes it reaches": f"{reached} of {free}",
+                "nodes it reaches": f"{reached} of {len(able)}",
             }
         )
     table = pd.DataFrame(rows)

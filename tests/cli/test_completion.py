@@ -62,7 +62,7 @@ def offered(shell, script, line, folder):
         ("seqopt compare --criteria clos", {"closest-to-plan"}),
         ("seqopt compare --engine fra", {"frame"}),
         ("seqopt optimize --limit pay", {"payload"}),
-        ("seqopt scene vau", {"vault338"}),
+        ("seqopt scene vau", {"vault338", "vault:"}),
         ("seqopt compare --engine qqq", set()),
     ],
 )
