@@ -48,7 +48,7 @@ from seqopt.engines.rigid._mixed import (
 )
 from seqopt.engines.rigid._operator import ComplianceOperator, _load_rows
 from seqopt.engines.rigid._pairs import _by_grip
-from seqopt.engines.rigid._response_maps import ResponseMaps, inner_edges, loads_of, scene_maps
+from seqopt.engines.rigid._response_maps import ResponseMaps, inner_edges, scene_maps
 from seqopt.errors import SolverError
 from seqopt.network._mechanics import point_motion
 from seqopt.network.network import GROUND, Network
@@ -243,8 +243,6 @@ class Refinement:
         self.parts = ungripped_system(network, bricks, shared)
         self.held = self._system(tied=tied)
         self.inner = _loaded(self.parts)
-        weighed = sparse.csr_array(self.parts.load[None])
-        self.pulls = sparse.vstack([self.inner / self.parts.unit, weighed], format="csr")
 
     def _system(self, *, tied: bool) -> _HeldSystem | HangingSystem:
         hanging, firm = self._hanging, tied and bool((self.parts.stiffness >= _SOFT).all())
@@ -327,7 +325,7 @@ class _Corrector:
         basis: Basis = SPACE,
     ) -> None:
         self.network, self.bricks, self.parts = system.network, system.bricks, system.parts
-        self.held, self.inner, self.pulls = system.held, system.inner, system.pulls
+        self.held, self.inner = system.held, system.inner
         self.operator, self.largest, self.basis = operator, largest, basis
 
     def together(self, columns: Ints, hands: Hands | None = None) -> Fields:
@@ -397,7 +395,9 @@ class _Corrector:
         operator, parts, columns = self.operator, self.parts, asked.columns
         joints, grips = len(parts.wrench_unit), columns.shape[1]
         at = _load_rows(columns, 3, 3 if operator.moments else 0)
-        pulled = loads_of(at, force, self.pulls.shape[0]).matrix @ self.pulls
+        load = np.zeros((len(at), self.inner.shape[0]))
+        np.add.at(load, (np.arange(len(at))[:, None], at), force)  # a brick may be turned twice
+        pulled = (self.inner.T @ load.T).T / parts.unit + parts.load
         missing = -(parts.matrix @ states.T).T
         missing[:, joints:] += pulled
         missing[:, :joints] += parts.moved
