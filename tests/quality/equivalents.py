@@ -127,9 +127,8 @@ EQUIVALENT = (
     Equivalent(
         GRIPS, "softness", "else 1.0", "else 2.0", "without loose motions nothing is scaled"
     ),
-    *(
-        Equivalent("seqopt.engines.rigid.*", "reshape(", f"{before}-1", f"{before}-2", why)
-        for before, why in (("(", "a negative length is what is left"), (",", "the same"))
+    Equivalent(
+        "seqopt.engines.rigid.*", "reshape(", ",-1", ",-2", "a negative length is what is left"
     ),
     Equivalent(
         CERTIFICATE, "@dataclass", "repr=False", "repr=True", "without arrays both look alike"
