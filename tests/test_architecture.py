@@ -34,6 +34,7 @@ ROOMS = (
     {"study"},
     {"workflow"},
     {"report"},
+    {"_paper"},
     {"_cli"},
     {"__init__", "__main__"},
 )  # a room imports from rooms above it in this list only

@@ -42,7 +42,7 @@ from experiments.placement import (
 from experiments.stability import classical, dry_map, witnesses
 from experiments.study import criteria_variants, paper_counterparts
 from experiments.times import makespan
-from seqopt.report._paper.items import ITEMS
+from seqopt._paper.items import ITEMS
 from seqopt.study.published import printed
 
 STUDY = printed("de_validation").set_index("bricks")["error_percent"]

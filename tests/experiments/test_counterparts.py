@@ -10,9 +10,9 @@ import pytest
 
 from experiments.study.paper_counterparts import KNOWN, faults
 from experiments.study.parts.counterpart_page import page
-from seqopt.report._paper.agreement import AGREES, DISAGREES, PARTLY, TITLES, verdict
-from seqopt.report._paper.items import ITEMS
-from seqopt.report._paper.rows import COUNTERPARTS, cell, ours, tabulate
+from seqopt._paper.agreement import AGREES, DISAGREES, PARTLY, TITLES, verdict
+from seqopt._paper.items import ITEMS
+from seqopt._paper.rows import COUNTERPARTS, cell, ours, tabulate
 from tests.builders import ROOT
 
 STORED = pd.read_csv(ROOT / "experiments" / "results" / "paper_counterparts.csv")

@@ -7,8 +7,8 @@ import textwrap
 
 import pandas as pd
 
-from seqopt.report._paper.agreement import AGREES, DISAGREES, PARTLY, TITLES, stated, verdict
-from seqopt.report._paper.items import ITEMS, Item
+from seqopt._paper.agreement import AGREES, DISAGREES, PARTLY, TITLES, stated, verdict
+from seqopt._paper.items import ITEMS, Item
 
 INTRODUCTION = """\
 ## Every figure and table

@@ -9,13 +9,7 @@ from seqopt._cli.options import WRITTEN, declare, form_options
 from seqopt._cli.outputs import figure_notes, require_out, write_outputs
 from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
-from seqopt.report._paper.files import (
-    PAGE,
-    agreement_lines,
-    agreement_table,
-    counterparts,
-    paper_files,
-)
+from seqopt._paper.files import PAGE, agreement_lines, agreement_table, counterparts, paper_files
 
 DESCRIPTION = (
     "Compute every figure and table of Bruun et al. (arXiv 2104.04856) that has numbers anew, and "

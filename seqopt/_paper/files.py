@@ -8,9 +8,9 @@ from importlib.util import find_spec
 import pandas as pd
 
 from seqopt._files import csv_text
-from seqopt.report._paper.agreement import TITLES, stated, verdict
-from seqopt.report._paper.items import ITEMS, Item
-from seqopt.report._paper.rows import Ours, ours, tabulate
+from seqopt._paper.agreement import TITLES, stated, verdict
+from seqopt._paper.items import ITEMS, Item
+from seqopt._paper.rows import Ours, ours, tabulate
 from seqopt.study.published import SOURCE
 from seqopt.work.progress import Tell, with_progress
 
@@ -69,7 +69,7 @@ def _pictures(own: Ours, table: pd.DataFrame, tell: Tell) -> Iterator[tuple[str,
     """Yield figures by file name; none where matplotlib, an extra, is not installed."""
     if find_spec("matplotlib") is None:
         return
-    from seqopt.report._paper.charts import drawn  # noqa: PLC0415
+    from seqopt._paper.charts import drawn  # noqa: PLC0415
     from seqopt.report._style import picture_files  # noqa: PLC0415
 
     for name in with_progress("drawing figures", [*TITLES], tell):

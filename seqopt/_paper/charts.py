@@ -11,11 +11,11 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
+from seqopt._paper import model_charts as models
+from seqopt._paper.agreement import NEAR, caption
+from seqopt._paper.model_charts import OFF, OURS, STUDY, number_of, of, pair
+from seqopt._paper.rows import LOOP, RESPONSES, Ours, plan_rows
 from seqopt.engines.interface import Want
-from seqopt.report._paper import model_charts as models
-from seqopt.report._paper.agreement import NEAR, caption
-from seqopt.report._paper.model_charts import OFF, OURS, STUDY, number_of, of, pair
-from seqopt.report._paper.rows import LOOP, RESPONSES, Ours, plan_rows
 from seqopt.report._robots import ROBOT_COLORS
 from seqopt.report._style import INK, SMALL, dress, new_figure, plain, styled
 from seqopt.report.draw import View, draw_bricks, draw_grips

@@ -7,8 +7,8 @@ import json
 import pandas as pd
 import pytest
 
-from seqopt.report._paper import files
-from seqopt.report._paper.files import NUMBERED, agreement_table, paper_files
+from seqopt._paper import files
+from seqopt._paper.files import NUMBERED, agreement_table, paper_files
 from tests.builders import ROOT
 from tests.commands import command
 

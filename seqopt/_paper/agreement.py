@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
-from seqopt.report._paper.items import ITEMS, STEPS, Item
+from seqopt._paper.items import ITEMS, STEPS, Item
 
 NEAR = 5.0  # percent beyond rounding, relative to the printed size or 1
 AGREES, PARTLY, DISAGREES = "agrees", "agrees in part", "disagrees"

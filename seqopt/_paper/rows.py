@@ -1,6 +1,6 @@
 """Printed and computed values, side by side, of every figure and table of the paper.
 
-Every function yields the rows of one item of `seqopt.report._paper.items`, named by its
+Every function yields the rows of one item of `seqopt._paper.items`, named by its
 label in `COUNTERPARTS`.
 """
 

@@ -9,8 +9,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from seqopt.report._paper import rows as counterpart_rows
-from seqopt.report._paper.rows import Ours, arch_corners, bed_of_springs
+from seqopt._paper import rows as counterpart_rows
+from seqopt._paper.rows import Ours, arch_corners, bed_of_springs
 from seqopt.report._style import BLUE, INK, VERMILION, dress, look, plain
 from seqopt.report.draw import View, draw_bricks
 from seqopt.study._barrel_vaults import Vault, chain, vaults
