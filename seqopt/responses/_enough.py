@@ -117,7 +117,8 @@ def _left_out(
         yield "what earlier steps lock in"
     if not isinstance(within.engine, DiscreteEngine):
         most = max(float(table[moved.column].max()) / moved.scale for table in tables) / within.far
-        yield f"change of shape (bricks move by up to {100 * most:.2g} % of its limit)"
+        share = np.format_float_positional(float(f"{100 * most:.2g}"), trim="-")
+        yield f"change of shape (bricks move by up to {share} % of its limit)"
     yield "motion in time"
 
 
