@@ -191,6 +191,8 @@ def parse_limits(texts: Sequence[str | Limit], scene: Scene) -> tuple[Limit, ...
             out += payload_limits(scene)
         else:
             name, value = _split_word(text)
+            if name == "payload":
+                raise ProblemError(f"--limit {text}: give payload alone, and values with --payload")
             response = _response_word(name, "--limit")
             read = length_word if response == TOLERANCE else number_word
             out.append(Limit(response, read(value, f"--limit {text}")))

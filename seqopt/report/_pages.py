@@ -40,7 +40,7 @@ WORDS = {
     "D_max": "displacement, µm",
 }  # as of seqopt.report.comparison.LARGEST
 OVER = "over payload"
-LEGEND = {OVER: "a robot would hold more than it can", OUTSIDE: "its numbers are not reliable"}
+LEGEND = {OVER: "a robot would hold more than it can", OUTSIDE: REMEDY[:-1]}
 FIRST = (CLOSED, FREE)  # of a comparison: its other rows may be more than are seen at once
 PLANS = ("plan.csv", "pick/plan.csv", "steps_*.csv")  # of optimize, pareto and compare
 GAP = "above the best, %"
@@ -75,7 +75,7 @@ def _outside(builds: Sequence[Build]) -> str:
     said = builds_in_words({build.name: build.departures for build in builds})
     if said and len(builds) == 1:
         said = (*map(str, builds[0].departures),)
-    return f"{OUTSIDE.capitalize()}: {'; '.join(said)}. {REMEDY} " if said else ""
+    return f"{OUTSIDE.capitalize()}: {'; '.join(said)}. Do not rely on it. " if said else ""
 
 
 def _with_legend(caption: str, table: pd.DataFrame) -> str:

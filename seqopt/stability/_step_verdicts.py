@@ -256,6 +256,15 @@ def stability_row(step: Step, result: Stability) -> dict[str, object]:
     }
 
 
+_TILT = "tilt_survived_deg"
+_MARGINS = (
+    ("bond_needed_Pa", "bond", "needs {} kPa at most", 1e-3),
+    ("friction_needed", "friction", "needs {} at most", 1.0),
+    (_TILT, "tilt", "survives {}° at least", 1.0),
+    ("largest_grip_force_N", "grip force", "needs {} N at most", 1.0),
+)  # in the table of `seqopt.stability.steps.stability_table`
+
+
 def format_rows(table: pd.DataFrame) -> str:
     """Return in a line how many steps stand, fall and are undecided, and what proved it."""
     found, proofs = Counter(table["verdict"]), Counter(table["proof"])
@@ -266,4 +275,16 @@ def format_rows(table: pd.DataFrame) -> str:
     by = ", ".join(f"{count} by {proof}" for proof, count in proofs.most_common())
     unproven = int(table["unproven"].sum())
     ends = f"; {unproven} cases unproven" if unproven else ""
-    return f"{len(table)} steps: {said}; proven {by}{ends}"
+    return f"{len(table)} steps: {said}; proven {by}{ends}{''.join(_extremes(table))}"
+
+
+def _extremes(table: pd.DataFrame) -> Iterator[str]:
+    """Yield the margin of the worst step, of every kind that was found."""
+    for column, name, said, scale in _MARGINS:
+        values = table[column].to_numpy(dtype=float)
+        if np.isnan(values).all():
+            continue
+        worst = int(np.nanargmin(values) if column == _TILT else np.nanargmax(values))
+        value = f"{values[worst] * scale:.4g}"
+        ends = said.format(value) if np.isfinite(values[worst]) else "no value is enough"
+        yield f"; {name}: {ends} (step {table['step'].iloc[worst]})"

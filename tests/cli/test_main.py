@@ -323,6 +323,7 @@ def test_the_loop_of_two_is_compared_where_there_is_no_third(capsys, tmp_path):
         (("--formulation", "overlap_dp", "--criteria", "beauty"), "--criteria beauty"),
         (("--formulation", "overlap_dp", "--criteria", "T_max=heavy"), "'heavy' is not a positive"),
         (("--formulation", "overlap_dp", "--limit", "T_max"), "--limit T_max"),
+        (("--formulation", "overlap_dp", "--limit", "payload=9"), "values with --payload"),
         (("--formulation", "minimax", "--no-proof"), "minimax looks beyond"),
     ],
 )
@@ -338,7 +339,11 @@ def test_optimize_refuses_in_one_line(capsys, tmp_path, arguments, named):
     ("arguments", "status", "named"),
     [
         (("overlap_dp", "--limit", "F_largest=9"), 3, "no grip is left to choose"),
-        (("overlap_dp", "--limit", "T_max=20"), 3, "relax a limit"),  # proven: no choice is allowed
+        (
+            ("overlap_dp", "--limit", "T_max=20"),
+            3,
+            "(--aim F_largest",
+        ),  # proven: no choice is allowed
         (
             ("cascade", "--no-proof", "--limit", "T_max=64"),
             4,

@@ -26,6 +26,7 @@ EXAMPLES = (
     "seqopt report best",
     "seqopt report my.json plans --out plans.html",
     "seqopt report best --figures pictures",
+    "seqopt report best --film build.mp4",
 )
 
 

@@ -116,7 +116,8 @@ class LayeredCosts(FrozenValue):
             if not reached.any():
                 raise InfeasibleError(
                     f"move {k}: none of its {len(single)} candidates is allowed after any choice "
-                    "before it; relax a limit or widen a reach"
+                    "before it; relax a limit or widen a reach (--aim F_largest without "
+                    "limits finds the least payload)"
                 )
         good = [np.isfinite(self.single[-1])]
         for single, shared in zip(self.single[-2::-1], self.shared[:0:-1], strict=True):

@@ -27,8 +27,8 @@ def of_states(engine: Engine, criterion: Criterion) -> Criterion:
     """Return a criterion posed for a scene, if it is about states alone."""
     if isinstance(criterion, RankSum):
         raise ProblemError(
-            f"criterion {criterion.name}: it ranks the choices of a move, and states of a "
-            "schedule are none; take worst-ratio, weighted or another one of responses"
+            f"criterion {criterion.name}: it ranks the choices of a move, and a free schedule "
+            "has none; take worst-ratio or weighted, or a schedule with open grips, as loop"
         )
     for name in criterion.wanted(1):
         _require(name, {*STATE_RESPONSES}, f"criterion {criterion.name}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import partial
 from itertools import chain, combinations, islice
 
@@ -81,6 +81,8 @@ STEPS = (Goal(Measure.STEPS),)
 IGNORED = "payload=ignored"
 PAYLOADS = "robots that carry more"  # where states must stand, held by what robots carry
 LARGE = 1e6  # N
+RULES = {field.name for field in fields(FreeRules)}
+BOTH = " together with "
 STANDING = "no requirement to stand"
 PROPS = "props that bear any force, both ways"
 CENTERING = "a prop at every brick, if not fewer"
@@ -267,7 +269,7 @@ def _pairs(problem: States, look: Look) -> Iterator[str]:
     """Yield two that open a way together: rules, or a rule and a limit."""
     for text, rules in _loosened(problem):
         for other in _opening(replace(problem, rules=rules), look):
-            yield f"{text} together with {other}"
+            yield f"{text}{BOTH}{other}"
 
 
 def _enough(problem: States, way: str, look: Look) -> str:
@@ -297,7 +299,7 @@ def _enough_limit(problem: States, way: str, look: Look) -> str:
     """Return how far a limit has to be raised; other ways as they are."""
     found = [limit for limit in problem.limits if limit.response == way]
     if not found or not (way in STATE_RESPONSES or is_tolerance(way)):
-        return way if not found else PROPS if way == PROP_EXCESS else f"no limit on {way}"
+        return _typed(way) if not found else PROPS if way == PROP_EXCESS else f"no limit on {way}"
     rest = tuple(limit for limit in problem.limits if limit not in found)
     least = worst_least(replace(problem, limits=rest), way, look)
     if is_tolerance(way):
@@ -325,6 +327,13 @@ def _enough_payload(problem: States, exists: Callable[[float], bool]) -> str:
         middle = (least + most) // 2
         least, most = (least, middle) if exists(middle * step) else (middle, most)
     return f"a payload of {most * step:.10g} N (--payload {most * step:.10g})"
+
+
+def _typed(way: str) -> str:
+    """Return a way with the words of the command line behind it, where it is rules alone."""
+    rules = way.split(BOTH)
+    known = all(rule.partition("=")[0] in RULES for rule in rules)
+    return f"{way} (--rule {' --rule '.join(rules)})" if known else way
 
 
 def worst_least(problem: States, response: str, look: Look = explore) -> float:

@@ -12,7 +12,7 @@ from seqopt.arrays import Floats
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.requirements import Criterion, _prop_faults, _response_along, overloads
 from seqopt.responses.quantities import RESPONSES, length_text
-from seqopt.responses.table import OUTSIDE, REMEDY, Departure, force_column
+from seqopt.responses.table import OUTSIDE, Departure, force_column
 from seqopt.scene.scene import Scene
 from seqopt.stability._builds import BuildVerdicts
 from seqopt.stability.assessment import Verdict
@@ -96,7 +96,7 @@ def in_a_sentence(
     does = f"1 robot {verb[1]}" if len(used) == 1 else f"{len(used)} robots {verb[0]}"
     over, fallen = _overloaded(scene, table), _fallen(verdicts)
     wrong = [*over, *faults, *fallen]
-    outside = f"{OUTSIDE.capitalize()}: {'; '.join(map(str, departures))}. {REMEDY} "
+    outside = f"{OUTSIDE.capitalize()}: {'; '.join(map(str, departures))}. Do not rely on it. "
     said = [f"{does} {scene.name} in {len(table):,} steps"]
     if wrong:
         said = [f"Not buildable: {'; '.join(wrong)}"]

@@ -104,7 +104,7 @@ def _unit(content: Content, given: Given, said: list[str]) -> float:
         size = " by ".join(f"{x:.4g}" for x in np.ptp(points, axis=0)) if points.size else "0"
         raise SceneError(
             f"it does not say its unit of length, and is {size} large; give one of "
-            f"{', '.join(UNITS)}"
+            f"{', '.join(UNITS)} (--unit)"
         )
     unit = one_of("unit", (known or usual) if given.unit is None else given.unit, UNITS)
     if usual is not None:
@@ -162,7 +162,7 @@ def _bricks(
     built = [(i, block) for i, block in enumerate(content.blocks) if i not in supports]
     silent = [block.key for _, block in built if block.density is None]
     if silent and density is None:
-        raise SceneError(f"block {silent[0]} has no density; give one in kg/m³")
+        raise SceneError(f"block {silent[0]} has no density; give one in kg/m³ (--density)")
     if silent:
         said.append(f"density of {len(silent)} blocks is {density:g} kg/m³, as given")
     return {

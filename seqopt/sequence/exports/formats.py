@@ -87,8 +87,10 @@ def export_plan(  # what is written, and what some formats take beside
 
 def read_folder(folder: Path) -> tuple[Scene, tuple[Step, ...]]:
     """Return the scene and the steps of a plan's folder, as ``seqopt optimize`` writes it."""
+    picked = (folder / "pick" / "plan.csv").is_file()
+    give = folder / "pick" if picked else "a folder of seqopt optimize --out or pareto --pick"
     for name in ("scene.json", "plan.csv"):
         if not (folder / name).is_file():
-            raise FileError(f"{folder}: it has no {name}; give a folder of seqopt optimize --out")
+            raise FileError(f"{folder}: it has no {name}; give {give}")
     scene = load_scene(folder / "scene.json")
     return scene, read_plan(scene, folder / "plan.csv")

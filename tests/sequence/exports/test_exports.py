@@ -114,7 +114,11 @@ def test_an_assembly_keeps_all_and_gains_the_plan(sources):
 
 def test_a_folder_is_read_whole(tmp_path):
     save_scene(SCENE, tmp_path / "scene.json")
-    with pytest.raises(FileError, match=r"it has no plan\.csv"):
+    with pytest.raises(FileError, match=r"it has no plan\.csv; give a folder of"):
+        read_folder(tmp_path)
+    (tmp_path / "pick").mkdir()
+    (tmp_path / "pick" / "plan.csv").touch()
+    with pytest.raises(FileError, match=r"it has no plan\.csv; give .*pick$"):
         read_folder(tmp_path)
     write_text(tmp_path / "plan.csv", export_plan(SCENE, STEPS, "csv"))
     assert read_folder(tmp_path) == (SCENE, STEPS)
