@@ -102,19 +102,13 @@ def _robots(scene: Scene) -> pd.DataFrame:
     free = len(_reaching(scene))
     rows = []
     for robot in scene.robots:
-        reach = robot.reach
-        said = "everywhere"
-        if isinstance(reach, Sphere):
-            said = "{:g} m around ({:g}, {:g}, {:g})".format(reach.radius, *reach.center)
-        elif isinstance(reach, Side):
-            said = "the side toward ({:g}, {:g}, {:g})".format(*reach.toward)
         reached = sum(len(nodes) for nodes in scene.within_reach(robot))
         arm = "" if robot.arm is None else "({:g}, {:g}, {:g})".format(*robot.arm.position)
         rows.append(
             {
                 "robot": robot.name,
                 "payload, N": f"{robot.payload:g}",
-                "reach": said,
+                "reach": str(robot.reach),
                 "base of its arm, m": arm,
                 "nodes it reaches": f"{reached} of {free}",
             }
