@@ -106,7 +106,7 @@ def _unit(content: Content, given: Given, said: list[str]) -> float:
             f"it does not say its unit of length, and is {size} large; give one of "
             f"{', '.join(UNITS)} (--unit)"
         )
-    unit = one_of("unit", given.unit or known or usual, UNITS)
+    unit = one_of("unit", (known or usual) if given.unit is None else given.unit, UNITS)
     if usual is not None:
         said.append(f"lengths are in {unit}, as the format has them; say --unit if they are not")
     elif known is None:
