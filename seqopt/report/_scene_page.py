@@ -118,21 +118,13 @@ def _robots(scene: Scene) -> pd.DataFrame:
     able = _reaching(scene)
     rows = []
     for k, robot in enumerate(scene.robots):
-        reach = robot.reach
-        said = "everywhere"
-        if isinstance(reach, Sphere):
-            said = "{:g} m around ({:g}, {:g}, {:g})".format(reach.radius, *reach.center)
-        elif isinstance(reach, Side):
-            said = "the side toward ({:g}, {:g}, {:g})".format(*reach.toward)
-        if robot.arm is not None:
-            said = "that of its arm"
         reached = sum(k in who for who in able.values())
         arm = "" if robot.arm is None else "({:g}, {:g}, {:g})".format(*robot.arm.position)
         rows.append(
             {
                 "robot": robot.name,
                 "payload, N": f"{robot.payload:g}",
-                "reach": said,
+                "reach": str(robot.reach) if robot.arm is None else "that of its arm",
                 "base of its arm, m": arm,
                 "nodes it reaches": f"{reached} of {len(able)}",
             }

@@ -95,6 +95,9 @@ class Anywhere:
         """Return whether a point is within reach."""
         return True
 
+    def __str__(self) -> str:
+        return "anywhere"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Side:
@@ -114,6 +117,9 @@ class Side:
     def covers(self, point: Vector) -> bool:
         """Return whether a point is within reach."""
         return _dot(self.toward, point) >= _dot(self.toward, self.point)
+
+    def __str__(self) -> str:
+        return "the side toward ({:g}, {:g}, {:g})".format(*self.toward)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,8 +141,11 @@ class Sphere:
     Examples
     --------
     >>> import seqopt
-    >>> seqopt.Sphere(center=(0.0, 0.0, 0.5), radius=1.0).covers((0.0, 0.9, 0.5))
+    >>> reach = seqopt.Sphere(center=(0.0, 0.0, 0.5), radius=1.0)
+    >>> reach.covers((0.0, 0.9, 0.5))
     True
+    >>> print(reach)
+    1 m around (0, 0, 0.5)
     """
 
     center: Vector
@@ -148,6 +157,9 @@ class Sphere:
     def covers(self, point: Vector) -> bool:
         """Return whether a point is within reach."""
         return math.dist(self.center, point) <= self.radius
+
+    def __str__(self) -> str:
+        return "{:g} m around ({:g}, {:g}, {:g})".format(self.radius, *self.center)
 
 
 Reach = Anywhere | Side | Sphere

@@ -477,6 +477,7 @@ def test_scene(capsys, tmp_path):
     status, out, _ = run(capsys, "scene", "--export", str(path))
     assert status == 0
     assert "77 edges" in out
+    assert "rob2: payload 392.4 N, reach the side toward (0, -1, 0)\nrob3: " in out
     again = tmp_path / "again.json"
     run(capsys, "scene", str(path), "--export", str(again))
     assert again.read_bytes() == path.read_bytes()

@@ -108,7 +108,8 @@ def test_the_worst_along_a_build_is_that_of_its_aim(engine25, table):
 @pytest.fixture
 def page(engine25, steps, table, tmp_path):
     known = [dry(9), BuildVerdicts("epoxy", (STANDS,) * 49)]
-    build = Build("sequential", steps, table, known)
+    pressed = table.assign(F_max_N=table["F_max_N"].where(table["step"] < 49, -50.0))
+    build = Build("sequential", steps, pressed, known)  # in its last step all edges are pressed
     path = tmp_path / "report.html"
     path.write_text(report_page(engine25, [build], "Two robots take turns."), "utf-8")
     if "<p>here</p>" not in browsed(tmp_path, "data:text/html,<p>here</p>")[0]:
@@ -129,6 +130,10 @@ def test_a_browser_opens_the_step_that_decides_and_shows_every_verdict(page, tmp
     (ninth,) = re.findall(r'<tr data-step="9".*?</tr>', text, re.S)
     assert ninth.index(">falls<") < ninth.index(">stands<")
     assert "<td>robot 3</td>" in re.sub(r"<span[^>]*></span>", "", text)
+    lines = re.findall(r'<polyline points="([^"]*)"', text)
+    heights = [float(point.split(",")[1]) for line in lines for point in line.split()]
+    assert len(lines) == 4
+    assert max(heights) == 172  # on the axis, not below it
 
 
 @pytest.mark.slow

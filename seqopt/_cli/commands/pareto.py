@@ -140,6 +140,8 @@ def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Ans
     files, left = _front_files(front, free, methods, provers, options)
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
+    if options.out and not options.pick:
+        said += "; --pick D_max also writes a folder of the plan with the least"
     if options.pick:
         chosen = pick(front.table, options.pick, _under(options.under, methods))
         scene = front.engines[chosen].network.scene  # in the order of what is picked

@@ -85,8 +85,7 @@ def _covered(scene: Scene, table: pd.DataFrame) -> Iterator[str]:
     """Yield how much lies within the reach of each robot, none of which has an arm."""
     yield f"no robot of {scene.name} has an arm: this is the reach that the scene gives them"
     for robot, (_, rows) in zip(scene.robots, table.groupby("robot", sort=False), strict=True):
-        kind = type(robot.reach).__name__.lower()
-        yield f"{robot.name}: reach {kind}, {rows['reached'].sum()} of {len(rows)} nodes"
+        yield f"{robot.name}: reach {robot.reach}, {rows['reached'].sum()} of {len(rows)} nodes"
         lacking = [str(node) for node in rows["node"][~rows["reached"]]]
         if lacking:
             yield f"  never: {_listed(lacking)}"

@@ -141,9 +141,8 @@ def _described(scene: Scene, facts: dict[str, Any]) -> Iterator[str]:
     yield size_line(scene)
     yield f"network: {facts['nodes']} nodes, {facts['edges']} edges"
     for robot in scene.robots:
-        reach = facts["reaches"][robot.name]
         at = "" if robot.arm is None else ", arm at ({:g}, {:g}, {:g})".format(*robot.arm.position)
-        yield f"{robot.name}: payload {robot.payload:g} N, reach {reach}{at}{_grip(robot)}"
+        yield f"{robot.name}: payload {robot.payload:g} N, reach {robot.reach}{at}{_grip(robot)}"
     for prop in scene.props:
         yield f"{prop.label}{_bears(prop)}"
     yield f"weight: {facts['weight_N']:.1f} N"

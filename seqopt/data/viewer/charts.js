@@ -79,7 +79,7 @@ function makeCharts(page) {
     const { box, svg, x, cursor } = frame(far ? title.replace("µm", "mm") : title, width, height, left, steps);
     const bound = builds.map((build) => build.bounds[name]).find((b) => b !== undefined);
     const top = 1.06 * Math.max(1e-12, bound || 0, ...values.flat().filter((v) => v !== null));
-    const y = (v) => height - 18 - (v / top) * (height - 40);
+    const y = (v) => height - 18 - (Math.max(v, 0) / top) * (height - 40);
     for (const share of [0, 0.5, 1]) {
       draw("line", { class: "axis", x1: left, x2: width - 10, y1: y((share * top) / 1.06), y2: y((share * top) / 1.06), "stroke-opacity": share ? 0.25 : 1 }, svg);
       draw("text", { x: left - 5, y: y((share * top) / 1.06) + 4, "text-anchor": "end" }, svg, plain(((share * top) / 1.06).toPrecision(3)));

@@ -180,10 +180,7 @@ def test_compliance_agrees_with_independent_routes(scene, share):
             "chain of 3: bricks 2 and 3 interpenetrate by 17.6 mm; give more bricks",
         ),
         (lambda: chain(9, lean=2.0), "chain: lean is 2 rad; give at most a right angle"),
-        (
-            lambda: WallShape(columns=0, courses=1),
-            "wall: columns is 0 or missing; give a whole number",
-        ),
+        (lambda: WallShape(columns=0, courses=1), "wall: columns is 0 or missing; give a whole"),
         (lambda: WallShape(columns=True, courses=1), "wall: columns is True; give a whole number"),
         (lambda: WallShape(columns=1, courses=1, gap=-1.0), "wall: gap is -1.0; give a positive"),
         (lambda: WallShape(columns=1, courses=1, gap=0.1), "wall: gap is 0.1 m, half a brick"),
