@@ -102,9 +102,10 @@ def _unit(content: Content, given: Given, said: list[str]) -> float:
     if known is None and usual is None and given.unit is None:
         points = np.vstack([block.vertices for block in content.blocks])
         size = " by ".join(f"{x:.4g}" for x in np.ptp(points, axis=0)) if points.size else "0"
+        silent = given.density is None and any(b.density is None for b in content.blocks)
         raise SceneError(
             f"it does not say its unit of length, and is {size} large; give one of "
-            f"{', '.join(UNITS)} (--unit)"
+            f"{', '.join(UNITS)} (--unit){', and a density (--density)' if silent else ''}"
         )
     unit = one_of("unit", (known or usual) if given.unit is None else given.unit, UNITS)
     if usual is not None:
