@@ -253,7 +253,9 @@ def test_no_plan_is_said_where_arms_are_in_each_others_way():
     """That is told from arms that do not reach, and computed with the postures of each alone."""
     close = beside(two_arms(), 0.6)
     both = close.with_robots(*close.robots[:2])
-    with pytest.raises(InfeasibleError, match=r"newest=free or arms that are out of each") as error:
+    with pytest.raises(
+        InfeasibleError, match=r"newest=free \(--rule newest=free\) or arms that are out of each"
+    ) as error:
         seqopt.optimize(both, "free", aim="steps", least_grips=1)
     assert "reach more" not in str(error.value)
     apart = [replace(r, arm=replace(r.arm, keeps_apart=False)) for r in both.robots]
