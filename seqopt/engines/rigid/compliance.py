@@ -141,22 +141,15 @@ def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
 
 
 def _try_extremes(
-    operator: ComplianceOperator, columns: Ints, want: Want, accuracy: float, *, compiled: bool
+    operator: ComplianceOperator, columns: Ints, want: Want, accuracy: float
 ) -> tuple[Floats, Floats, Bools]:
     """Return extremes (4, S) of rigid grips, their forces (S, r), and which sets have others.
 
-    These are the sets that an operator alone answers not well enough, and where loops are not
-    compiled those with two grips on one brick.
+    These are the sets that an operator alone answers not well enough.
     """
-    index, idle = operator.load_index(columns), None
-    if compiled:
-        force, pivot, shared, idle = solve_compiled(operator, columns, index)
-        apart = ~trusted(operator, index, _GripForces(force, pivot.T), accuracy / _UNSEEN)
-    else:
-        tried = _try_forces(operator, columns, even=True, accuracy=accuracy)
-        force, apart = np.ascontiguousarray(tried.force), ~tried.trusted
-        apart[tried.pairs.sets] = True
-        shared = force
+    index = operator.load_index(columns)
+    force, pivot, shared, idle = solve_compiled(operator, columns, index)
+    apart = ~trusted(operator, index, _GripForces(force, pivot.T), accuracy / _UNSEEN)
     force[apart] = 0.0
     found = extremes_of(rows_of(operator, want), index, force, idle)
     each = shared.reshape(*columns.shape, operator.directions)
@@ -231,24 +224,23 @@ class ComplianceEngine(NamedEngine):
     ) -> Extremes:
         """Return the extremes of the fields that are wanted, for grip sets (S, r).
 
-        ``compiled``: whether by compiled loops, where numba is there.
+        ``compiled``: whether by compiled loops, where numba is there and rows of all loads are
+        made; else they are taken from the fields.
         """
         columns, numbers = grip_columns(self._network, bricks, grips), np.asarray(grips)
         hands = read_hands(self._network, columns, numbers, None)
+        if not compiled or hands is not None or not can_compile():
+            fields = self._found(bricks, columns, hands, want)
+            return extremes_in(require_finite(fields, bricks, numbers), want)
         apart = np.ones(len(columns), dtype=bool)  # what fields are computed of
-
         found, size = np.empty((4, len(columns))), np.empty(columns.shape)
-        if hands is None and bricks <= min(self._even, len(self._tree.spring)):
+        if bricks <= min(self._even, len(self._tree.spring)):
             operator = self._operator(bricks, columns)
             if operator.few_loads(len(columns)):
                 accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
-                found, size, apart = _try_extremes(
-                    operator, columns, want, accuracy, compiled=compiled and can_compile()
-                )
+                found, size, apart = _try_extremes(operator, columns, want, accuracy)
         if apart.any():
-            fields = self._found(
-                bricks, columns[apart], hands if hands is None else hands.of(apart), want
-            )
+            fields = self._found(bricks, columns[apart], None, want)
             rest = extremes_in(require_finite(fields, bricks, numbers[apart]), want)
             found[:, apart], size[apart] = rest[:4], rest.force
         return Extremes(found[0], found[1], found[2], found[3], size)
