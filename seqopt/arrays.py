@@ -93,7 +93,7 @@ class FrozenValue(Terse):
 def frozen(content: _Content) -> _Content:
     """Return the same content, arrays and sparse ones also within tuples and mappings read-only."""
     if isinstance(content, np.ndarray):
-        content.flags.writeable = False
+        content.setflags(write=False)
     elif isinstance(content, _COMPRESSED):
         for part in (content.data, content.indices, content.indptr):
             part.flags.writeable = False

@@ -9,6 +9,7 @@ from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
 from functools import cache, cached_property
 from itertools import combinations
+from math import isfinite
 from typing import Protocol, SupportsIndex
 
 import numpy as np
@@ -195,11 +196,19 @@ def keep_wanted(answer: Fields, want: Want) -> Fields:
     return replace(answer, **{name: getattr(answer, name)[:, :0] for name in dropped})
 
 
+def _owner(values: Floats) -> Floats:
+    """Return the array that others are cut from, itself if it is not."""
+    return values.base if isinstance(values.base, np.ndarray) else values
+
+
 def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
     """Return fields if all of their numbers are finite; raise `SolverError` if one is not."""
-    for name in _NAMES:
-        values = getattr(answer, name)
-        if values.size and not np.isfinite(values.sum()) and not np.isfinite(values).all():
+    each = [getattr(answer, name) for name in _NAMES]
+    whole = {id(found): found for found in map(_owner, each)}
+    if all(isfinite(found.sum()) for found in whole.values() if found.size):
+        return answer
+    for name, values in zip(_NAMES, each, strict=True):
+        if not np.isfinite(values).all():
             of_set = ~np.isfinite(values).reshape(len(values), -1).all(axis=1)
             nodes = ", ".join(map(str, np.asarray(grips)[int(of_set.argmax())])) or "none"
             raise SolverError(
@@ -224,28 +233,27 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
         raise GripError(
             "grip sets have different sizes; give as many nodes in each, or solve them by size"
         ) from None
-    if numbers.ndim != 2 or (numbers.size and not np.issubdtype(numbers.dtype, np.integer)):
+    if numbers.ndim != 2 or (numbers.size and numbers.dtype.kind not in "iu"):
         shape = numbers.shape
         raise GripError(f"grips have shape {shape}; give integer node numbers, (sets, grips)")
     numbers, _ = network.scene.grip_kinds.split(numbers)
     known, index = network.index_of_grip
-    last = len(known) - 1
-    at = (numbers.astype(np.int64, copy=False) - known[0]).clip(0, last)
-    other = known[at] != numbers
-    if other.any():  # names are not consecutive, or wrong
-        at = np.searchsorted(known, numbers).clip(max=last)
-        other = known[at] != numbers
-    columns = index[at]
+    at = numbers.astype(np.int64, copy=False) - known[0]
+    other = known.take(at, mode="clip") != numbers
+    if np.count_nonzero(other):  # names are not consecutive, or wrong
+        at = np.searchsorted(known, numbers)
+        other = known.take(at, mode="clip") != numbers
+    columns = index.take(at, mode="clip")
     wrong = other | (columns >= 2 * bricks)
-    if wrong.any():
+    if np.count_nonzero(wrong):  # some times as fast as ``any``
         raise GripError(
             f"grip on node {numbers[wrong][0]}: with {bricks} bricks the free nodes are "
             f"{known[index < 2 * bricks].tolist()}"
         )
-    first, second = _couples(columns.shape[1])
-    twice = columns[:, first] == columns[:, second]
-    if twice.any():
-        named = numbers[twice.any(axis=1)][0].tolist()
+    first, second = columns.T.take(_couples(columns.shape[1]), axis=0)
+    twice = first == second
+    if np.count_nonzero(twice):
+        named = numbers[twice.any(axis=0)][0].tolist()
         raise GripError(f"grip set {named}: a node is held twice; name it once")
     return np.asarray(columns, dtype=np.int64)
 

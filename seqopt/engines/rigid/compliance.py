@@ -76,13 +76,14 @@ class _Tried:
         """Return the fields of all sets by name, grip forces in the operator's directions."""
         operator, columns = self.operator, self.columns
         force = self.force.copy() if len(self.pairs.sets) else self.force
-        loads, asked = operator.loads(self.index, force), names_wanted(want)
-        found = {}
+        asked = names_wanted(want)
+        known = operator.answers([n for n in SHAPES if n in asked], self.index, force)
+        none, sets, found = np.empty((len(columns), 0)), len(columns), dict[str, Floats]()
         for name, shape in SHAPES.items():
-            wanted = np.empty((len(columns), 0))
-            if name in asked:
-                wanted = operator.answer(name, self.index, force, loads)
-            found[name] = wanted.reshape(len(wanted), wanted.shape[1] // prod(shape), *shape)
+            flat = known.get(name, none)
+            found[name] = (
+                flat.reshape(sets, flat.shape[1] // prod(shape), *shape) if shape else flat
+            )
         share_pairs(operator, columns, self.index, force, found["edge_force"], self.pairs)
         nodes = force[:, : columns.shape[1] * operator.directions]
         found["grip_force"] = nodes.reshape(*columns.shape, operator.directions)
@@ -116,7 +117,8 @@ def _try_forces(
         found = grip_forces(operator, columns[part], index[part], mine, own)
         force[part] = found.force
         good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN, own)
-    force[~good] = 0.0
+    if np.count_nonzero(good) < sets:
+        force[~good] = 0.0
     if len(pairs.sets):
         pairs = pairs.only(pairs.rigid(hands, *columns.shape))
     if not even:
@@ -203,14 +205,15 @@ class ComplianceEngine(NamedEngine):
             accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
             own = None if hands is None else hands.within(self._basis.force, self._basis.wrench)
             tried = _try_forces(operator, columns, own, even=even, accuracy=accuracy)
-        if tried is None or (len(columns) and not tried.trusted.any()):
+        sure = 0 if tried is None else np.count_nonzero(tried.trusted)
+        if tried is None or (len(columns) and not sure):
             return self._refined(bricks, columns, hands, want)
         found = tried.fields(want)
         if self._basis is not SPACE:
             found["grip_force"] = found["grip_force"] @ self._basis.force
             if tried.operator.moments:
                 found["grip_moment"] = found["grip_moment"] @ self._basis.moment
-        if not tried.trusted.all():
+        if sure < len(columns):
             wrong = ~tried.trusted
             rest = None if hands is None else hands.of(wrong)
             better = self._refined(bricks, columns[wrong], rest, want)
