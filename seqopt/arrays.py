@@ -99,7 +99,9 @@ def frozen(content: _Content) -> _Content:
             part.flags.writeable = False
     elif isinstance(content, dict | list | tuple):
         for part in content.values() if isinstance(content, dict) else content:
-            if not isinstance(part, str):  # names are many
+            if type(part) is np.ndarray:
+                part.setflags(write=False)
+            elif not isinstance(part, str):  # names are many
                 frozen(part)
     return content
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
-from functools import cache, cached_property
+from functools import cache, cached_property, wraps
 from itertools import combinations
 from math import isfinite
-from typing import Protocol, SupportsIndex
+from typing import ParamSpec, Protocol, SupportsIndex, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +22,9 @@ from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene._checks import settle
 from seqopt.scene.scene import Scene
+
+_Asked = ParamSpec("_Asked")
+_Answer = TypeVar("_Answer")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -264,19 +266,23 @@ def _couples(grips: int) -> Ints:
     return frozen(np.array([*combinations(range(grips), 2)], dtype=np.int64).reshape(-1, 2).T)
 
 
-@contextmanager
-def failing_in_a_line() -> Iterator[None]:
-    """Let numerical failures be a `SolverError`, of a function that this decorates too."""
-    try:
-        yield
-    except (np.linalg.LinAlgError, ValueError) as error:
-        # SciPy says so of arrays that it does not take
-        if not isinstance(error, np.linalg.LinAlgError) and "infs or NaNs" not in str(error):
-            raise
-        raise SolverError(
-            f"the equations have no answer in numbers ({error}); correct lengths, masses or "
-            "stiffnesses beyond all bounds in the scene"
-        ) from error
+def failing_in_a_line(function: Callable[_Asked, _Answer]) -> Callable[_Asked, _Answer]:
+    """Let numerical failures of a function be a `SolverError`."""
+
+    @wraps(function)
+    def guarded(*args: _Asked.args, **named: _Asked.kwargs) -> _Answer:
+        try:
+            return function(*args, **named)
+        except (np.linalg.LinAlgError, ValueError) as error:
+            # SciPy says so of arrays that it does not take
+            if not isinstance(error, np.linalg.LinAlgError) and "infs or NaNs" not in str(error):
+                raise
+            raise SolverError(
+                f"the equations have no answer in numbers ({error}); correct lengths, masses or "
+                "stiffnesses beyond all bounds in the scene"
+            ) from error
+
+    return guarded
 
 
 def no_sets(network: Network, bricks: int, held: int) -> Fields:
@@ -337,7 +343,7 @@ class SerialEngine(NamedEngine, ABC):
     All fields are evaluated whatever is asked: the solution dominates the cost.
     """
 
-    @failing_in_a_line()
+    @failing_in_a_line
     def solve(
         self,
         bricks: int,

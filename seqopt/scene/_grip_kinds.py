@@ -57,7 +57,7 @@ class GripKinds(FrozenValue):
     def split(self, numbers: Ints) -> tuple[Ints, Ints]:
         """Return the nodes and the kinds of grips; kinds that there are not, of wrong numbers."""
         if len(self.turns) == 1:
-            return numbers, np.broadcast_to(0, numbers.shape)
+            return numbers, np.zeros(numbers.shape, dtype=np.int64)
         kind = (numbers - self.first) // self.span
         known = (kind >= 0) & (kind < len(self.turns))
         kind = np.where(known, kind, 0)

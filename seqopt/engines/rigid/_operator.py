@@ -91,6 +91,11 @@ class ComplianceOperator(FrozenValue):
         return frozen(out)
 
     @cached_property
+    def _nodes(self) -> Ints:
+        """Which of the nodes that are loaded each inner node is, (2b,)."""
+        return frozen(np.add.outer(2 * self.place, np.arange(2)).ravel())
+
+    @cached_property
     def shares(self) -> Floats:
         """Roots of flexibilities, what weight adds to their sum, what makes it forces; (3, l)."""
         own = np.maximum(np.abs(self.flexibility.diagonal()), np.finfo(float).tiny)
@@ -116,7 +121,7 @@ class ComplianceOperator(FrozenValue):
     def load_index(self, columns: Ints) -> Ints:
         """Return which loads act at every grip, and after them all loose motions, (S, k)."""
         every = len(self.held) == self.bricks
-        nodes = columns if every else 2 * self.place[columns // 2] + columns % 2
+        nodes = columns if every else self._nodes.take(columns)
         rows = _load_rows(nodes, self.directions, self.moments)
         if self.loose:
             after = len(self.flexibility) - self.loose + np.arange(self.loose)

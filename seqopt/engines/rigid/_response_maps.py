@@ -150,7 +150,7 @@ class Loads:
     def sum(self, rows: Floats) -> Floats:
         """Return the sums (S, Q) of what the loads mean by rows (count, Q)."""
         if self.index.size * rows.shape[1] <= _GATHERED:  # in the order of the sparse product
-            return np.asarray(np.einsum("sk,skq->sq", self.share, rows[self.index]))
+            return np.asarray(np.einsum("sk,skq->sq", self.share, rows.take(self.index, axis=0)))
         return np.asarray(self.matrix @ rows)
 
     @property

@@ -183,7 +183,7 @@ class ComplianceEngine(NamedEngine):
         self._asked: set[int] = set()  # brick counts since then
         self._refinement: Refinement | None = None  # of the brick count that was asked last
 
-    @failing_in_a_line()
+    @failing_in_a_line
     def solve(
         self,
         bricks: int,
@@ -221,7 +221,7 @@ class ComplianceEngine(NamedEngine):
                 values[wrong] = getattr(better, name)
         return Fields(**found)
 
-    @failing_in_a_line()
+    @failing_in_a_line
     def _extremes(
         self, bricks: int, grips: ArrayLike, want: Want, *, compiled: bool = False
     ) -> Extremes:
