@@ -93,13 +93,15 @@ class FrozenValue(Terse):
 def frozen(content: _Content) -> _Content:
     """Return the same content, arrays and sparse ones also within tuples and mappings read-only."""
     if isinstance(content, np.ndarray):
-        content.flags.writeable = False
+        content.setflags(write=False)
     elif isinstance(content, _COMPRESSED):
         for part in (content.data, content.indices, content.indptr):
             part.flags.writeable = False
     elif isinstance(content, dict | list | tuple):
         for part in content.values() if isinstance(content, dict) else content:
-            if not isinstance(part, str):  # names are many
+            if type(part) is np.ndarray:
+                part.setflags(write=False)
+            elif not isinstance(part, str):  # names are many
                 frozen(part)
     return content
 

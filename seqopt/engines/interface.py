@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
-from functools import cache, cached_property
+from functools import cache, cached_property, wraps
 from itertools import combinations
-from typing import Protocol, SupportsIndex
+from math import isfinite
+from typing import ParamSpec, Protocol, SupportsIndex, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +22,9 @@ from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene._checks import settle
 from seqopt.scene.scene import Scene
+
+_Asked = ParamSpec("_Asked")
+_Answer = TypeVar("_Answer")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -195,11 +198,19 @@ def keep_wanted(answer: Fields, want: Want) -> Fields:
     return replace(answer, **{name: getattr(answer, name)[:, :0] for name in dropped})
 
 
+def _owner(values: Floats) -> Floats:
+    """Return the array that others are cut from, itself if it is not."""
+    return values.base if isinstance(values.base, np.ndarray) else values
+
+
 def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
     """Return fields if all of their numbers are finite; raise `SolverError` if one is not."""
-    for name in _NAMES:
-        values = getattr(answer, name)
-        if values.size and not np.isfinite(values.sum()) and not np.isfinite(values).all():
+    each = [getattr(answer, name) for name in _NAMES]
+    whole = {id(found): found for found in map(_owner, each)}
+    if all(isfinite(found.sum()) for found in whole.values() if found.size):
+        return answer
+    for name, values in zip(_NAMES, each, strict=True):
+        if not np.isfinite(values).all():
             of_set = ~np.isfinite(values).reshape(len(values), -1).all(axis=1)
             nodes = ", ".join(map(str, np.asarray(grips)[int(of_set.argmax())])) or "none"
             raise SolverError(
@@ -224,28 +235,27 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
         raise GripError(
             "grip sets have different sizes; give as many nodes in each, or solve them by size"
         ) from None
-    if numbers.ndim != 2 or (numbers.size and not np.issubdtype(numbers.dtype, np.integer)):
+    if numbers.ndim != 2 or (numbers.size and numbers.dtype.kind not in "iu"):
         shape = numbers.shape
         raise GripError(f"grips have shape {shape}; give integer node numbers, (sets, grips)")
     numbers, _ = network.scene.grip_kinds.split(numbers)
     known, index = network.index_of_grip
-    last = len(known) - 1
-    at = (numbers.astype(np.int64, copy=False) - known[0]).clip(0, last)
-    other = known[at] != numbers
-    if other.any():  # names are not consecutive, or wrong
-        at = np.searchsorted(known, numbers).clip(max=last)
-        other = known[at] != numbers
-    columns = index[at]
+    at = numbers.astype(np.int64, copy=False) - known[0]
+    other = known.take(at, mode="clip") != numbers
+    if np.count_nonzero(other):  # names are not consecutive, or wrong
+        at = np.searchsorted(known, numbers)
+        other = known.take(at, mode="clip") != numbers
+    columns = index.take(at, mode="clip")
     wrong = other | (columns >= 2 * bricks)
-    if wrong.any():
+    if np.count_nonzero(wrong):  # some times as fast as ``any``
         raise GripError(
             f"grip on node {numbers[wrong][0]}: with {bricks} bricks the free nodes are "
             f"{known[index < 2 * bricks].tolist()}"
         )
-    first, second = _couples(columns.shape[1])
-    twice = columns[:, first] == columns[:, second]
-    if twice.any():
-        named = numbers[twice.any(axis=1)][0].tolist()
+    first, second = columns.T.take(_couples(columns.shape[1]), axis=0)
+    twice = first == second
+    if np.count_nonzero(twice):
+        named = numbers[twice.any(axis=0)][0].tolist()
         raise GripError(f"grip set {named}: a node is held twice; name it once")
     return np.asarray(columns, dtype=np.int64)
 
@@ -256,19 +266,23 @@ def _couples(grips: int) -> Ints:
     return frozen(np.array([*combinations(range(grips), 2)], dtype=np.int64).reshape(-1, 2).T)
 
 
-@contextmanager
-def failing_in_a_line() -> Iterator[None]:
-    """Let numerical failures be a `SolverError`, of a function that this decorates too."""
-    try:
-        yield
-    except (np.linalg.LinAlgError, ValueError) as error:
-        # SciPy says so of arrays that it does not take
-        if not isinstance(error, np.linalg.LinAlgError) and "infs or NaNs" not in str(error):
-            raise
-        raise SolverError(
-            f"the equations have no answer in numbers ({error}); correct lengths, masses or "
-            "stiffnesses beyond all bounds in the scene"
-        ) from error
+def failing_in_a_line(function: Callable[_Asked, _Answer]) -> Callable[_Asked, _Answer]:
+    """Let numerical failures of a function be a `SolverError`."""
+
+    @wraps(function)
+    def guarded(*args: _Asked.args, **named: _Asked.kwargs) -> _Answer:
+        try:
+            return function(*args, **named)
+        except (np.linalg.LinAlgError, ValueError) as error:
+            # SciPy says so of arrays that it does not take
+            if not isinstance(error, np.linalg.LinAlgError) and "infs or NaNs" not in str(error):
+                raise
+            raise SolverError(
+                f"the equations have no answer in numbers ({error}); correct lengths, masses or "
+                "stiffnesses beyond all bounds in the scene"
+            ) from error
+
+    return guarded
 
 
 def no_sets(network: Network, bricks: int, held: int) -> Fields:
@@ -329,7 +343,7 @@ class SerialEngine(NamedEngine, ABC):
     All fields are evaluated whatever is asked: the solution dominates the cost.
     """
 
-    @failing_in_a_line()
+    @failing_in_a_line
     def solve(
         self,
         bricks: int,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class GripKinds(FrozenValue):
     first: int
     span: int
 
-    @property
+    @cached_property
     def rigid(self) -> bool:
         """Whether all hands are rigid and let their nodes turn."""
         return not (self.compliance.any() or self.turns.any() or self.arms.any())
@@ -56,7 +57,7 @@ class GripKinds(FrozenValue):
     def split(self, numbers: Ints) -> tuple[Ints, Ints]:
         """Return the nodes and the kinds of grips; kinds that there are not, of wrong numbers."""
         if len(self.turns) == 1:
-            return numbers, np.zeros_like(numbers)
+            return numbers, np.zeros(numbers.shape, dtype=np.int64)
         kind = (numbers - self.first) // self.span
         known = (kind >= 0) & (kind < len(self.turns))
         kind = np.where(known, kind, 0)

@@ -1,4 +1,4 @@
-"""Extremes of fields without the fields, by NumPy and by compiled loops."""
+"""Extremes of fields without the fields, by compiled loops."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from tests.limit_scenes import chain, loosened
 
 needs_numba = pytest.mark.skipif(not _extremes.can_compile(), reason="no numba")
 once = pytest.mark.xdist_group("compiled loops")  # which one worker compiles
-WAYS = [False, pytest.param(True, marks=[needs_numba, once])]
 SOME = [Want.RESPONSES, Want.EDGES, Want.DISPLACEMENTS, Want.SUPPORT, Want(0)]
 NONE, MANY = np.empty((1, 0), dtype=np.int64), np.empty((500, 0), dtype=np.int64)
 CLOSE = 1e-12  # of what is largest
@@ -47,30 +46,33 @@ def of_fields(engine, bricks, sets, want):
     return extremes_in(engine.solve(bricks, sets, want), want)
 
 
-@pytest.mark.parametrize("compiled", WAYS)
+@needs_numba
+@once
 @pytest.mark.parametrize("want", SOME)
 @pytest.mark.parametrize("grips", [1, 2, 3, 4, 5])
-def test_they_are_those_of_the_fields(grips, want, compiled):
+def test_they_are_those_of_the_fields(grips, want):
     engine = ComplianceEngine(build_network(from_both_sides(6)))
     sets = sets_of(engine.network, 6, grips)
-    found = engine._extremes(6, sets, want, compiled=compiled)
+    found = engine._extremes(6, sets, want, compiled=True)
     assert apart(found, of_fields(engine, 6, sets, want)) <= CLOSE
 
 
-@pytest.mark.parametrize("compiled", WAYS)
-def test_in_parts_of_a_larger_structure(compiled):
+@needs_numba
+@once
+def test_in_parts_of_a_larger_structure():
     engine = ComplianceEngine(build_network(load_scene("dome163")))
     bricks, want = 33, Want.RESPONSES
     sets = sets_of(engine.network, bricks, 3)
     operator = engine._operator(bricks, np.arange(2 * bricks).reshape(-1, 1))
     assert len(rows_of(operator, want).rows) > 1
-    found = engine._extremes(bricks, sets, want, compiled=compiled)
+    found = engine._extremes(bricks, sets, want, compiled=True)
     assert apart(found, of_fields(engine, bricks, sets, want)) <= CLOSE
 
 
-@pytest.mark.parametrize("compiled", WAYS)
+@needs_numba
+@once
 @pytest.mark.parametrize("alter", ["soft", "loose", "few"])
-def test_what_rows_do_not_answer_is_that_of_the_fields(alter, compiled):
+def test_what_rows_do_not_answer_is_that_of_the_fields(alter):
     scene = {
         "soft": small_arch(6),
         "loose": loosened(chain(16), 1e-7, only_turning=True),
@@ -82,11 +84,11 @@ def test_what_rows_do_not_answer_is_that_of_the_fields(alter, compiled):
     engine = ComplianceEngine(build_network(scene))
     bricks = len(scene.bricks)
     sets = sets_of(engine.network, bricks, 2, 40)
-    found = engine._extremes(bricks, sets, Want.RESPONSES, compiled=compiled)
+    found = engine._extremes(bricks, sets, Want.RESPONSES, compiled=True)
     assert apart(found, of_fields(engine, bricks, sets, Want.RESPONSES)) == 0
 
 
-@pytest.mark.parametrize("compiled", WAYS)
+@pytest.mark.parametrize("compiled", [False, pytest.param(True, marks=[needs_numba, once])])
 def test_blocks_answer_responses_by_them(compiled):
     engine = ComplianceEngine(build_network(six_bricks()))
     sets = np.sort(sets_of(engine.network, 6, 2, 50), axis=1)
@@ -98,11 +100,12 @@ def test_blocks_answer_responses_by_them(compiled):
     assert np.abs(found.forces - lengths(fields.grip_force)).max() <= 1e-9
 
 
-@pytest.mark.parametrize("compiled", WAYS)
-def test_no_sets_have_none(compiled):
+@needs_numba
+@once
+def test_no_sets_have_none():
     engine = ComplianceEngine(build_network(six_bricks()))
     none = np.zeros((0, 2), dtype=np.int64)
-    found = engine._extremes(6, none, Want.RESPONSES, compiled=compiled)
+    found = engine._extremes(6, none, Want.RESPONSES, compiled=True)
     assert [len(each) for each in found] == [0] * 5
 
 
@@ -116,16 +119,17 @@ def test_a_set_has_the_same_whatever_is_beside_it():
         assert np.array_equal(each, np.concatenate(some))
 
 
-@pytest.mark.parametrize("compiled", WAYS)
-def test_a_wrong_row_is_seen(compiled):
+@needs_numba
+@once
+def test_a_wrong_row_is_seen():
     """The control of the comparisons above."""
     engine = ComplianceEngine(build_network(six_bricks()))
     operator = engine._operator(6, np.arange(12).reshape(-1, 1))
     known = rows_of(operator, Want.EDGES)
     index, force = operator.load_index(np.array([[0, 9]])), np.ones((1, 6))
-    true = extremes_of(known, index, force, NONE if compiled else None)
+    true = extremes_of(known, index, force, NONE)
     wrong = known._replace(rows=known.rows * (1 + 1e-9))
-    found = extremes_of(wrong, index, force, NONE if compiled else None)
+    found = extremes_of(wrong, index, force, NONE)
     assert np.abs(found - true).max() > CLOSE * np.abs(true).max()
 
 
@@ -160,7 +164,7 @@ def test_where_no_folder_can_be_written_code_is_compiled_all_the_same(tmp_path):
     assert done.stdout.split() == ["-0.5", "NullCache"]
 
 
-def test_without_numba_numpy_answers(monkeypatch):
+def test_without_numba_fields_answer(monkeypatch):
     monkeypatch.setattr("seqopt.engines.rigid.compliance.can_compile", lambda: False)
     monkeypatch.setattr(_extremes, "_loops", None)
     engine = ComplianceEngine(build_network(six_bricks()))

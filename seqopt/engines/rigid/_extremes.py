@@ -5,9 +5,9 @@ node, the largest moment at any ground end. What every load means is kept by par
 as many edges and nodes to a part as stay in the processor's cache while all grip sets are summed
 there; of each sum only the extremes are kept.
 
-The loops are written twice: here with NumPy, which is the reference, and in
-`seqopt.engines.rigid._compiled` for numba, which does the same in a third of the time where it is
-installed. Loading it takes half a second, so it is left to those who ask for it.
+The loops are those of `seqopt.engines.rigid._compiled`, where numba is installed; else, and for
+little work, extremes are taken from fields, which are the reference. Loading numba takes half a
+second, so it is left to those who ask for it.
 """
 
 from __future__ import annotations
@@ -22,11 +22,9 @@ import numpy as np
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Fields, Want
 from seqopt.engines.rigid._operator import ComplianceOperator
-from seqopt.engines.rigid._response_maps import loads_of
 
 _PART = 2**15  # numbers under all loads of a part: a quarter of a megabyte
 _LEAST = 256  # of them under each load
-_AT_ONCE = 2**16  # numbers that are summed at once: they stay in the processor's cache
 
 
 class Extremes(NamedTuple):
@@ -94,47 +92,19 @@ def _by_part(operator: ComplianceOperator, parts: int, counts: tuple[int, int, i
     return rows
 
 
-def extremes_of(known: ExtremeRows, index: Ints, force: Floats, idle: Ints | None = None) -> Floats:
-    """Return the least and most edge force, the largest displacement and moment, (4, S).
+def extremes_of(known: ExtremeRows, index: Ints, force: Floats, idle: Ints) -> Floats:
+    """Return the extremes of edge forces, of displacements and of moments of sets, (4, S).
 
     ``index``, ``force`` (S, k): loads of the operator, and how much of each; ``idle`` (S, q): edges
-    that carry nothing whatever these mean, -1 for none, for compiled loops; else these are NumPy's.
+    that carry nothing whatever these mean, -1 for none.
     """
     found = np.zeros((4, len(index)))
     if known.counts[0]:
         found[0], found[1] = np.inf, -np.inf
-    if idle is not None:
-        counts = *known.counts, known.edges
-        _loops().reduce_rows(known.rows, counts, (index, force), idle, found)
-    else:
-        _reduce_rows(known, index, force, found)
+    counts = *known.counts, known.edges
+    _loops().reduce_rows(known.rows, counts, (index, force), idle, found)
     np.sqrt(found[2:], out=found[2:])
     return found
-
-
-def _reduce_rows(known: ExtremeRows, index: Ints, force: Floats, found: Floats) -> None:
-    """Find extremes as ``reduce_rows`` of `seqopt.engines.rigid._compiled` does."""
-    rows, (edges, nodes, ends), _ = known
-    step, behind = max(16, _AT_ONCE // max(rows.shape[2], 1)), edges + 3 * nodes
-    for start in range(0, len(index), step):
-        part = slice(start, start + step)
-        loads = loads_of(index[part], force[part], rows.shape[1])
-        for each in rows:
-            sums, out = loads.sum(each), found[:, part]
-            if edges:
-                np.minimum(out[0], sums[:, :edges].min(axis=1), out=out[0])
-                np.maximum(out[1], sums[:, :edges].max(axis=1), out=out[1])
-            if nodes:
-                np.maximum(out[2], _largest_square(sums[:, edges:behind], nodes), out=out[2])
-            if ends:
-                np.maximum(out[3], _largest_square(sums[:, behind:], ends), out=out[3])
-
-
-def _largest_square(sums: Floats, count: int) -> Floats:
-    """Return the largest square (S,) of a length of vectors (S, 3n), all first components first."""
-    squares = sums * sums
-    total = squares[:, :count] + squares[:, count : 2 * count] + squares[:, 2 * count :]
-    return np.asarray(total.max(axis=1))
 
 
 def extremes_in(fields: Fields, want: Want) -> Extremes:

@@ -20,6 +20,7 @@ from seqopt.engines.rigid._pairs import (
     pairs_of,
 )
 
+_MANY = 256  # sets from which on more calls of NumPy that gather less take less
 _FEW = 12  # systems up to which one call of LAPACK for each takes less than one for all
 
 
@@ -119,11 +120,13 @@ def trusted(
 
     ``most``: largest of `_doubts` that is accepted; ``hands``: as of `grip_forces`.
     """
-    lowest = found.lowest
-    out = np.zeros(len(lowest), dtype=bool)
+    lowest, least = found.lowest, np.inf
     if hands is None or hands.moved is None:  # else forces may undo what the weight does
         own = 0.0 if hands is None else 2.0  # of what hands give, that forces undo as well
-        out = np.asarray(most * lowest >= len(found.pivot) * operator.worst_doubt + own)
+        least = (len(found.pivot) * operator.worst_doubt + own) / most
+    out = np.asarray(lowest >= least)
+    if np.count_nonzero(out) == len(out):
+        return out
     rest = np.flatnonzero(~out & (lowest > 0))
     if rest.size:
         part = _GripForces(found.force[rest], found.pivot[:, rest])
@@ -251,8 +254,9 @@ def _solved(asked: _Asked, dead: Floats, off: Floats | None = None) -> tuple[Flo
     count, sets = rows.shape
     size = len(operator.flexibility)
     system = np.empty((count + 1, count, sets))
-    for i in range(0, count, operator.directions):  # what is above the diagonal is not read
-        mine = slice(i, min(i + operator.directions, count))
+    step = operator.directions if sets > _MANY else max(count, 1)
+    for i in range(0, count, step):  # what is above the diagonal is not read
+        mine = slice(i, min(i + step, count))
         entries = rows[mine, None] * size + rows[: mine.stop]
         part = system[mine, : mine.stop]
         operator.flexibility.take(entries, out=part, mode="clip")  # others copy once more

@@ -5,7 +5,7 @@ The operators of all brick counts come from what grows with the build.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -27,6 +27,7 @@ from seqopt.engines.rigid._response_maps import (
 from seqopt.network.network import Network
 
 _OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
+_TOGETHER = 1000  # sets up to which one product takes less than one for every field
 _FEW = 200  # loads whose responses take little, and are always made once for all
 
 
@@ -90,6 +91,11 @@ class ComplianceOperator(FrozenValue):
         return frozen(out)
 
     @cached_property
+    def _nodes(self) -> Ints:
+        """Which of the nodes that are loaded each inner node is, (2b,)."""
+        return frozen(np.add.outer(2 * self.place, np.arange(2)).ravel())
+
+    @cached_property
     def shares(self) -> Floats:
         """Roots of flexibilities, what weight adds to their sum, what makes it forces; (3, l)."""
         own = np.maximum(np.abs(self.flexibility.diagonal()), np.finfo(float).tiny)
@@ -110,12 +116,12 @@ class ComplianceOperator(FrozenValue):
 
     def covers(self, bricks: Ints) -> bool:
         """Return whether loads act at the nodes of bricks."""
-        return len(self.held) == self.bricks or bool((self.place[bricks] >= 0).all())
+        return len(self.held) == self.bricks or not np.count_nonzero(self.place.take(bricks) < 0)
 
     def load_index(self, columns: Ints) -> Ints:
         """Return which loads act at every grip, and after them all loose motions, (S, k)."""
         every = len(self.held) == self.bricks
-        nodes = columns if every else 2 * self.place[columns // 2] + columns % 2
+        nodes = columns if every else self._nodes.take(columns)
         rows = _load_rows(nodes, self.directions, self.moments)
         if self.loose:
             after = len(self.flexibility) - self.loose + np.arange(self.loose)
@@ -126,17 +132,31 @@ class ComplianceOperator(FrozenValue):
         """Return forces (S, k) at loads (S, k), and a share of the weight."""
         return loads_of(index, force, len(self.twist), weight)
 
-    def answer(self, name: str, index: Ints, force: Floats, loads: Loads | None = None) -> Floats:
-        """Return a field of sets of forces beside the weight.
+    def answers(self, names: Sequence[str], index: Ints, force: Floats) -> dict[str, Floats]:
+        """Return fields (S, Q) of sets of forces beside the weight.
 
         Where there are fewer sets than loads of all bricks, their twists and wrenches are summed
-        and mapped; else those of the loads are mapped, once, and then summed. So are reactions,
-        which few of the wrenches tell. ``loads``: from the others, if it was made before.
+        and mapped; else those of the loads are mapped, once, and then summed, all fields together.
+        So are reactions, which few of the wrenches tell.
         """
-        few = name == "support" or self.few_loads(len(index))
-        if few:  # whatever was asked before: answers do not depend on it
-            loads = self.loads(index, force) if loads is None else loads
-            return loads.sum(self.of_loads(name))
+        few = self.few_loads(len(index))  # whatever was asked before: answers do not depend on it
+        at_once = tuple(name for name in names if few or name == "support")
+        found = {name: self._mapped(name, index, force) for name in names if name not in at_once}
+        if not at_once:
+            return found
+        loads, rows, first = self.loads(index, force), self.of_loads(*at_once), 0
+        sums = loads.sum(rows) if len(index) <= _TOGETHER else None
+        for name in at_once:
+            part = slice(first, first := first + self.maps.count(name))
+            found[name] = loads.sum(rows[:, part]) if sums is None else sums[:, part]
+        return found
+
+    def answer(self, name: str, index: Ints, force: Floats) -> Floats:
+        """Return one of these fields."""
+        return self.answers((name,), index, force)[name]
+
+    def _mapped(self, name: str, index: Ints, force: Floats) -> Floats:
+        """Return a field of sets whose twists and wrenches are summed first."""
         states = self._states(name)
         out = np.empty((len(index), self.maps.count(name)))
         step = max(16, AT_ONCE // states.shape[1])
@@ -164,9 +184,9 @@ class ComplianceOperator(FrozenValue):
         for i in range(nodes):  # two may share an edge
             out[np.arange(len(index)), self.inner_edge[brick[:, i]]] += along[:, i]
 
-    def of_loads(self, name: str) -> Floats:
-        """Return a field under every load, (l + 1, Q), made when it is first asked for."""
-        return self.made(name, lambda: self.mean(name))
+    def of_loads(self, *names: str) -> Floats:
+        """Return fields under every load side by side, (l + 1, Q), made when first asked for."""
+        return self.made(" ".join(names), lambda: np.hstack([self.mean(name) for name in names]))
 
     def mean(self, name: str) -> Floats:
         """Return a field under every load, (l + 1, Q), and keep it nowhere."""

@@ -47,14 +47,13 @@ class Pairs(NamedTuple):
 
 def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
     """Return all pairs of grips of the sets that share a brick."""
-    first, second = _couples(columns.shape[1])
-    bricks = columns.T // 2
-    same = np.flatnonzero(bricks[first] == bricks[second])
-    if not len(same):
+    couples = _couples(columns.shape[1])
+    brick, other = (columns // 2).T.take(couples, axis=0)
+    same = brick == other
+    if not np.count_nonzero(same):
         return _none(operator.axis.shape[1])
-    couple, sets = np.divmod(same, len(columns))
-    first, second = first[couple], second[couple]
-    brick = bricks[first, sets]
+    couple, sets = same.nonzero()
+    brick, (first, second) = brick[couple, sets], couples.take(couple, axis=1)
     return Pairs(sets, first, second, brick, operator.axis[brick])
 
 

@@ -90,7 +90,11 @@ class ResponseMaps(FrozenValue):
 
     def count(self, name: str) -> int:
         """Return how many numbers a field has."""
-        return counts_of_fields(self.scene.network, self.bricks)[name] * prod(SHAPES[name])
+        return self._counts[name] * prod(SHAPES[name])
+
+    @cached_property
+    def _counts(self) -> dict[str, int]:
+        return counts_of_fields(self.scene.network, self.bricks)
 
     def apply(self, name: str, states: Floats, out: Floats | None = None) -> Floats:
         """Return a field of states, edge forces without what loads add to the inner edges.
@@ -146,10 +150,10 @@ class Loads:
     def sum(self, rows: Floats) -> Floats:
         """Return the sums (S, Q) of what the loads mean by rows (count, Q)."""
         if self.index.size * rows.shape[1] <= _GATHERED:  # in the order of the sparse product
-            return np.asarray(np.einsum("sk,skq->sq", self.share, rows[self.index]))
+            return np.asarray(np.einsum("sk,skq->sq", self.share, rows.take(self.index, axis=0)))
         return np.asarray(self.matrix @ rows)
 
-    @cached_property
+    @property
     def matrix(self) -> sparse.csr_array:
         """All shares, (S, count): with many sets half the time of a dense product."""
         first = np.arange(0, self.index.size + 1, self.index.shape[1], dtype=np.int32)
@@ -160,9 +164,9 @@ class Loads:
 def loads_of(index: Ints, force: Floats, count: int, weight: float = 1.0) -> Loads:
     """Return forces (S, k) at loads (S, k) beside a share of the weight, the last of the rows."""
     sets, loads = index.shape
-    rows = np.full((sets, loads + 1), count - 1, dtype=np.int32)
-    share = np.full((sets, loads + 1), weight)
+    rows, share = np.empty((sets, loads + 1), dtype=np.int32), np.empty((sets, loads + 1))
     rows[:, :-1], share[:, :-1] = index, force
+    rows[:, -1], share[:, -1] = count - 1, weight
     return Loads(rows, share, count)
 
 

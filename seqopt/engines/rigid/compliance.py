@@ -76,13 +76,14 @@ class _Tried:
         """Return the fields of all sets by name, grip forces in the operator's directions."""
         operator, columns = self.operator, self.columns
         force = self.force.copy() if len(self.pairs.sets) else self.force
-        loads, asked = operator.loads(self.index, force), names_wanted(want)
-        found = {}
+        asked = names_wanted(want)
+        known = operator.answers([n for n in SHAPES if n in asked], self.index, force)
+        none, sets, found = np.empty((len(columns), 0)), len(columns), dict[str, Floats]()
         for name, shape in SHAPES.items():
-            wanted = np.empty((len(columns), 0))
-            if name in asked:
-                wanted = operator.answer(name, self.index, force, loads)
-            found[name] = wanted.reshape(len(wanted), wanted.shape[1] // prod(shape), *shape)
+            flat = known.get(name, none)
+            found[name] = (
+                flat.reshape(sets, flat.shape[1] // prod(shape), *shape) if shape else flat
+            )
         share_pairs(operator, columns, self.index, force, found["edge_force"], self.pairs)
         nodes = force[:, : columns.shape[1] * operator.directions]
         found["grip_force"] = nodes.reshape(*columns.shape, operator.directions)
@@ -116,7 +117,8 @@ def _try_forces(
         found = grip_forces(operator, columns[part], index[part], mine, own)
         force[part] = found.force
         good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN, own)
-    force[~good] = 0.0
+    if np.count_nonzero(good) < sets:
+        force[~good] = 0.0
     if len(pairs.sets):
         pairs = pairs.only(pairs.rigid(hands, *columns.shape))
     if not even:
@@ -141,22 +143,15 @@ def _cancels(operator: ComplianceOperator, index: Ints, force: Floats) -> Bools:
 
 
 def _try_extremes(
-    operator: ComplianceOperator, columns: Ints, want: Want, accuracy: float, *, compiled: bool
+    operator: ComplianceOperator, columns: Ints, want: Want, accuracy: float
 ) -> tuple[Floats, Floats, Bools]:
     """Return extremes (4, S) of rigid grips, their forces (S, r), and which sets have others.
 
-    These are the sets that an operator alone answers not well enough, and where loops are not
-    compiled those with two grips on one brick.
+    These are the sets that an operator alone answers not well enough.
     """
-    index, idle = operator.load_index(columns), None
-    if compiled:
-        force, pivot, shared, idle = solve_compiled(operator, columns, index)
-        apart = ~trusted(operator, index, _GripForces(force, pivot.T), accuracy / _UNSEEN)
-    else:
-        tried = _try_forces(operator, columns, even=True, accuracy=accuracy)
-        force, apart = np.ascontiguousarray(tried.force), ~tried.trusted
-        apart[tried.pairs.sets] = True
-        shared = force
+    index = operator.load_index(columns)
+    force, pivot, shared, idle = solve_compiled(operator, columns, index)
+    apart = ~trusted(operator, index, _GripForces(force, pivot.T), accuracy / _UNSEEN)
     force[apart] = 0.0
     found = extremes_of(rows_of(operator, want), index, force, idle)
     each = shared.reshape(*columns.shape, operator.directions)
@@ -188,7 +183,7 @@ class ComplianceEngine(NamedEngine):
         self._asked: set[int] = set()  # brick counts since then
         self._refinement: Refinement | None = None  # of the brick count that was asked last
 
-    @failing_in_a_line()
+    @failing_in_a_line
     def solve(
         self,
         bricks: int,
@@ -210,14 +205,15 @@ class ComplianceEngine(NamedEngine):
             accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
             own = None if hands is None else hands.within(self._basis.force, self._basis.wrench)
             tried = _try_forces(operator, columns, own, even=even, accuracy=accuracy)
-        if tried is None or (len(columns) and not tried.trusted.any()):
+        sure = 0 if tried is None else np.count_nonzero(tried.trusted)
+        if tried is None or (len(columns) and not sure):
             return self._refined(bricks, columns, hands, want)
         found = tried.fields(want)
         if self._basis is not SPACE:
             found["grip_force"] = found["grip_force"] @ self._basis.force
             if tried.operator.moments:
                 found["grip_moment"] = found["grip_moment"] @ self._basis.moment
-        if not tried.trusted.all():
+        if sure < len(columns):
             wrong = ~tried.trusted
             rest = None if hands is None else hands.of(wrong)
             better = self._refined(bricks, columns[wrong], rest, want)
@@ -225,30 +221,29 @@ class ComplianceEngine(NamedEngine):
                 values[wrong] = getattr(better, name)
         return Fields(**found)
 
-    @failing_in_a_line()
+    @failing_in_a_line
     def _extremes(
         self, bricks: int, grips: ArrayLike, want: Want, *, compiled: bool = False
     ) -> Extremes:
         """Return the extremes of the fields that are wanted, for grip sets (S, r).
 
-        ``compiled``: whether by compiled loops, where numba is there.
+        ``compiled``: whether by compiled loops, where numba is there and rows of all loads are
+        made; else they are taken from the fields.
         """
         columns, numbers = grip_columns(self._network, bricks, grips), np.asarray(grips)
         hands = read_hands(self._network, columns, numbers, None)
+        if not compiled or hands is not None or not can_compile():
+            fields = self._found(bricks, columns, hands, want)
+            return extremes_in(require_finite(fields, bricks, numbers), want)
         apart = np.ones(len(columns), dtype=bool)  # what fields are computed of
-
         found, size = np.empty((4, len(columns))), np.empty(columns.shape)
-        if hands is None and bricks <= min(self._even, len(self._tree.spring)):
+        if bricks <= min(self._even, len(self._tree.spring)):
             operator = self._operator(bricks, columns)
             if operator.few_loads(len(columns)):
                 accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
-                found, size, apart = _try_extremes(
-                    operator, columns, want, accuracy, compiled=compiled and can_compile()
-                )
+                found, size, apart = _try_extremes(operator, columns, want, accuracy)
         if apart.any():
-            fields = self._found(
-                bricks, columns[apart], hands if hands is None else hands.of(apart), want
-            )
+            fields = self._found(bricks, columns[apart], None, want)
             rest = extremes_in(require_finite(fields, bricks, numbers[apart]), want)
             found[:, apart], size[apart] = rest[:4], rest.force
         return Extremes(found[0], found[1], found[2], found[3], size)
