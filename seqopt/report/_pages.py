@@ -152,7 +152,8 @@ def plan_page(
         tables |= {key: each for key, each in fixed_methods(engine).items() if key not in tables}
     prover = prover or BuildProver(engine.network, SHOWN if small else {})
     verdicts = prover.of_tables(tables)
-    first, *rest = _builds(scene, tables, LinearRange(engine).of_builds(tables), verdicts)
+    left = plan._within.of_builds(tables)  # knows the plan's own steps
+    first, *rest = _builds(scene, tables, left, verdicts)
     first = replace(first, along=_along(plan, first.table))
     sentence = first.sentence(scene, _grips_off(engine, first))
     found = f"Found by: {in_words(name)} ({plan.result})."

@@ -19,11 +19,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from scipy import linalg, sparse
-from scipy.sparse.linalg import splu
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
@@ -36,7 +35,6 @@ _SHARE = 0.95  # of the way to the edge of the cones that is gone in a round
 _STUCK = 1e-3  # share of a step so small that further rounds lead nowhere
 _ROUNDED = 1e-12  # share of a square by which a difference may be negative from rounding
 _FARTHEST = 1e3  # share of a step that counts as no limit
-_DENSE = 300  # lines of a system up to which it is solved as a full matrix
 _REGULAR = 1e-13  # of the largest entry, added to all on the diagonal: blocks may be loose
 _DONE = 1e-8  # t that counts as none, over the force scale
 _ROOM = 0.1  # by which t starts above what the first forces need, over the force scale
@@ -93,19 +91,27 @@ class _Cones:
 
 
 class _Balance:
-    """The map E from forces to wrenches, and systems E B E^T y = r for weights B (N, 3, 3)."""
+    """The map E from forces to wrenches, and systems E B E^T y = r for weights B (N, 3, 3).
+
+    Bodies that touch are numbered close together, so that such a system is a narrow band.
+    """
 
     def __init__(self, assembly: Assembly) -> None:
         maps = assembly.contact_map, assembly.grip_map
         self._map = sparse.hstack(maps, format="csr")
         self._transposed = blocks = self._map.T.tobsr((3, 6))
-        self._bodies = blocks.shape[1] // 6
+        bodies = blocks.shape[1] // 6
         self._owner = np.repeat(np.arange(blocks.shape[0] // 3), np.diff(blocks.indptr))
-        own, each = np.arange(len(self._owner)), np.arange(self._bodies)
+        own, each = np.arange(len(self._owner)), np.arange(bodies)
         both = np.flatnonzero(self._owner[1:] == self._owner[:-1])  # where a force has two bodies
-        first = np.concatenate([own, both, both + 1])
-        second = np.concatenate([own, both + 1, both])
-        place = blocks.indices[first] * self._bodies + blocks.indices[second]
+        first, second = np.concatenate([[own, own], [both, both + 1]], axis=1)
+        meet = np.ones(len(first)), (blocks.indices[first], blocks.indices[second])
+        touching = sparse.csr_array(meet, shape=(bodies, bodies))
+        self._order = reverse_cuthill_mckee(touching + touching.T, symmetric_mode=True)
+        number = np.argsort(self._order)[blocks.indices]
+        low = number[first] < number[second]  # of what is symmetric, the lower half counts
+        first, second = np.where(low, second, first), np.where(low, first, second)
+        place = number[first] * bodies + number[second]
         order = np.argsort(place, kind="stable")
         self._first, self._right = first[order], blocks.data[second[order]]
         self._half, self._left = np.empty((len(own), 6, 3)), np.empty((len(order), 6, 3))
@@ -113,9 +119,14 @@ class _Balance:
             (len(order), 6, 6)
         )  # written again and again: new pages cost more
         places, self._starts = np.unique(place[order], return_index=True)
-        self._places = np.union1d(places, each * (self._bodies + 1))  # bodies may be loose
-        self._met = np.searchsorted(self._places, places)
-        self._diagonal = np.searchsorted(self._places, each * (self._bodies + 1))
+        every = np.union1d(places, each * (bodies + 1))  # bodies may be loose
+        self._met = np.searchsorted(every, places)
+        self._diagonal = np.searchsorted(every, each * (bodies + 1))
+        rows, columns = np.divmod(every, bodies)
+        line = 6 * (rows - columns)[:, None, None] + np.subtract.outer(np.arange(6), np.arange(6))
+        column = np.broadcast_to(6 * columns[:, None, None] + np.arange(6), line.shape)
+        self._lower = line >= 0
+        self._band = line[self._lower], column[self._lower]
 
     def wrench(self, force: Floats) -> Floats:
         """Return the wrenches (6B,) of forces (N, 3)."""
@@ -126,42 +137,33 @@ class _Balance:
         return np.asarray(self._transposed @ motion).reshape(-1, 3)
 
     def solver(self, weight: Floats) -> _Solve:
-        """Return the solution of systems with weights; raises an error if there is none."""
+        """Return the solution of systems with weights; raises an error if there is none.
+
+        It is that of a system with a larger diagonal, corrected once.
+        """
         across = self._transposed.data.transpose(0, 2, 1)
         np.matmul(across, weight[self._owner], out=self._half)
         np.take(self._half, self._first, axis=0, out=self._left, mode="clip")
         np.matmul(self._left, self._right, out=self._products)
-        block = np.zeros((len(self._places), 6, 6))
+        block = np.zeros((len(self._lower), 6, 6))
         block[self._met] = np.add.reduceat(self._products, self._starts)
         regular = _REGULAR * np.abs(block).max()
         block[self._diagonal] += regular * np.eye(6)
-        size, (rows, columns) = 6 * self._bodies, np.divmod(self._places, self._bodies)
-        if size <= _DENSE:
-            full = np.zeros((self._bodies, 6, self._bodies, 6))
-            full[rows, :, columns] = block
-            full = full.reshape(size, size)
-            factor = linalg.cho_factor(full, check_finite=False)
-            solve = partial(linalg.cho_solve, factor, check_finite=False)
-            return _refined(full, solve, regular)
-        ends = np.searchsorted(rows, np.arange(self._bodies + 1))
-        lines = sparse.bsr_array((block, columns, ends), shape=(size, size)).tocsr()
-        same = sparse.csc_array((lines.data, lines.indices, lines.indptr), shape=(size, size))
-        symmetric = {"SymmetricMode": True}  # so that lines are columns
-        factors = splu(same, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=symmetric)
-        return _refined(lines, factors.solve, regular)
+        lines, bodies = int(self._band[0].max()) + 1, len(self._order)
+        band = np.zeros((lines, 6 * bodies), order="F")
+        band[self._band] = block[self._lower]
+        factor = linalg.cholesky_banded(band, lower=True, check_finite=False), True
 
+        def solution(right: Floats) -> Floats:
+            given = right.reshape(-1, 6)[self._order].ravel()
+            found = linalg.cho_solve_banded(factor, given, check_finite=False)
+            left = given - linalg.blas.dsbmv(lines - 1, 1.0, band, found, lower=1)
+            found += linalg.cho_solve_banded(factor, left + regular * found, check_finite=False)
+            out = np.empty((bodies, 6))
+            out[self._order] = found.reshape(-1, 6)
+            return out.ravel()
 
-def _refined(matrix: Floats | sparse.csr_array, solve: _Solve, regular: float) -> _Solve:
-    """Return the solution of a system by that of one nearby, corrected once.
-
-    ``matrix``: of the one nearby, whose diagonal is larger by ``regular``.
-    """
-
-    def solution(right: Floats) -> Floats:
-        first = solve(right)
-        return np.asarray(first + solve(right - (matrix @ first - regular * first)))
-
-    return solution
+        return solution
 
 
 class _Search:
