@@ -1,4 +1,4 @@
-"""Claim: compiled loops compare grip sets at least 1.5 times as fast as fields, and agree with them.
+"""Claim: compiled loops compare grip sets at least 1.5 times as fast as fields and agree with them.
 
 What optimization asks of a grip set is the largest tension of any edge, displacement of any node,
 moment at any ground end, and the forces of its grips. Where numba is installed and there is much to
