@@ -123,12 +123,14 @@ def trusted(
     lowest, least = found.lowest, np.inf
     if hands is None or hands.moved is None:  # else forces may undo what the weight does
         own = 0.0 if hands is None else 2.0  # of what hands give, that forces undo as well
-        least = (len(found.pivot) * operator.worst_doubt + own) / most
-    out = np.asarray(lowest >= least)
+        least = len(found.pivot) * operator.worst_doubt + own
+    out = np.asarray(most * lowest >= least)
     if np.count_nonzero(out) == len(out):
         return out
     rest = np.flatnonzero(~out & (lowest > 0))
-    if rest.size:
+    if len(rest) == len(out):
+        return np.asarray(_doubts(operator, index, found, hands) <= most)
+    if len(rest):
         part = _GripForces(found.force[rest], found.pivot[:, rest])
         own_hands = None if hands is None else hands.of(rest)
         out[rest] = _doubts(operator, index[rest], part, own_hands) <= most
