@@ -186,7 +186,7 @@ EQUIVALENT = (
         Equivalent(OPERATOR, "slice(bricks)", "==", new, "a slice of all bricks is all of them")
         for new in (">", ">=")
     ),
-    Equivalent(GRIPS, "worst_doubt", ">=", ">", "no doubt is it to the last bit"),
+    Equivalent(GRIPS, "most * lowest >= least", ">=", ">", "no doubt is it to the last bit"),
     Equivalent(
         "seqopt.engines.rigid._pairs",
         "@cache",
