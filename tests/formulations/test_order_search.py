@@ -163,9 +163,8 @@ def test_the_worst_of_scenarios_equals_brute_force(workers, bricks):
     assert found.order.selection.objective > 1.01 * min(known(bricks).values())
 
 
-@pytest.mark.parametrize(
-    ("aim", "bricks"), [(WORST_TOTAL, 3), pytest.param(cvar(0.5), 3, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("aim", "bricks"), [(WORST_TOTAL, 3), (cvar(0.5), 3)])
 def test_totals_over_scenarios_equal_brute_force(aim, bricks):
     """By every formulation; a bound is proven where weights leave nothing open, else claimed."""
     scene = small_arch(bricks)
@@ -190,6 +189,7 @@ def test_totals_over_scenarios_equal_brute_force(aim, bricks):
         _proven("x", problem, replace(alone, bound=found.objective), np.inf)
 
 
+@pytest.mark.slow
 def test_the_order_of_the_best_margin_equals_brute_force():
     """To its width; the judge knows that no order has a better one, and that some has a worse."""
     problem = posed(small_arch(3), aim="friction")
@@ -221,7 +221,8 @@ def test_states_of_all_orders_that_do_not_fit_the_memory_get_one_line(monkeypatc
 
 
 @once
-@pytest.mark.parametrize("aim", ["minmax", pytest.param("sum", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("aim", ["minmax", "sum"])
 def test_orders_within_budgets_equal_brute_force(aim):
     """Another order is the best where robots may not go far; one budget on a peak is decided."""
     nominal = posed(small_arch(4), aim=aim)
@@ -302,7 +303,8 @@ def test_a_heuristic_order_is_on_the_right_side(seed):
     assert tried.summary()["order_status"] == tried.status
 
 
-@pytest.mark.parametrize("hired", [pytest.param(None, marks=pytest.mark.slow), "threads"])
+@pytest.mark.slow
+@pytest.mark.parametrize("hired", [None, "threads"])
 def test_who_tries_orders_changes_nothing(hired):
     """Two processes of our own, or two threads of an executor."""
     problem = posed(small_arch(6), aim="F_largest")

@@ -191,7 +191,9 @@ def test_the_judge_of_budgets_has_prices_of_its_own_to_check():
 
 
 @once
-@pytest.mark.parametrize("mortar", ["dry", "bond=2e3", "bond=2e4"])
+@pytest.mark.parametrize(
+    "mortar", ["dry", "bond=2e3", pytest.param("bond=2e4", marks=pytest.mark.slow)]
+)
 @pytest.mark.parametrize("name", ["three-robot", "four"])
 def test_what_stands_equals_brute_force(name, mortar):
     """Standing is asked of every state by the cone program; where no plan stands, none is found."""
