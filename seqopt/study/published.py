@@ -147,13 +147,13 @@ IRREGULARITIES = (
     "(472.3 N, as in step 49 of A.1, which is the same).",
     "The payload is 40 kg (392.4 N); step 47 exceeds it in both two-robot methods.",
     "The text counts 23 optimizations; the printed three-robot plan contains 22.",
-    "The largest D_max of the three-robot plan is 27.9e-3 mm, at step 86 of Table B.1; the "
-    "improvement table gives the second largest, 21.9e-3 mm at step 88. The reduction against the "
+    "The largest D_max of the three-robot plan is 27.9 µm, at step 86 of Table B.1; the "
+    "improvement table gives the second largest, 21.9 µm at step 88. The reduction against the "
     "sequential method is then 90.9 %, not 93 %.",
-    "The three-robot plan moves more than the cantilever method (27.9 against 15.9e-3 mm), "
+    "The three-robot plan moves more than the cantilever method (27.9 against 15.9 µm), "
     "though it is called an improvement in all responses.",
-    "Averages 'over the full sequence' (D_max 7.3e-3 mm, M_sup 6.8 N m) leave out the eight "
-    "twisting steps; over all 49 steps of A.1 the mean D_max is 21.9e-3 mm.",
+    "Averages 'over the full sequence' (D_max 7.3 µm, M_sup 6.8 N m) leave out the eight "
+    "twisting steps; over all 49 steps of A.1 the mean D_max is 21.9 µm.",
     "The average T_max of the sequential method is printed as 38.0 N; all 49 rows give 36.7 N. "
     "Those of the cantilever method leave out steps 1 to 4.",
 )
