@@ -9,9 +9,9 @@ from dataclasses import replace
 import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.given import given_scene, given_steps
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_payload, parse_robots
+from seqopt._cli.words.given import given_scene, given_steps
 from seqopt._cli.words.props import parse_props
 from seqopt.contact.mortar import Mortar
 from seqopt.engines._auto import AutoEngine

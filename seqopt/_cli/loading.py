@@ -8,9 +8,9 @@ import numpy as np
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
-from seqopt._cli.given import plan_name
 from seqopt._cli.outputs import require_out, write_outputs
 from seqopt._cli.values import asked_mortar
+from seqopt._cli.words.given import plan_name
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.engines.registry import USUAL, make_engine, versions

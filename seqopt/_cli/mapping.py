@@ -8,10 +8,10 @@ from typing import Any
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
-from seqopt._cli.given import plan_name
 from seqopt._cli.outputs import figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import count_word, mortar_word, number_word
+from seqopt._cli.words.given import plan_name
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.engines.registry import USUAL, make_engine, versions

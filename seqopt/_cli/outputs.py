@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from seqopt._cli.given import is_folder
+from seqopt._cli.words.given import is_folder
 from seqopt._files import csv_text, require_apart, require_folder, write_csv, write_folder
 from seqopt._showing import PAGE
 from seqopt.graph.layers.layers import Layers

@@ -9,12 +9,12 @@ from pathlib import Path
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.commands import optimize
-from seqopt._cli.given import file_name, take
 from seqopt._cli.options import WRITTEN, declare
 from seqopt._cli.outputs import keep_apart
 from seqopt._cli.posing import asked_problem
 from seqopt._cli.screens import question
 from seqopt._cli.values import number_word
+from seqopt._cli.words.given import file_name, take
 from seqopt.errors import ProblemError
 from seqopt.graph.instances._files import WRITERS, save_instance
 from seqopt.plan._bare._compiled import compile_instance

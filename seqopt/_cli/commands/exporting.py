@@ -7,10 +7,10 @@ from collections.abc import Sequence
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import scene_facts
-from seqopt._cli.given import plan_folder
 from seqopt._cli.options import WRITTEN, declare, form_options
 from seqopt._cli.screens import question
 from seqopt._cli.values import number_word
+from seqopt._cli.words.given import plan_folder
 from seqopt._files import require_apart, write_text
 from seqopt.arms.reach import find_postures
 from seqopt.errors import ExtraError, SceneError

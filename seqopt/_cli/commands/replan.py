@@ -14,7 +14,6 @@ from typing import Any
 from seqopt._cli.answer import Answer
 from seqopt._cli.arguments import parser
 from seqopt._cli.commands import optimize
-from seqopt._cli.given import plan_folder
 from seqopt._cli.options import (
     BEST,
     CURING,
@@ -33,6 +32,7 @@ from seqopt._cli.options import (
 )
 from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
+from seqopt._cli.words.given import plan_folder
 from seqopt._cli.words.optimizing import AIM, TIME
 from seqopt._cli.words.where import Place
 from seqopt._files import read_text

@@ -10,10 +10,10 @@ import numpy as np
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import asked_scene, scene_facts, size_line
-from seqopt._cli.given import file_name
 from seqopt._cli.options import BUILT, declare, form_options, scene_options
 from seqopt._cli.outputs import keep_apart
 from seqopt._cli.screens import question
+from seqopt._cli.words.given import file_name
 from seqopt._files import write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network

@@ -17,7 +17,6 @@ from seqopt._cli.asked import (
     scene_facts,
     waits_said,
 )
-from seqopt._cli.given import take
 from seqopt._cli.options import (
     BUILT,
     CURING,
@@ -36,6 +35,7 @@ from seqopt._cli.outputs import figure_notes, require_out, time_files, write_out
 from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_standing
+from seqopt._cli.words.given import take
 from seqopt._files import csv_text
 from seqopt.contact.curing import _find_curing
 from seqopt.engines.registry import USUAL, make_engine
