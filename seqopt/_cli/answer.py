@@ -64,7 +64,7 @@ def status_of(error: BaseException) -> Status:
 class Answer:
     """What a command answers, as facts for scripts and as text for people."""
 
-    facts: Mapping[str, object]  # values, mappings, sequences and tables
+    facts: Mapping[str, object]  # values, mappings, sequences, tables, and what makes them if asked
     text: str = ""  # lines on standard output
     headings: tuple[str, ...] = ()  # lines of the text that are headings
     data: str = ""  # a table as CSV for standard output, where no file is written for it
@@ -133,6 +133,8 @@ def _unpacked(value: object) -> Any:
         return dict(value)
     if isinstance(value, Sequence | set | frozenset):
         return list(value)
+    if callable(value):
+        return value()
     if hasattr(value, "tolist"):
         return value.tolist()
     return value.value if isinstance(value, Enum) else str(value)

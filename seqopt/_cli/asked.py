@@ -6,8 +6,6 @@ import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-import pandas as pd
-
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_payload, parse_robots
@@ -23,7 +21,7 @@ from seqopt.plan.build import ShownBuild
 from seqopt.problem._arms import arm_faults
 from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.report.comparison import idle_note
-from seqopt.responses.table import OUTSIDE, REMEDY
+from seqopt.responses.table import OUTSIDE, REMEDY, _Columns
 from seqopt.scene.scene import Scene, in_order
 from seqopt.sequence.rules import with_robots
 from seqopt.sequence.steps import AnyStep, Step
@@ -120,7 +118,7 @@ def idle_notes(scene: Scene, steps: Sequence[AnyStep]) -> tuple[str, ...]:
     return tuple(idle_note(scene, "robots", steps))
 
 
-def exceeded(scene: Scene, *tables: pd.DataFrame) -> tuple[str, ...]:
+def exceeded(scene: Scene, *tables: _Columns) -> tuple[str, ...]:
     """Return the payloads, also of props, that are exceeded in responses of steps, in words."""
     found = ((*overloads(scene, table), *_prop_faults(scene, table)) for table in tables)
     return tuple(str(excess) for each in found for excess in each)

@@ -31,7 +31,7 @@ from dataclasses import dataclass, field
 
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
-from seqopt.responses.table import analyze
+from seqopt.responses.table import _Columns, analyze
 from seqopt.sequence.steps import _check_part
 
 
@@ -73,7 +73,11 @@ class ShownBuild(Shown):
     @cached_property
     def departures(self) -> tuple[Departure, ...]:
         """The limits of the linear range that steps leave: there the responses mean nothing."""
-        return self._within.departures(self.responses())
+        return self._within.departures(self._columns)
+
+    @cached_property
+    def _columns(self) -> _Columns:
+        return self.responses()
 
     @cached_property
     def _within(self) -> LinearRange:
@@ -82,7 +86,7 @@ class ShownBuild(Shown):
     @cached_property
     def enough(self) -> Enough:
         """Which model was enough for the steps, what others would change, what is left out."""
-        return what_was_enough(self._within, {"": self.responses()})
+        return what_was_enough(self._within, {"": self._columns})
 
     def grips(self) -> pd.DataFrame:
         """Return every grip of the build, for as long as it lasts.

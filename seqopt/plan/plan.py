@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import inf, isfinite
+from math import inf, isfinite, nan
 
 import pandas as pd
 
@@ -45,7 +45,7 @@ from seqopt.problem.requirements import Excess, overloads
 from seqopt.problem.standing import Standing
 from seqopt.responses._choices import window_models
 from seqopt.responses._tolerance import value_text
-from seqopt.responses.table import response_table, step_fields
+from seqopt.responses.table import _Columns, _response_columns, _table_of, step_fields
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.site import Site
@@ -310,7 +310,7 @@ class Plan(ShownBuild):
     @cached_property
     def overloads(self) -> tuple[Excess, ...]:
         """The payloads that steps exceed, whether or not a limit was asked for."""
-        return overloads(self.engine.network.scene, self._responses)
+        return overloads(self.engine.network.scene, self._columns)
 
     def responses(self) -> pd.DataFrame:
         """Return the responses of every step; of a schedule with the robots that were chosen for.
@@ -318,20 +318,20 @@ class Plan(ShownBuild):
         Result: a row per step; the columns of `seqopt.analyze`, of candidates ``optimized_robot``.
         Raises `ProblemError` if the problem is given by its costs alone; so do the tables below.
         """
-        return self._responses.copy()
+        return _table_of(self._columns)
 
     @cached_property
-    def _responses(self) -> pd.DataFrame:
+    def _columns(self) -> _Columns:
         answers = (  # of all fields, which what steps leave is judged by too
             (step, self._within.seen(step, step_fields(self.engine, step, Want.ALL)))
             for step in self.steps
         )
-        table = response_table(self.engine.network, answers)
+        columns = _response_columns(self.engine.network, answers)
         if not isinstance(self.graph, States):
             moves, steps = self.layers.schedule.moves, self.layers.schedule.steps
             robots = {s.number: ";".join(moves[m].robot for m in s.moves) for s in steps}
-            table["optimized_robot"] = table["step"].map(robots)
-        return table
+            columns["optimized_robot"] = [robots.get(step.number, nan) for step in self.steps]
+        return columns
 
     def table(self) -> pd.DataFrame:
         """Return what was chosen: every move with what it costs, or every grip where states were.

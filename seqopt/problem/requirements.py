@@ -11,7 +11,6 @@ from numbers import Real
 from typing import Protocol
 
 import numpy as np
-import pandas as pd
 
 from seqopt.arrays import Bools, Floats, Terse
 from seqopt.engines.interface import Engine
@@ -28,7 +27,7 @@ from seqopt.responses.quantities import (
     length_text,
     robot_response,
 )
-from seqopt.responses.table import analyze, force_column
+from seqopt.responses.table import _Columns, analyze, force_column
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
@@ -384,7 +383,7 @@ class Excess:
         )
 
 
-def _excesses(scene: Scene, table: pd.DataFrame, limits: Sequence[Limit]) -> tuple[Excess, ...]:
+def _excesses(scene: Scene, table: _Columns, limits: Sequence[Limit]) -> tuple[Excess, ...]:
     """Return the limits that steps of a table of `seqopt.analyze` exceed, in their order.
 
     A limit on ``F_move``, which only open steps have, is left out.
@@ -394,38 +393,39 @@ def _excesses(scene: Scene, table: pd.DataFrame, limits: Sequence[Limit]) -> tup
         values = _response_along(scene, table, limit.response)
         over = limit.exceeded(values)
         if over.any():
-            steps = tuple(table["step"][over].astype(int).tolist())
+            steps = tuple(np.asarray(table["step"], dtype=int)[over].tolist())
             out.append(Excess(limit, steps, float(values[over].max())))
     return tuple(out)
 
 
-def overloads(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
+def overloads(scene: Scene, table: _Columns) -> tuple[Excess, ...]:
     """Return the payloads that steps exceed, in the order of the robots; see `_excesses`."""
     names = {robot_response(robot.name): robot.name for robot in scene.robots}
     found = _excesses(scene, table, payload_limits(scene))
     return tuple(replace(excess, robot=names[excess.limit.response]) for excess in found)
 
 
-def _prop_faults(scene: Scene, table: pd.DataFrame) -> tuple[Excess, ...]:
+def _prop_faults(scene: Scene, table: _Columns) -> tuple[Excess, ...]:
     """Return in which steps props bear more than they may; see `_excesses`."""
     return _excesses(scene, table, _prop_limits(scene))
 
 
-def _response_along(scene: Scene, table: pd.DataFrame, name: str) -> np.ndarray:
+def _response_along(scene: Scene, table: _Columns, name: str) -> np.ndarray:
     """Return a response of every step (steps,) as limits name it, but ``F_move``.
 
     They are in SI units, sizes without sign, NaN where the robot does not grip.
     """
     if name == "C_max":
-        return np.asarray(np.maximum(-table[RESPONSES["F_min"].column].to_numpy(float), 0.0))
+        least = np.asarray(table[RESPONSES["F_min"].column], dtype=float)
+        return np.asarray(np.maximum(-least, 0.0))
     if is_tolerance(name):
         return misfits_along(table)
     if name == PROP_EXCESS:
-        return table[EXCESS_COLUMN].to_numpy(float)
+        return np.asarray(table[EXCESS_COLUMN], dtype=float)
     if name in RESPONSES:
         response = RESPONSES[name]
-        return table[response.column].to_numpy(float) / response.scale
+        return np.asarray(table[response.column], dtype=float) / response.scale
     columns = {robot_response(robot.name): force_column(robot) for robot in scene.robots}
-    forces = table[[*columns.values()]].abs()
-    found = forces.max(axis=1) if name == "F_largest" else forces[columns[name]]
-    return found.to_numpy(float)
+    asked = columns.values() if name == "F_largest" else [columns[name]]
+    forces = np.abs([np.asarray(table[column], dtype=float) for column in asked])
+    return np.asarray(np.fmax.reduce(forces))

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 from itertools import chain
 
 import numpy as np
-import pandas as pd
 
 from seqopt.arrays import Terse
 from seqopt.engines._auto import AutoEngine
@@ -15,9 +14,9 @@ from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.registry import recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.responses._tolerance import each_tolerance, held_in_table, is_linear
+from seqopt.responses._tolerance import each_tolerance, is_linear
 from seqopt.responses.quantities import RESPONSES, _plain, length_text
-from seqopt.responses.table import LinearRange, force_column
+from seqopt.responses.table import LinearRange, _Columns, _node, force_column, held_in_table
 from seqopt.scene.scene import Scene
 
 _FEW = 100  # bricks up to which tolerances take less than a second
@@ -53,7 +52,7 @@ class Enough(Terse):
 
 
 def what_was_enough(
-    within: LinearRange, builds: Mapping[str, pd.DataFrame], *, staged: bool = False
+    within: LinearRange, builds: Mapping[str, _Columns], *, staged: bool = False
 ) -> Enough:
     """Return which model was enough for builds, by their tables of responses.
 
@@ -98,7 +97,7 @@ def _others(within: LinearRange, below: float, where: str) -> str:
 
 
 def _left_out(
-    within: LinearRange, builds: Mapping[str, pd.DataFrame], *, staged: bool
+    within: LinearRange, builds: Mapping[str, _Columns], *, staged: bool
 ) -> Iterator[str]:
     """Yield what the model has not, as far as it could matter in these builds."""
     every, moved = within.engine.network.scene.robots, RESPONSES["D_max"]
@@ -106,22 +105,23 @@ def _left_out(
     rigid = ~kinds.gives[kinds.of_robot[: len(every)]]  # props come after robots
     robots = [robot for robot, is_rigid in zip(every, rigid, strict=True) if is_rigid]
     tables = builds.values()
-    if any(table[f"{robot.name}_node"].notna().any() for table in tables for robot in robots):
+    cells = (cell for t in tables for r in robots for cell in t[f"{r.name}_node"])
+    if any(_node(cell) is not None for cell in cells):
         yield f"that robots give way{_off(within, builds)}"
     props = within.engine.network.scene.props
     if any(prop.stiffness is None for prop in props):
         yield "that props give way"
     if any(prop.direction for prop in props):
         yield "that props lift off which only push (plans in which one would pull are not allowed)"
-    if not staged and any(len(table) > 1 for table in tables):
+    if not staged and any(len(table["step"]) > 1 for table in tables):
         yield "what earlier steps lock in"
     if not isinstance(within.engine, DiscreteEngine):
-        most = max(float(table[moved.column].max()) / moved.scale for table in tables) / within.far
+        most = max(float(np.max(t[moved.column])) / moved.scale for t in tables) / within.far
         yield f"change of shape (bricks move by up to {_plain(100 * most, 2)} % of its limit)"
     yield "motion in time"
 
 
-def _off(within: LinearRange, builds: Mapping[str, pd.DataFrame]) -> str:
+def _off(within: LinearRange, builds: Mapping[str, _Columns]) -> str:
     """Return by how much grips may be off, in brackets.
 
     Nothing where that is not linear, takes long, or a payload is exceeded wherever they are.
@@ -139,10 +139,10 @@ def _off(within: LinearRange, builds: Mapping[str, pd.DataFrame]) -> str:
     return f" (rigid grips {length_text(found[at])} off exceed a payload: {where})"
 
 
-def _overloaded(scene: Scene, builds: Mapping[str, pd.DataFrame]) -> bool:
+def _overloaded(scene: Scene, builds: Mapping[str, _Columns]) -> bool:
     """Return whether a robot carries more than its payload in a step of some builds."""
     return any(
-        bool((table[force_column(robot)].abs() > robot.payload).any())
+        bool((np.abs(np.asarray(table[force_column(robot)])) > robot.payload).any())
         for table in builds.values()
         for robot in scene.robots
     )

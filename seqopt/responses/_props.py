@@ -45,7 +45,7 @@ def prop_cells(scene: Scene, step: Step, force: Floats) -> dict[str, object]:
     most = int(size.argmax()) if len(props) else 0
     return {
         "props": len(props),
-        "prop_node": props[most].node if len(props) else pd.NA,
+        "prop_node": props[most].node if len(props) else None,
         "F_prop_N": float(size[most]) if len(props) else np.nan,
         EXCESS_COLUMN: float(excess_of(props, force[None])[0]),
     }

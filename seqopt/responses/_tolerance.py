@@ -25,7 +25,7 @@ from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.responses._worst_direction import proven_rates, worst_misplacement, worst_rates
 from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, length_text
-from seqopt.responses.table import _grips_of, _node
+from seqopt.responses.table import _Columns, _grips_of, _Held
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 
@@ -240,19 +240,6 @@ def step_tolerance(engine: Engine, step: Step, allowed: Allowed = ROBOTS_ALONE) 
     return replace(worst, proven=1 / proven if proven else np.inf)
 
 
-_Held = tuple[int, int, tuple[int, ...]]  # a step's number, its bricks, its grips by number
-
-
-def held_in_table(scene: Scene, table: pd.DataFrame) -> list[_Held]:
-    """Return what is held in every step of a table of `seqopt.analyze`."""
-    nodes = table[[f"{robot.name}_node" for robot in scene.robots]].to_numpy(object)
-    bricks = table["bricks"].astype(int).tolist()
-    held = (
-        scene.grip_numbers([_node(n) for n in row], b) for row, b in zip(nodes, bricks, strict=True)
-    )
-    return [*zip(map(int, table["step"]), bricks, held, strict=True)]
-
-
 def held_in_steps(scene: Scene, steps: Sequence[Step]) -> list[_Held]:
     """Return what is held in every step."""
     return [(s.number, s.bricks, scene.grip_numbers(s.grips, s.bricks)) for s in steps]
@@ -356,7 +343,7 @@ def tolerance_table(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     )
 
 
-def misfits_along(table: pd.DataFrame) -> Floats:
+def misfits_along(table: _Columns) -> Floats:
     """Return one over the tolerances of a table of steps, 1/m."""
     with np.errstate(divide="ignore"):
-        return np.asarray(np.minimum(1e3 / table[COLUMN].to_numpy(float), NO_TOLERANCE))
+        return np.asarray(np.minimum(1e3 / np.asarray(table[COLUMN], dtype=float), NO_TOLERANCE))

@@ -9,6 +9,7 @@ import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -46,6 +47,10 @@ _STRESSED = (
     f"{{:.3g}} MPa beyond what epoxy holds, {EPOXY.tensile_strength / 1e6:g} MPa in tension, "
     f"{EPOXY.cohesion / 1e6:g} MPa and friction in shear"
 )
+_Columns: TypeAlias = "Mapping[str, Sequence[Any]] | pd.DataFrame"
+"""A table of `analyze`, or its columns by name: where no table is needed, pandas takes long."""
+_Held = tuple[int, int, tuple[int, ...]]
+"""Number of a step, its bricks, and what is held."""
 OUTSIDE = "outside the linear range"
 REMEDY = (
     "Do not rely on numbers outside the linear range. Check sizes, densities and stiffnesses of "
@@ -94,7 +99,7 @@ class LinearRange:
         return FAR * min(min(brick.dimensions) for brick in self._network.scene.bricks)
 
     def departures(
-        self, table: pd.DataFrame, fields: Iterable[Fields] | None = None
+        self, table: _Columns, fields: Iterable[Fields] | None = None
     ) -> tuple[Departure, ...]:
         """Return the limits that the steps of a build leave.
 
@@ -110,9 +115,10 @@ class LinearRange:
         ()
         """
         shift, far = RESPONSES["D_max"], self.far
-        moved = table[shift.column].to_numpy(float) / shift.scale
+        moved = np.asarray(table[shift.column], dtype=float) / shift.scale
         turned, strained, stressed = self._measured(table, fields)[:, :3].T
         stressed = np.where(self._breaks, -np.inf, stressed)
+        steps = np.asarray(table["step"], dtype=int)
         within = f", more than {length_text(far)}, a tenth of the smallest side of a brick"
         deformed = f"{{:.3g}} times its thickness, more than {_STRAIN:g} times".format
         found = (
@@ -122,7 +128,7 @@ class LinearRange:
             ("stress in a joint", stressed, 0.0, lambda most: _STRESSED.format(most / 1e6)),
         )
         return tuple(
-            Departure(what, say(float(values[over].max())), tuple(map(int, table["step"][over])))
+            Departure(what, say(float(values[over].max())), tuple(steps[over].tolist()))
             for what, values, most, say in found
             if (over := ~(values <= most)).any()  # what is not a number is not within
         )
@@ -135,11 +141,11 @@ class LinearRange:
             self._known[step.bricks, numbers] = found
         return fields
 
-    def of_builds(self, tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[Departure, ...]]:
+    def of_builds(self, tables: Mapping[str, _Columns]) -> dict[str, tuple[Departure, ...]]:
         """Return the limits that builds leave, for those that leave any, by name."""
         return {name: left for name, each in tables.items() if (left := self.departures(each))}
 
-    def closest(self, table: pd.DataFrame) -> tuple[float, str, int]:
+    def closest(self, table: _Columns) -> tuple[float, str, int]:
         """Return which joint comes closest to its elastic limits: Pa below them, name and step.
 
         Negative beyond them; NaN, without a joint, where that is not known.
@@ -149,18 +155,15 @@ class LinearRange:
         if self._limits is None or not np.isfinite(excess[at]):
             return np.nan, "", 0
         name = self._limits.assembly.contact_name[int(joint[at])]
-        return -float(excess[at]), f"joint {name}", int(table["step"].iloc[at])
+        return -float(excess[at]), f"joint {name}", int(np.asarray(table["step"])[at])
 
-    def _measured(self, table: pd.DataFrame, fields: Iterable[Fields] | None) -> Floats:
+    def _measured(self, table: _Columns, fields: Iterable[Fields] | None) -> Floats:
         """Return rotation, strain, excess of stress and in which joint, of every step, (n, 4)."""
         if fields is not None:
             return np.array([self._of(each) for each in fields])
         if isinstance(self._engine, DiscreteEngine):
-            return np.full((len(table), 4), -np.inf)  # whoever goes far is unstable there
-        scene = self._network.scene
-        nodes = table[[f"{robot.name}_node" for robot in scene.robots]].to_numpy(object)
-        pairs = zip(table["bricks"].astype(int).tolist(), nodes, strict=True)
-        keys = [(b, scene.grip_numbers([_node(n) for n in row], b)) for b, row in pairs]
+            return np.full((len(table["step"]), 4), -np.inf)  # whoever goes far is unstable there
+        keys = [(bricks, held) for _, bricks, held in held_in_table(self._network.scene, table)]
         for key in keys:  # in order: engines grow with the build
             if not key[0]:
                 self._known[key] = np.array([0.0, 0.0, -np.inf, 0.0])
@@ -248,7 +251,31 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
 
 def response_table(network: Network, answers: Iterable[tuple[Step, Fields]]) -> pd.DataFrame:
     """Return a row of responses for every step, as `analyze` does, from the fields of each."""
-    return pd.DataFrame([_row(network, step, fields) for step, fields in answers])
+    return _table_of(_response_columns(network, answers))
+
+
+def _response_columns(
+    network: Network, answers: Iterable[tuple[Step, Fields]]
+) -> dict[str, list[object]]:
+    """Return the columns of that table, with None where a robot does not grip."""
+    rows = [_row(network, step, fields) for step, fields in answers]
+    return {name: [row[name] for row in rows] for name in rows[0]} if rows else {}
+
+
+def _table_of(columns: _Columns) -> pd.DataFrame:
+    """Return a table of columns."""
+    filled = {name: [pd.NA if v is None else v for v in each] for name, each in columns.items()}
+    return pd.DataFrame(filled)
+
+
+def held_in_table(scene: Scene, table: _Columns) -> list[_Held]:
+    """Return what is held in every step of a table of `analyze`."""
+    nodes = zip(*(table[f"{robot.name}_node"] for robot in scene.robots), strict=True)
+    bricks = [int(count) for count in table["bricks"]]
+    held = (
+        scene.grip_numbers([_node(n) for n in row], b) for row, b in zip(nodes, bricks, strict=True)
+    )
+    return [*zip(map(int, table["step"]), bricks, held, strict=True)]
 
 
 def force_column(robot: Robot) -> str:
@@ -290,7 +317,8 @@ def _grips_of(scene: Scene, step: Step) -> Ints:
 
 def _node(cell: object) -> int | None:
     """Return the node that a cell of a table names, None if it is empty."""
-    return int(cell) if pd.notna(cell) else None  # type: ignore[call-overload]
+    known = isinstance(cell, float | int | np.number) and not np.isnan(cell)
+    return int(cell) if known else None  # type: ignore[call-overload]
 
 
 @contextmanager
@@ -332,8 +360,8 @@ def _row(network: Network, step: Step, fields: Fields) -> dict[str, object]:
     forces = iter(require_finite("grip force", grip_forces(network, fields), step.bricks)[0])
     row: dict[str, object] = {"step": step.number, "type": step.kind.value, "bricks": step.bricks}
     for robot, node in zip(scene.robots, step.grips, strict=True):
-        row[f"{robot.name}_brick"] = pd.NA if node is None else scene.brick_of_node[node].name
-        row[f"{robot.name}_node"] = pd.NA if node is None else node
+        row[f"{robot.name}_brick"] = None if node is None else scene.brick_of_node[node].name
+        row[f"{robot.name}_node"] = node
     for robot, node in zip(scene.robots, step.grips, strict=True):
         row[force_column(robot)] = np.nan if node is None else next(forces)
     for response in RESPONSES.values():

@@ -10,8 +10,6 @@ from functools import cached_property
 from math import ceil, isfinite
 from typing import Any
 
-import pandas as pd
-
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import (
     asked_prover,
@@ -86,6 +84,7 @@ from seqopt.problem._arms import faults_in_words
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import OWN, overloads
 from seqopt.responses._tolerance import value_text
+from seqopt.responses.table import _Columns
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
@@ -290,7 +289,7 @@ def _how(options: argparse.Namespace, formulation: Formulation) -> dict[str, Any
 def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...]) -> Answer:
     """Return what a plan is worth, once it is written."""
     plan = found.plan
-    table, scene = plan.responses(), plan.engine.network.scene
+    table, scene = plan._columns, plan.engine.network.scene
     stopped = plan.ended is End.INTERRUPTED
     over = () if stopped else exceeded(scene, table)
     enough = _enough_payload(scene, table) if over else ()
@@ -301,7 +300,7 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
     lines += [wrapped(found.whole)] if found.whole else []
     facts: dict[str, object] = {
         "scene": scene_facts(scene),
-        "summary": found.report,
+        "summary": lambda: found.report,
         "proof": _proof(plan),
     }
     if found.bases is not None:
@@ -314,7 +313,7 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
         lines.append(wrapped(", ".join(map(str, order)), first="order: "))
     arms = () if plan.arms is None else (f"arms: {plan.arms}",)
     answer = Answer(
-        facts={**facts, "plan": table},
+        facts={**facts, "plan": plan.responses},
         text="\n".join([*lines, *(f"payload exceeded: {excess}" for excess in over), *enough]),
         written=written,
         notes=(
@@ -332,7 +331,7 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
     return strictly(answer, options, over, plan.departures, found.verdicts, unreached)
 
 
-def _enough_payload(scene: Scene, table: pd.DataFrame) -> tuple[str, ...]:
+def _enough_payload(scene: Scene, table: _Columns) -> tuple[str, ...]:
     """Return which payload of every robot is enough for a plan in which one is exceeded."""
     least = max((ceil(excess.largest) for excess in overloads(scene, table)), default=None)
     how = f"--payload {least}, or payload of its robots in the scene file"
