@@ -20,11 +20,10 @@ from seqopt.network.network import Network
 from seqopt.plan.build import ShownBuild
 from seqopt.problem._arms import arm_faults
 from seqopt.problem.requirements import _prop_faults, overloads
-from seqopt.report.comparison import idle_note
 from seqopt.responses.table import OUTSIDE, REMEDY, _Columns
 from seqopt.scene.scene import Scene, in_order
 from seqopt.sequence.rules import with_robots
-from seqopt.sequence.steps import AnyStep, Step
+from seqopt.sequence.steps import AnyStep, Step, _idle_note
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
@@ -115,7 +114,7 @@ def level_notes(engine: Engine) -> tuple[str, ...]:
 
 def idle_notes(scene: Scene, steps: Sequence[AnyStep]) -> tuple[str, ...]:
     """Return the robots that never grip, in words."""
-    return tuple(idle_note(scene, "robots", steps))
+    return tuple(_idle_note(scene, "robots", steps))
 
 
 def exceeded(scene: Scene, *tables: _Columns) -> tuple[str, ...]:

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from importlib import import_module
 from types import ModuleType
 
 from seqopt._cli.answer import Answer, Status, print_answer, status_of
@@ -34,13 +33,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
-class _Later(ModuleType):
-    """A library that is loaded when something of it is asked for."""
+class _LaterPandas(ModuleType):
+    """Stands for pandas until something of it is asked for."""
 
     def __getattr__(self, name: str) -> object:
-        if sys.modules.get(self.__name__) is self:
-            del sys.modules[self.__name__]
-        return getattr(import_module(self.__name__), name)
+        if sys.modules.get("pandas") is self:
+            del sys.modules["pandas"]
+        import pandas as pd  # noqa: PLC0415  # that is what it is for
+
+        return getattr(pd, name)
 
 
 def load(words: Sequence[str]) -> None:
@@ -51,7 +52,7 @@ def load(words: Sequence[str]) -> None:
     """
     asked = asked_command(words)
     if asked in COMMANDS:
-        sys.modules.setdefault("pandas", _Later("pandas"))
+        sys.modules.setdefault("pandas", _LaterPandas("pandas"))
         if any(map(os.path.exists, words)):
             import jsonschema  # noqa: F401, PLC0415  # scene files need it
 

@@ -17,7 +17,6 @@ from seqopt.plan.calling.formulation import Formulation, as_formulation
 from seqopt.problem.criteria import Among, Ranked, RankSum
 from seqopt.problem.requirements import NEVER, Criterion, Limit, payload_limits
 from seqopt.problem.standing import Standing
-from seqopt.report.softness import _grip_range
 from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses.quantities import TOLERANCE
 from seqopt.responses.resources import Resources
@@ -132,6 +131,8 @@ def _parse_grip_range(text: str | None) -> tuple[float, ...]:
         raise SceneError(
             f"--grips {short(text)[1:-1]}: give the softest and the stiffest, 1e5..1e9"
         )
+    from seqopt.report.softness import _grip_range  # noqa: PLC0415  # compare alone needs it
+
     return _grip_range(*ends)
 
 

@@ -37,7 +37,7 @@ from seqopt.responses.table import Departure, LinearRange, analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule_file import MOST, find_schedule, parse_plan
-from seqopt.sequence.steps import AnyStep, idle_robots
+from seqopt.sequence.steps import _idle_note
 from seqopt.sequence.three_robots import modified_sequential
 from seqopt.sequence.two_robots import METHODS, degeneration
 from seqopt.stability._builds import BuildProver, BuildVerdicts
@@ -183,7 +183,7 @@ def _loop_notes(scene: Scene, loop: Layers | None) -> list[str]:
     """Return which robots never grip in a loop, in words."""
     if loop is None:
         return []
-    return idle_note(scene, f"{loop.schedule.method} loop", loop.schedule.steps)
+    return _idle_note(scene, f"{loop.schedule.method} loop", loop.schedule.steps)
 
 
 def _criteria(loop: Layers | None, free: Plan | None) -> dict[str, Criterion]:
@@ -358,19 +358,13 @@ def method_tables(
         tables[name] = analyze(engine, steps)
         why = degeneration(engine.network, name)
         notes += [f"{name}: {why}"] if why else []
-        notes += idle_note(scene, name, steps)
+        notes += _idle_note(scene, name, steps)
     if not tables:
         raise next(iter(refused.values()))
     if is_reference_arch(scene):
         tables[PUBLISHED] = analyze(engine, published_plan(scene))
     refusals = [f"{name}: not possible here; {error}" for name, error in refused.items()]
     return tables, refusals + notes
-
-
-def idle_note(scene: Scene, name: str, steps: Iterable[AnyStep]) -> list[str]:
-    """Return a note that names the robots which never grip, or none."""
-    idle = idle_robots(scene, steps)
-    return [f"{name}: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}"] if idle else []
 
 
 def _free_criterion(criterion: Criterion, rows: Sequence[Mapping[str, float]]) -> Criterion:

@@ -13,7 +13,6 @@ from pathlib import Path
 from seqopt._files import read_text
 from seqopt.errors import SceneError, StepError, did_you_mean
 from seqopt.scene._checks import as_float, short
-from seqopt.scene.imports.formats import import_scene
 from seqopt.scene.scenarios import as_built
 from seqopt.scene.scene import Scene, in_order
 from seqopt.sequence.schedule import Move, OpenGrip, Schedule
@@ -76,6 +75,8 @@ def _measured(scene: Scene, told: object, where: str) -> Scene:
 def read_measured(scene: Scene, path: Path) -> dict[int, tuple[float, ...]]:
     """Return where bricks were measured, m, from a CSV file (brick, x, y, z) or of COMPAS."""
     if path.suffix == ".json":
+        from seqopt.scene.imports.formats import import_scene  # noqa: PLC0415  # few files are
+
         found = {brick.name: brick.position for brick in import_scene(path).bricks}
         own = {brick.name: brick.position for brick in scene.bricks}
         return {n: p for n, p in found.items() if n not in own or math.dist(own[n], p) > SAME}

@@ -82,6 +82,12 @@ def idle_robots(scene: Scene, steps: Iterable[AnyStep]) -> tuple[str, ...]:
     return tuple(robot.name for i, robot in enumerate(scene.robots) if i not in busy)
 
 
+def _idle_note(scene: Scene, name: str, steps: Iterable[AnyStep]) -> list[str]:
+    """Return a note that names the robots which never grip, or none."""
+    idle = idle_robots(scene, steps)
+    return [f"{name}: {', '.join(idle)} never grip{'s' * (len(idle) == 1)}"] if idle else []
+
+
 def require_steps(steps: Sequence[Step]) -> Sequence[Step]:
     """Return steps if that is what they are; a schedule whose grips are open is not."""
     if not isinstance(steps, Sequence) or not all(isinstance(step, Step) for step in steps):

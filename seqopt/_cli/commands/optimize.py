@@ -78,7 +78,6 @@ from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.out_of_sample import Trial, judge_unseen, worst_values
 from seqopt.plan.plan import Plan
-from seqopt.plan.policy import FILE, find_policy
 from seqopt.plan.solving import solve, usual
 from seqopt.problem._arms import faults_in_words
 from seqopt.problem.problem import Problem
@@ -225,6 +224,8 @@ def answered(options: argparse.Namespace, found: Found) -> Answer:
         choices = getattr(options, "tables", None) == "all"
         made = plan_files(plan, found.report, found.prover, found.trial, choices=choices)
         if getattr(options, "policy", False):
+            from seqopt.plan.policy import FILE, find_policy  # noqa: PLC0415  # few ask for one
+
             made[FILE] = find_policy(found.asked.problem, options.tell).content()
         name = "bases.csv" if found.props is None else "fewest_props.csv"
         return made if outer is None else made | {name: csv_text(outer.tried)}
