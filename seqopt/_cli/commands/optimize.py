@@ -361,9 +361,9 @@ def _said(found: Found) -> str:
             f"{how}: {plan.result} over {len(found.trial.known)} scenarios ({plan.title}); over "
             f"unseen ones {unseen['robust']:.6g}, the nominal plan {unseen['nominal']:.6g}"
         )
-    counts = f"{plan.models} models"
+    counts = f"{plan.models:,} models"
     if isinstance(plan.graph, States):
-        counts = f"{len(plan.steps)} steps, {plan.regrips} regrips, {counts}"
+        counts = f"{len(plan.steps)} steps, {plan.regrips} regrip{'s' * (plan.regrips != 1)}, {counts}"
         return f"{how}: {plan.result}; {counts}"
     return f"{how}: {plan.result}, {counts}"
 
@@ -378,11 +378,11 @@ def _posed_notes(problem: Problem) -> tuple[str, ...]:
 
 def _proof(plan: Plan) -> str:
     """Return which proof was enough, and what another could still change."""
-    proof, looked = plan.certificate, f"{plan.models} models"
+    proof, looked = plan.certificate, f"{plan.models:,} models"
     if proof is None or plan.gap is None:
         return "none; how much better another plan may be is not known"
     if proof.states:
-        looked += f" and {proof.states} state{'s' * (proof.states > 1)}"
+        looked += f" and {proof.states:,} state{'s' * (proof.states > 1)}"
     other = "no other plan among these" if plan.among else "no other plan"
     better = (
         "is better" if plan.gap <= TOLERANCE else f"is better by more than {100 * plan.gap:.3g} %"
