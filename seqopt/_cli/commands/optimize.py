@@ -363,7 +363,8 @@ def _said(found: Found) -> str:
         )
     counts = f"{plan.models:,} models"
     if isinstance(plan.graph, States):
-        counts = f"{len(plan.steps)} steps, {plan.regrips} regrip{'s' * (plan.regrips != 1)}, {counts}"
+        regrips = f"{plan.regrips} regrip{'s' * (plan.regrips != 1)}"
+        counts = f"{len(plan.steps)} steps, {regrips}, {counts}"
         return f"{how}: {plan.result}; {counts}"
     return f"{how}: {plan.result}, {counts}"
 
