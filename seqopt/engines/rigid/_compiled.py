@@ -19,7 +19,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 
-_SIDE_BY_SIDE = 32  # sets
+_SIDE_BY_SIDE = 16  # sets: a number that is known when loops are compiled
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
@@ -50,15 +50,14 @@ def solve_grips(
     held: tuple[Ints, Ints],
     force: Floats,
     pivot: Floats,
-) -> int:
-    """Find the forces (S, k) that undo the displacements (l,) at grips, and scaled pivots (S, k).
+) -> None:
+    """Find the forces (S, k) that undo the displacements (l,) at grips, and scaled pivots (k, S).
 
     As ``_solve_positive`` of `seqopt.engines.rigid._grip_equations`, of rigid grips. ``axis`` (b,
-    d): along bricks; ``held`` (S, r), (S, k): nodes and their loads. Result: how many pairs of
-    grips share a brick.
+    d): along bricks; ``held`` (S, r), (S, k): nodes and their loads.
     """
     columns, index = held
-    (sets, count), pairs = index.shape, 0
+    sets, count = index.shape
     low = np.empty((count, count, _SIDE_BY_SIDE))
     share, pivots, own = np.empty((3, count, _SIDE_BY_SIDE))
     for start in range(0, sets, _SIDE_BY_SIDE):
@@ -68,7 +67,7 @@ def solve_grips(
                 for j in range(i + 1):
                     low[i, j, s] = flexibility[at[i], at[j]]
                 share[i, s] = -dead[at[i]]
-            pairs += _brace(low, s, axis, columns[min(start + s, sets - 1)]) * (start + s < sets)
+            _brace(low, s, axis, columns[min(start + s, sets - 1)])
             for i in range(count):
                 own[i, s] = low[i, i, s]
         _eliminate(low, pivots)
@@ -76,14 +75,13 @@ def solve_grips(
         for s in range(min(_SIDE_BY_SIDE, sets - start)):
             for i in range(count):
                 force[start + s, i] = share[i, s]
-                pivot[start + s, i] = pivots[i, s] / own[i, s]
-    return pairs
+                pivot[i, start + s] = pivots[i, s] / own[i, s]
 
 
 @_compiled()
-def _brace(low: Floats, s: int, axis: Floats, columns: Ints) -> int:
-    """Give the force between two grips on one brick a flexibility; return how many pairs."""
-    pairs, width, scale = 0, axis.shape[1], 0.0
+def _brace(low: Floats, s: int, axis: Floats, columns: Ints) -> None:
+    """Give the force between two grips on one brick a flexibility, so that there is one answer."""
+    width, scale = axis.shape[1], 0.0
     for i in range(len(low)):
         scale += low[i, i, s]
     for second in range(1, len(columns)):
@@ -91,7 +89,6 @@ def _brace(low: Floats, s: int, axis: Floats, columns: Ints) -> int:
             brick = columns[first] // 2
             if columns[second] // 2 != brick:
                 continue
-            pairs += 1
             f, g = width * first, width * second
             for i in range(width):
                 for j in range(width):
@@ -100,69 +97,84 @@ def _brace(low: Floats, s: int, axis: Floats, columns: Ints) -> int:
                         low[f + i, f + j, s] += more
                         low[g + i, g + j, s] += more
                     low[g + i, f + j, s] -= more
-    return pairs
 
 
 @_compiled()
 def share_pairs(
-    axis: Floats, inner: Floats, held: tuple[Ints, Ints], force: Floats, between: Ints
+    axis: Floats,
+    inner: tuple[Ints, Floats],
+    held: tuple[Ints, Ints],
+    force: Floats,
+    size: Floats,
+    idle: Ints,
 ) -> None:
-    """Let each of two grips on one brick take what reaches its own node, in place.
+    """Find what each grip bears, where each of two on one brick takes what reaches its own node.
 
-    As ``share_pairs`` of `seqopt.engines.rigid._grip_equations`. ``inner`` (l + 1, b): what loads
-    mean to the inner edges; ``between`` (S, p): the bricks whose inner edges then carry nothing,
-    -1 for none.
+    As ``share_pairs`` of `seqopt.engines.rigid._grip_equations`. ``inner`` (b,), (l + 1, b): the
+    inner edges, and what loads mean to them; ``size`` (S, r): of the forces; ``idle`` (S, p): inner
+    edges that carry nothing then, -1 for none.
     """
     columns, index = held
-    width = axis.shape[1]
+    edge, mean = inner
+    width, own = axis.shape[1], np.empty(force.shape[1])
     for s in range(len(columns)):
         pairs, at = 0, columns[s]
+        own[:] = force[s]
         for second in range(1, len(at)):
             for first in range(second):
                 brick = at[first] // 2
                 if at[second] // 2 != brick:
                     continue
-                carried = inner[-1, brick]
-                for k in range(index.shape[1]):
-                    carried += force[s, k] * inner[index[s, k], brick]
-                between[s, pairs] = brick
+                carried = mean[-1, brick]
+                for k in range(len(own)):
+                    carried += own[k] * mean[index[s, k], brick]
+                idle[s, pairs] = edge[brick]
                 pairs += 1
                 carried *= 1.0 - 2.0 * (at[first] % 2)  # the axis leads to the second node
                 for i in range(width):
-                    force[s, width * first + i] += carried * axis[brick, i]
-                    force[s, width * second + i] -= carried * axis[brick, i]
+                    own[width * first + i] += carried * axis[brick, i]
+                    own[width * second + i] -= carried * axis[brick, i]
+        for grip in range(len(at)):
+            squared = 0.0
+            for i in range(width * grip, width * grip + width):
+                squared += own[i] * own[i]
+            size[s, grip] = np.sqrt(squared)
 
 
 @_compiled()
 def _eliminate(low: Floats, pivots: Floats) -> None:
     """Turn lower triangles (k, k, w) into their factors, with reciprocals of the pivots (k, w)."""
-    count, _, wide = low.shape
+    count = len(low)
+    row = np.empty((count, _SIDE_BY_SIDE))
     for j in range(count):
+        for k in range(j):
+            for s in range(_SIDE_BY_SIDE):
+                row[k, s] = low[j, k, s] * pivots[k, s]
         for i in range(j, count):
             for k in range(j):
-                for s in range(wide):
-                    low[i, j, s] -= low[i, k, s] * low[j, k, s] * pivots[k, s]
-        for s in range(wide):
+                for s in range(_SIDE_BY_SIDE):
+                    low[i, j, s] -= low[i, k, s] * row[k, s]
+        for s in range(_SIDE_BY_SIDE):
             pivots[j, s] = low[j, j, s]
             low[j, j, s] = 1.0 / low[j, j, s]
         for i in range(j + 1, count):
-            for s in range(wide):
+            for s in range(_SIDE_BY_SIDE):
                 low[i, j, s] *= low[j, j, s]
 
 
 @_compiled()
 def _substitute(low: Floats, share: Floats) -> None:
     """Turn loads (k, w) into answers."""
-    count, wide = share.shape
+    count = len(share)
     for i in range(count):
         for k in range(i):
-            for s in range(wide):
+            for s in range(_SIDE_BY_SIDE):
                 share[i, s] -= low[i, k, s] * share[k, s]
     for i in range(count - 1, -1, -1):
-        for s in range(wide):
+        for s in range(_SIDE_BY_SIDE):
             share[i, s] *= low[i, i, s]
         for k in range(i + 1, count):
-            for s in range(wide):
+            for s in range(_SIDE_BY_SIDE):
                 share[i, s] -= low[k, i, s] * share[k, s]
 
 

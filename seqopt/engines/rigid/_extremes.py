@@ -136,7 +136,7 @@ def can_compile() -> bool:
 class _Loops(NamedTuple):
     """The compiled functions."""
 
-    solve_grips: Callable[..., int]
+    solve_grips: Callable[..., None]
     share_pairs: Callable[..., None]
     reduce_rows: Callable[..., None]
 
@@ -152,27 +152,32 @@ def _loops() -> _Loops:
 class Solved(NamedTuple):
     """Forces of rigid grips as compiled loops find them.
 
-    ``force`` (S, k): at loads, N; ``pivot`` (S, k): scaled; ``shared`` (S, k): forces, what is
-    between two grips on one brick shared by them; ``idle`` (S, q): edges that carry nothing then.
+    ``force`` (S, k): at loads, N; ``pivot`` (k, S): scaled; ``size`` (S, r): of the forces of
+    grips, what is between two on one brick shared by them; ``idle`` (S, q): edges that carry
+    nothing then.
     """
 
     force: Floats
     pivot: Floats
-    shared: Floats
+    size: Floats
     idle: Ints
 
 
 def solve_compiled(operator: ComplianceOperator, columns: Ints, index: Ints) -> Solved:
     """Return what rigid grips exert on nodes (S, r), which are loads (S, k)."""
-    force, pivot = np.empty(index.shape), np.empty(index.shape)
-    flexibility, dead, axis = operator.flexibility, operator.dead_displacement, operator.axis
-    loops, held = _loops(), (columns, index)
-    if not loops.solve_grips(flexibility, dead, axis, held, force, pivot):
-        return Solved(force, pivot, force, np.empty((len(columns), 0), dtype=np.int64))
-    inner = operator.made("inner edges", lambda: _inner(operator))
-    shared, idle = force.copy(), np.full((len(columns), columns.shape[1] // 2), -1)
-    loops.share_pairs(axis, inner, held, shared, idle)
-    return Solved(force, pivot, shared, np.where(idle < 0, -1, operator.inner_edge[idle]))
+    (sets, grips), axis, loops = columns.shape, operator.axis, _loops()
+    found = Solved(
+        force=np.empty(index.shape),
+        pivot=np.empty(index.shape[::-1]),
+        size=np.empty(columns.shape),
+        idle=np.full((sets, grips // 2), -1),
+    )
+    flexibility, dead, held = operator.flexibility, operator.dead_displacement, (columns, index)
+    loops.solve_grips(flexibility, dead, axis, held, found.force, found.pivot)
+    mean = operator.made("inner edges", lambda: _inner(operator))
+    inner = operator.inner_edge, mean
+    loops.share_pairs(axis, inner, held, found.force, found.size, found.idle)
+    return found
 
 
 def _inner(operator: ComplianceOperator) -> Floats:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import prod
+from math import isfinite, prod
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -149,14 +149,20 @@ def _try_extremes(
 
     These are the sets that an operator alone answers not well enough.
     """
-    index = operator.load_index(columns)
-    force, pivot, shared, idle = solve_compiled(operator, columns, index)
-    apart = ~trusted(operator, index, _GripForces(force, pivot.T), accuracy / _UNSEEN)
-    force[apart] = 0.0
-    found = extremes_of(rows_of(operator, want), index, force, idle)
-    each = shared.reshape(*columns.shape, operator.directions)
-    size = np.sqrt((each * each).sum(axis=2))
-    return found, size, apart | ~np.isfinite(found).all(axis=0)
+    sets = len(columns)
+    found, size, apart = np.empty((4, sets)), np.empty(columns.shape), np.empty(sets, dtype=bool)
+    for start in range(0, sets, _CHUNK):
+        part = slice(start, start + _CHUNK)
+        index = operator.load_index(columns[part])
+        force, pivot, size[part], idle = solve_compiled(operator, columns[part], index)
+        wrong = ~trusted(operator, index, _GripForces(force, pivot), accuracy / _UNSEEN)
+        if np.count_nonzero(wrong):
+            force[wrong] = 0.0
+        found[:, part] = extremes_of(rows_of(operator, want), index, force, idle)
+        apart[part] = wrong
+    if not isfinite(found.sum()):
+        apart |= ~np.isfinite(found).all(axis=0)
+    return found, size, apart
 
 
 _KEPT = 32e6  # bytes of operators that may stay when another is made
