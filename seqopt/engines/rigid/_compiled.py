@@ -58,16 +58,17 @@ def solve_grips(
     """
     columns, index = held
     sets, count = index.shape
-    low = np.empty((count, count, _SIDE_BY_SIDE))
+    low, at = np.empty((count, count, _SIDE_BY_SIDE)), np.empty(count, dtype=np.int64)
     share, pivots, own = np.empty((3, count, _SIDE_BY_SIDE))
     for start in range(0, sets, _SIDE_BY_SIDE):
         for s in range(_SIDE_BY_SIDE):
-            at = index[min(start + s, sets - 1)]
+            mine = min(start + s, sets - 1)
             for i in range(count):
+                at[i] = index[mine, i]
                 for j in range(i + 1):
                     low[i, j, s] = flexibility[at[i], at[j]]
                 share[i, s] = -dead[at[i]]
-            _brace(low, s, axis, columns[min(start + s, sets - 1)])
+            _brace(low, s, axis, columns, mine)
             for i in range(count):
                 own[i, s] = low[i, i, s]
         _eliminate(low, pivots)
@@ -79,15 +80,15 @@ def solve_grips(
 
 
 @_compiled()
-def _brace(low: Floats, s: int, axis: Floats, columns: Ints) -> None:
+def _brace(low: Floats, s: int, axis: Floats, columns: Ints, mine: int) -> None:
     """Give the force between two grips on one brick a flexibility, so that there is one answer."""
     width, scale = axis.shape[1], 0.0
     for i in range(len(low)):
         scale += low[i, i, s]
-    for second in range(1, len(columns)):
+    for second in range(1, columns.shape[1]):
         for first in range(second):
-            brick = columns[first] // 2
-            if columns[second] // 2 != brick:
+            brick = columns[mine, first] // 2
+            if columns[mine, second] // 2 != brick:
                 continue
             f, g = width * first, width * second
             for i in range(width):
@@ -179,44 +180,51 @@ def _substitute(low: Floats, share: Floats) -> None:
 
 
 @_compiled()
-def _sum_into(out: Floats, rows: Floats, at: Ints, force: Floats) -> None:
-    """Find what the weight, the last of the rows (l + 1, n), and forces at others mean."""
-    count, done = len(at), 0
+def _sum_into(out: Floats, rows: Floats, part: int, loads: tuple[Ints, Floats], s: int) -> None:
+    """Find what the weight, the last of the rows (p, l + 1, n), and forces of a set mean in a part.
+
+    Rows are not cut out, for each part and set: it takes as long as summing a hundred numbers.
+    """
+    index, force = loads
+    count, done, weight = index.shape[1], 0, rows.shape[1] - 1
     if count >= 9:
-        done = _sum_nine(out, rows, at, force)
+        done = _sum_nine(out, rows, part, loads, s)
     elif count >= 6:
-        done = _sum_six(out, rows, at, force)
+        done = _sum_six(out, rows, part, loads, s)
     else:
-        out[:] = rows[-1]
-    for k in range(done, count):
-        own, much = rows[at[k]], force[k]
         for n in range(len(out)):
-            out[n] += much * own[n]
+            out[n] = rows[part, weight, n]
+    for k in range(done, count):
+        at, much = index[s, k], force[s, k]
+        for n in range(len(out)):
+            out[n] += much * rows[part, at, n]
 
 
 @_compiled()
-def _sum_nine(out: Floats, rows: Floats, at: Ints, force: Floats) -> int:
+def _sum_nine(out: Floats, rows: Floats, m: int, loads: tuple[Ints, Floats], s: int) -> int:
     """Begin a sum with the weight and nine loads: three grips in space."""
-    weight, a, b, c, d = rows[-1], rows[at[0]], rows[at[1]], rows[at[2]], rows[at[3]]
-    e, f, g, h, i = rows[at[4]], rows[at[5]], rows[at[6]], rows[at[7]], rows[at[8]]
-    p, q, r, s, t, u = force[0], force[1], force[2], force[3], force[4], force[5]
-    v, w, x = force[6], force[7], force[8]
+    at, force = loads
+    last, a, b, c, d = rows.shape[1] - 1, at[s, 0], at[s, 1], at[s, 2], at[s, 3]
+    e, f, g, h, i = at[s, 4], at[s, 5], at[s, 6], at[s, 7], at[s, 8]
+    p, q, r, t, u = force[s, 0], force[s, 1], force[s, 2], force[s, 3], force[s, 4]
+    v, w, x, y = force[s, 5], force[s, 6], force[s, 7], force[s, 8]
     for n in range(len(out)):
-        first = weight[n] + p * a[n] + q * b[n] + r * c[n]
-        second = s * d[n] + t * e[n] + u * f[n]
-        out[n] = first + second + v * g[n] + w * h[n] + x * i[n]
+        first = rows[m, last, n] + p * rows[m, a, n] + q * rows[m, b, n] + r * rows[m, c, n]
+        second = t * rows[m, d, n] + u * rows[m, e, n] + v * rows[m, f, n]
+        out[n] = first + second + w * rows[m, g, n] + x * rows[m, h, n] + y * rows[m, i, n]
     return 9
 
 
 @_compiled()
-def _sum_six(out: Floats, rows: Floats, at: Ints, force: Floats) -> int:
+def _sum_six(out: Floats, rows: Floats, m: int, loads: tuple[Ints, Floats], s: int) -> int:
     """Begin a sum with the weight and six loads: two grips in space."""
-    weight, a, b, c, d = rows[-1], rows[at[0]], rows[at[1]], rows[at[2]], rows[at[3]]
-    e, f = rows[at[4]], rows[at[5]]
-    p, q, r, s, t, u = force[0], force[1], force[2], force[3], force[4], force[5]
+    at, force = loads
+    last, a, b, c, d = rows.shape[1] - 1, at[s, 0], at[s, 1], at[s, 2], at[s, 3]
+    e, f = at[s, 4], at[s, 5]
+    p, q, r, t, u, v = force[s, 0], force[s, 1], force[s, 2], force[s, 3], force[s, 4], force[s, 5]
     for n in range(len(out)):
-        first = weight[n] + p * a[n] + q * b[n] + r * c[n]
-        out[n] = first + s * d[n] + t * e[n] + u * f[n]
+        first = rows[m, last, n] + p * rows[m, a, n] + q * rows[m, b, n] + r * rows[m, c, n]
+        out[n] = first + t * rows[m, d, n] + u * rows[m, e, n] + v * rows[m, f, n]
     return 6
 
 
@@ -234,14 +242,13 @@ def reduce_rows(
     and of how many edges in all; ``idle`` (S, q): edges that carry nothing, -1 for none.
     """
     edges, nodes, ends, total = counts
-    index, force = loads
     out = np.empty(rows.shape[2])
     tension, x, y, z = out[:edges], out[edges:], out[edges + nodes :], out[edges + 2 * nodes :]
     behind = edges + 3 * nodes
     u, v, w = out[behind:], out[behind + ends :], out[behind + 2 * ends :]
     for part in range(len(rows)):
-        for s in range(len(index)):
-            _sum_into(out, rows[part], index[s], force[s])
+        for s in range(len(idle)):
+            _sum_into(out, rows, part, loads, s)
             for k in range(idle.shape[1]):
                 place = idle[s, k] - min(part * edges, total - edges)
                 if idle[s, k] >= 0 and 0 <= place < edges:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
 
 import numpy as np
 
@@ -91,9 +92,10 @@ class ComplianceOperator(FrozenValue):
         return frozen(out)
 
     @cached_property
-    def _nodes(self) -> Ints:
-        """Which of the nodes that are loaded each inner node is, (2b,)."""
-        return frozen(np.add.outer(2 * self.place, np.arange(2)).ravel())
+    def _loads_at(self) -> Ints:
+        """The loads at each inner node, (2b, w): forces, and then moments on its brick."""
+        nodes = np.add.outer(2 * self.place, np.arange(2)).reshape(2 * self.bricks, 1)
+        return frozen(_load_rows(nodes, self.directions, self.moments))
 
     @cached_property
     def shares(self) -> Floats:
@@ -120,13 +122,16 @@ class ComplianceOperator(FrozenValue):
 
     def load_index(self, columns: Ints) -> Ints:
         """Return which loads act at every grip, and after them all loose motions, (S, k)."""
-        every = len(self.held) == self.bricks
-        nodes = columns if every else self._nodes.take(columns)
-        rows = _load_rows(nodes, self.directions, self.moments)
+        each, width = self._loads_at.take(columns, axis=0), self.directions
+        if self.moments:  # those of all grips come after all forces
+            parts = each[:, :, :width], each[:, :, width:]
+            rows = np.hstack([part.reshape(len(part), prod(part.shape[1:])) for part in parts])
+        else:
+            rows = each.reshape(len(each), prod(each.shape[1:]))
         if self.loose:
             after = len(self.flexibility) - self.loose + np.arange(self.loose)
             rows = np.hstack([rows, np.tile(after, (len(rows), 1))])
-        return np.asarray(rows)
+        return rows
 
     def loads(self, index: Ints, force: Floats, weight: float = 1.0) -> Loads:
         """Return forces (S, k) at loads (S, k), and a share of the weight."""
