@@ -135,11 +135,18 @@ def share_pairs(
                 for i in range(width):
                     own[width * first + i] += carried * axis[brick, i]
                     own[width * second + i] -= carried * axis[brick, i]
-        for grip in range(len(at)):
-            squared = 0.0
-            for i in range(width * grip, width * grip + width):
-                squared += own[i] * own[i]
-            size[s, grip] = np.sqrt(squared)
+        _measure(own, size, s)
+
+
+@_compiled()
+def _measure(force: Floats, size: Floats, s: int) -> None:
+    """Find how large the forces (r, d) of a set are."""
+    width = len(force) // max(1, size.shape[1])
+    for grip in range(size.shape[1]):
+        squared = 0.0
+        for i in range(width * grip, width * grip + width):
+            squared += force[i] * force[i]
+        size[s, grip] = np.sqrt(squared)
 
 
 @_compiled()
@@ -148,9 +155,7 @@ def _eliminate(low: Floats, pivots: Floats) -> None:
     count = len(low)
     row = np.empty((count, _SIDE_BY_SIDE))
     for j in range(count):
-        for k in range(j):
-            for s in range(_SIDE_BY_SIDE):
-                row[k, s] = low[j, k, s] * pivots[k, s]
+        _pick_row(low, pivots, j, row)
         for i in range(j, count):
             for k in range(j):
                 for s in range(_SIDE_BY_SIDE):
@@ -161,6 +166,14 @@ def _eliminate(low: Floats, pivots: Floats) -> None:
         for i in range(j + 1, count):
             for s in range(_SIDE_BY_SIDE):
                 low[i, j, s] *= low[j, j, s]
+
+
+@_compiled()
+def _pick_row(low: Floats, pivots: Floats, j: int, row: Floats) -> None:
+    """Find a row of the factors, left of the diagonal, times the pivots."""
+    for k in range(j):
+        for s in range(_SIDE_BY_SIDE):
+            row[k, s] = low[j, k, s] * pivots[k, s]
 
 
 @_compiled()

@@ -231,7 +231,6 @@ def share_pairs(
         found = operator.answer("edge_force", index[sets], force[sets])
         between = found[np.arange(len(sets)), edges]
     shift = between[:, None] * pairs.axis
-    shift[columns[sets, pairs.first] % 2 == 1] *= -1.0  # the axis leads to the second node
     own = _count_grips(operator, force.shape[1]) * operator.directions
     nodes = force[:, :own].reshape(len(force), -1, pairs.axis.shape[1])
     nodes[sets, pairs.first] += shift

@@ -98,6 +98,11 @@ class ComplianceOperator(FrozenValue):
         return frozen(_load_rows(nodes, self.directions, self.moments))
 
     @cached_property
+    def across(self) -> Floats:
+        """Unit vectors from each inner node to the other of its brick, (2b, d)."""
+        return frozen(np.stack([self.axis, -self.axis], axis=1).reshape(-1, self.directions))
+
+    @cached_property
     def shares(self) -> Floats:
         """Roots of flexibilities, what weight adds to their sum, what makes it forces; (3, l)."""
         own = np.maximum(np.abs(self.flexibility.diagonal()), np.finfo(float).tiny)

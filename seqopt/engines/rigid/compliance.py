@@ -119,7 +119,7 @@ def _try_forces(
         good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN, own)
     if np.count_nonzero(good) < sets:
         force[~good] = 0.0
-    if len(pairs.sets):
+    if hands is not None and len(pairs.sets):
         pairs = pairs.only(pairs.rigid(hands, *columns.shape))
     if not even:
         good &= ~_cancels(operator, index, force)
