@@ -120,7 +120,7 @@ def share_pairs(
     width, own = axis.shape[1], np.empty(force.shape[1])
     for s in range(len(columns)):
         pairs, at = 0, columns[s]
-        own[:] = force[s]
+        own[:], idle[s] = force[s], -1
         for second in range(1, len(at)):
             for first in range(second):
                 brick = at[first] // 2

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.interface import Fields, Want
+from seqopt.engines.interface import Fields, Want, names_wanted
 from seqopt.engines.rigid._operator import ComplianceOperator
 
 _PART = 2**15  # numbers under all loads of a part: a quarter of a megabyte
@@ -56,31 +56,38 @@ class ExtremeRows(NamedTuple):
     counts: tuple[int, int, int]
     edges: int  # in all
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the rows."""
+        return self.rows.nbytes
 
-_OF = {"edge_force": (Want.EDGES, 1), "displacement": (Want.DISPLACEMENTS, 3)}
-_OF["support"] = Want.SUPPORT, 6  # of which the last three are taken
+
+_OF = {"edge_force": 1, "displacement": 3, "support": 6}  # of which the last three are taken
 
 
 def rows_of(operator: ComplianceOperator, want: Want) -> ExtremeRows:
     """Return what every load of an operator means to the extremes of some fields."""
+    asked = names_wanted(want).intersection(_OF)
+    return operator.made(("extremes", asked), lambda: _made_rows(operator, asked))
+
+
+def _made_rows(operator: ComplianceOperator, asked: frozenset[str]) -> ExtremeRows:
+    """Return the same of named fields."""
     loads, sizes = len(operator.twist), []
-    for name, (flag, size) in _OF.items():
-        sizes.append(operator.maps.count(name) // size if want & flag else 0)
+    for name, size in _OF.items():
+        sizes.append(operator.maps.count(name) // size if name in asked else 0)
     total = sizes[0] + 3 * (sizes[1] + sizes[2])
     parts = max(1, min(total * loads // _PART, total // _LEAST))
     edges, nodes, ends = (-(-size // parts) for size in sizes)
     counts = edges, nodes, ends
-    name = f"extremes of {sizes}"
-    return ExtremeRows(
-        operator.made(name, lambda: _by_part(operator, parts, counts)), counts, sizes[0]
-    )
+    return ExtremeRows(_by_part(operator, parts, counts), counts, sizes[0])
 
 
 def _by_part(operator: ComplianceOperator, parts: int, counts: tuple[int, int, int]) -> Floats:
     """Return the rows of an operator as of `ExtremeRows`."""
     width = counts[0] + 3 * (counts[1] + counts[2])
     rows, first = _in_lines(parts, len(operator.twist), width), 0
-    for count, (name, (_, size)) in zip(counts, _OF.items(), strict=True):
+    for count, (name, size) in zip(counts, _OF.items(), strict=True):
         if not count:
             continue
         found = operator.mean(name)
@@ -183,7 +190,7 @@ def solve_compiled(operator: ComplianceOperator, columns: Ints, index: Ints) -> 
         force=np.empty(index.shape),
         pivot=np.empty(index.shape[::-1]),
         size=np.empty(columns.shape),
-        idle=np.full((sets, grips // 2), -1),
+        idle=np.empty((sets, grips // 2), dtype=np.int64),
     )
     flexibility, dead, held = operator.flexibility, operator.dead_displacement, (columns, index)
     loops.solve_grips(flexibility, dead, axis, held, found.force, found.pivot)

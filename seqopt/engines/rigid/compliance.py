@@ -30,6 +30,7 @@ from seqopt.engines.interface import (
     Want,
     failing_in_a_line,
     grip_columns,
+    is_screen,
     keep_wanted,
     names_wanted,
     require_finite,
@@ -208,7 +209,7 @@ class ComplianceEngine(NamedEngine):
         tried: _Tried | None = None
         if bricks <= len(self._tree.spring):
             operator, even = self._operator(bricks, columns), bricks <= self._even
-            accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
+            accuracy = self._accepted(want)
             own = None if hands is None else hands.within(self._basis.force, self._basis.wrench)
             tried = _try_forces(operator, columns, own, even=even, accuracy=accuracy)
         sure = 0 if tried is None else np.count_nonzero(tried.trusted)
@@ -246,13 +247,17 @@ class ComplianceEngine(NamedEngine):
         if bricks <= min(self._even, len(self._tree.spring)):
             operator = self._operator(bricks, columns)
             if operator.few_loads(len(columns)):
-                accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
+                accuracy = self._accepted(want)
                 found, size, apart = _try_extremes(operator, columns, want, accuracy)
-        if apart.any():
+        if np.count_nonzero(apart):
             fields = self._found(bricks, columns[apart], None, want)
             rest = extremes_in(require_finite(fields, bricks, numbers[apart]), want)
             found[:, apart], size[apart] = rest[:4], rest.force
         return Extremes(found[0], found[1], found[2], found[3], size)
+
+    def _accepted(self, want: Want) -> float:
+        """Return the largest error of fields that is accepted, over the largest entry of each."""
+        return max(_SCREEN, self._accuracy) if is_screen(want) else self._accuracy
 
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
@@ -295,7 +300,7 @@ class ComplianceEngine(NamedEngine):
 
     def _refined(self, bricks: int, columns: Ints, hands: Hands | None, want: Want) -> Fields:
         """Return what is wanted of grip sets that the operator alone answers not well enough."""
-        largest = _SCREEN if want & Want.SCREEN else LAST_CORRECTION
+        largest = _SCREEN if is_screen(want) else LAST_CORRECTION
         operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
