@@ -119,23 +119,33 @@ def share_pairs(
     edge, mean = inner
     width, own = axis.shape[1], np.empty(force.shape[1])
     for s in range(len(columns)):
-        pairs, at = 0, columns[s]
-        own[:], idle[s] = force[s], -1
-        for second in range(1, len(at)):
+        pairs = 0
+        for k in range(len(own)):
+            own[k] = force[s, k]
+        for second in range(1, columns.shape[1]):
             for first in range(second):
-                brick = at[first] // 2
-                if at[second] // 2 != brick:
+                node, brick = columns[s, first], columns[s, first] // 2
+                if columns[s, second] // 2 != brick:
                     continue
-                carried = mean[-1, brick]
-                for k in range(len(own)):
-                    carried += own[k] * mean[index[s, k], brick]
                 idle[s, pairs] = edge[brick]
                 pairs += 1
-                carried *= 1.0 - 2.0 * (at[first] % 2)  # the axis leads to the second node
+                carried = _sum_of(mean, brick, index, s, own)
+                carried *= 1.0 - 2.0 * (node % 2)  # the axis leads to the second node
                 for i in range(width):
                     own[width * first + i] += carried * axis[brick, i]
                     own[width * second + i] -= carried * axis[brick, i]
+        for k in range(pairs, idle.shape[1]):
+            idle[s, k] = -1
         _measure(own, size, s)
+
+
+@_compiled()
+def _sum_of(mean: Floats, column: int, index: Ints, s: int, force: Floats) -> float:
+    """Return what the weight, the last row, and forces (k,) at the loads of a set mean."""
+    out = mean[len(mean) - 1, column]
+    for k in range(len(force)):
+        out += force[k] * mean[index[s, k], column]
+    return float(out)
 
 
 @_compiled()
