@@ -127,13 +127,11 @@ def trusted(
     out = np.asarray(most * lowest >= least)
     if np.count_nonzero(out) == len(out):
         return out
-    rest = np.flatnonzero(~out & (lowest > 0))
-    if len(rest) == len(out):
-        return np.asarray(_doubts(operator, index, found, hands) <= most)
-    if len(rest):
-        part = _GripForces(found.force[rest], found.pivot[:, rest])
-        own_hands = None if hands is None else hands.of(rest)
-        out[rest] = _doubts(operator, index[rest], part, own_hands) <= most
+    rest = slice(None) if len(out) <= _MANY else np.flatnonzero(~out & (lowest > 0))
+    part = _GripForces(found.force[rest], found.pivot[:, rest])
+    own_hands = None if hands is None else hands.of(rest)
+    sure = _doubts(operator, index[rest], part, own_hands) <= most
+    out[rest] |= sure & (lowest[rest] > 0)
     return out
 
 
