@@ -58,7 +58,8 @@ def solve_grips(
     """
     columns, index = held
     sets, count = index.shape
-    low, at = np.empty((count, count, _SIDE_BY_SIDE)), np.empty(count, dtype=np.int64)
+    low = np.empty((count, count, _SIDE_BY_SIDE))
+    at = np.empty(count, dtype=np.uint64)  # else each look-up asks whether it counts from the end
     share, pivots, own = np.empty((3, count, _SIDE_BY_SIDE))
     for start in range(0, sets, _SIDE_BY_SIDE):
         for s in range(_SIDE_BY_SIDE):
