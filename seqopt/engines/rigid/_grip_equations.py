@@ -83,7 +83,7 @@ class _GripForces(NamedTuple):
     @property
     def lowest(self) -> Floats:
         """The smallest pivot of each set, (S,): one where there are no grips."""
-        return np.asarray(self.pivot.min(axis=0, initial=1.0))
+        return np.asarray(np.minimum.reduce(self.pivot, axis=0, initial=1.0))
 
 
 def grip_forces(
