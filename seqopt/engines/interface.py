@@ -192,12 +192,6 @@ def names_wanted(want: Want) -> frozenset[str]:
     return frozenset(name for name, flag in FLAGS.items() if want & flag)
 
 
-@cache
-def is_screen(want: Want) -> bool:
-    """Return whether fields are only to be compared: kept, since flags take long to meet."""
-    return Want.SCREEN in want
-
-
 def keep_wanted(answer: Fields, want: Want) -> Fields:
     """Return fields without what is not asked for."""
     dropped = FLAGS.keys() - names_wanted(want)

@@ -13,7 +13,7 @@ Brick counts are best asked in ascending order: what all of them share grows in 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from math import isfinite, prod
 
 import numpy as np
@@ -30,7 +30,6 @@ from seqopt.engines.interface import (
     Want,
     failing_in_a_line,
     grip_columns,
-    is_screen,
     keep_wanted,
     names_wanted,
     require_finite,
@@ -59,6 +58,12 @@ _CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's ca
 ACCURACY = 1e-9  # largest error of fields over the largest of each
 _UNSEEN = 100 * np.finfo(float).eps  # largest error met, over what is read off the equations
 _CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
+
+
+@cache
+def _is_screen(want: Want) -> bool:
+    """Return whether fields are only to be compared; flags take long to meet."""
+    return Want.SCREEN in want
 
 
 @dataclass(frozen=True)
@@ -257,7 +262,7 @@ class ComplianceEngine(NamedEngine):
 
     def _accepted(self, want: Want) -> float:
         """Return the largest error of fields that is accepted, over the largest entry of each."""
-        return max(_SCREEN, self._accuracy) if is_screen(want) else self._accuracy
+        return max(_SCREEN, self._accuracy) if _is_screen(want) else self._accuracy
 
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
@@ -300,7 +305,7 @@ class ComplianceEngine(NamedEngine):
 
     def _refined(self, bricks: int, columns: Ints, hands: Hands | None, want: Want) -> Fields:
         """Return what is wanted of grip sets that the operator alone answers not well enough."""
-        largest = _SCREEN if is_screen(want) else LAST_CORRECTION
+        largest = _SCREEN if _is_screen(want) else LAST_CORRECTION
         operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
