@@ -102,7 +102,7 @@ def _by_part(operator: ComplianceOperator, parts: int, counts: tuple[int, int, i
 
 
 def _in_lines(parts: int, loads: int, width: int) -> Floats:
-    """Return zeros of which each row begins with a line of the processor's cache: a third faster.
+    """Return zeros of which each row begins with a line of the processor's cache: a fifth faster.
 
     Rows are longer by what is left of their last lines.
     """
