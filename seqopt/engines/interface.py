@@ -239,25 +239,30 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
         shape = numbers.shape
         raise GripError(f"grips have shape {shape}; give integer node numbers, (sets, grips)")
     numbers, _ = network.scene.grip_kinds.split(numbers)
-    known, index = network.index_of_grip
-    at = numbers.astype(np.int64, copy=False) - known[0]
-    other = known.take(at, mode="clip") != numbers
-    if np.count_nonzero(other):  # names are not consecutive, or wrong
-        at = np.searchsorted(known, numbers)
-        other = known.take(at, mode="clip") != numbers
-    columns = index.take(at, mode="clip")
-    wrong = other | (columns >= 2 * bricks)
-    if np.count_nonzero(wrong):  # some times as fast as ``any``
-        raise GripError(
-            f"grip on node {numbers[wrong][0]}: with {bricks} bricks the free nodes are "
-            f"{known[index < 2 * bricks].tolist()}"
-        )
+    before, index = network.index_from_first
+    columns = index.take(numbers.astype(np.int64, copy=False) - before, mode="clip")
+    if np.count_nonzero(columns >= 2 * bricks):  # some times as fast as ``any``
+        columns = _searched(network, bricks, numbers)
     first, second = columns.T.take(_couples(columns.shape[1]), axis=0)
     twice = first == second
     if np.count_nonzero(twice):
         named = numbers[twice.any(axis=0)][0].tolist()
         raise GripError(f"grip set {named}: a node is held twice; name it once")
     return np.asarray(columns, dtype=np.int64)
+
+
+def _searched(network: Network, bricks: int, numbers: Ints) -> Ints:
+    """Return the same of numbers of nodes, some of which are wrong or far from all others."""
+    known, index = network.index_of_grip
+    at = np.searchsorted(known, numbers)
+    columns = index.take(at, mode="clip")
+    wrong = (known.take(at, mode="clip") != numbers) | (columns >= 2 * bricks)
+    if wrong.any():
+        raise GripError(
+            f"grip on node {numbers[wrong][0]}: with {bricks} bricks the free nodes are "
+            f"{known[index < 2 * bricks].tolist()}"
+        )
+    return columns
 
 
 @cache

@@ -263,6 +263,19 @@ class Network(Shown, FrozenValue):
         blocked = np.isin(numbers[order], self.scene.blocked_nodes)
         return frozen((numbers[order], np.where(blocked, len(numbers), order)))
 
+    @cached_property
+    def index_from_first(self) -> tuple[int, Ints]:
+        """Number before the first of inner nodes, and what numbers from it on have for an index.
+
+        As `index_of_grip`; of numbers that it does not know, and beyond some gaps, it comes after
+        all others.
+        """
+        known, index = self.index_of_grip
+        near = known - known[0] < 2 * len(known)
+        out = np.full(2 * len(known) + 2, len(known))  # the first and the last stand for others
+        out[1 + known[near] - known[0]] = index[near]
+        return int(known[0]) - 1, frozen(out)
+
     def count_nodes(self, bricks: int) -> int:
         """Return how many nodes a partial structure has."""
         return int(np.searchsorted(self.node_since, bricks, side="right"))

@@ -19,7 +19,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 
-_SIDE_BY_SIDE = 32  # sets
+_SIDE_BY_SIDE = 16  # sets: a number that is known when loops are compiled
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
@@ -50,25 +50,26 @@ def solve_grips(
     held: tuple[Ints, Ints],
     force: Floats,
     pivot: Floats,
-) -> int:
-    """Find the forces (S, k) that undo the displacements (l,) at grips, and scaled pivots (S, k).
+) -> None:
+    """Find the forces (S, k) that undo the displacements (l,) at grips, and scaled pivots (k, S).
 
     As ``_solve_positive`` of `seqopt.engines.rigid._grip_equations`, of rigid grips. ``axis`` (b,
-    d): along bricks; ``held`` (S, r), (S, k): nodes and their loads. Result: how many pairs of
-    grips share a brick.
+    d): along bricks; ``held`` (S, r), (S, k): nodes and their loads.
     """
     columns, index = held
-    (sets, count), pairs = index.shape, 0
+    sets, count = index.shape
     low = np.empty((count, count, _SIDE_BY_SIDE))
+    at = np.empty(count, dtype=np.uint64)  # else each look-up asks whether it counts from the end
     share, pivots, own = np.empty((3, count, _SIDE_BY_SIDE))
     for start in range(0, sets, _SIDE_BY_SIDE):
         for s in range(_SIDE_BY_SIDE):
-            at = index[min(start + s, sets - 1)]
+            mine = min(start + s, sets - 1)
             for i in range(count):
+                at[i] = index[mine, i]
                 for j in range(i + 1):
                     low[i, j, s] = flexibility[at[i], at[j]]
                 share[i, s] = -dead[at[i]]
-            pairs += _brace(low, s, axis, columns[min(start + s, sets - 1)]) * (start + s < sets)
+            _brace(low, s, axis, columns, mine)
             for i in range(count):
                 own[i, s] = low[i, i, s]
         _eliminate(low, pivots)
@@ -76,22 +77,20 @@ def solve_grips(
         for s in range(min(_SIDE_BY_SIDE, sets - start)):
             for i in range(count):
                 force[start + s, i] = share[i, s]
-                pivot[start + s, i] = pivots[i, s] / own[i, s]
-    return pairs
+                pivot[i, start + s] = pivots[i, s] / own[i, s]
 
 
 @_compiled()
-def _brace(low: Floats, s: int, axis: Floats, columns: Ints) -> int:
-    """Give the force between two grips on one brick a flexibility; return how many pairs."""
-    pairs, width, scale = 0, axis.shape[1], 0.0
+def _brace(low: Floats, s: int, axis: Floats, columns: Ints, mine: int) -> None:
+    """Give the force between two grips on one brick a flexibility, so that there is one answer."""
+    width, scale = axis.shape[1], 0.0
     for i in range(len(low)):
         scale += low[i, i, s]
-    for second in range(1, len(columns)):
+    for second in range(1, columns.shape[1]):
         for first in range(second):
-            brick = columns[first] // 2
-            if columns[second] // 2 != brick:
+            brick = columns[mine, first] // 2
+            if columns[mine, second] // 2 != brick:
                 continue
-            pairs += 1
             f, g = width * first, width * second
             for i in range(width):
                 for j in range(width):
@@ -100,111 +99,156 @@ def _brace(low: Floats, s: int, axis: Floats, columns: Ints) -> int:
                         low[f + i, f + j, s] += more
                         low[g + i, g + j, s] += more
                     low[g + i, f + j, s] -= more
-    return pairs
 
 
 @_compiled()
 def share_pairs(
-    axis: Floats, inner: Floats, held: tuple[Ints, Ints], force: Floats, between: Ints
+    axis: Floats,
+    inner: tuple[Ints, Floats],
+    held: tuple[Ints, Ints],
+    force: Floats,
+    size: Floats,
+    idle: Ints,
 ) -> None:
-    """Let each of two grips on one brick take what reaches its own node, in place.
+    """Find what each grip bears, where each of two on one brick takes what reaches its own node.
 
-    As ``share_pairs`` of `seqopt.engines.rigid._grip_equations`. ``inner`` (l + 1, b): what loads
-    mean to the inner edges; ``between`` (S, p): the bricks whose inner edges then carry nothing,
-    -1 for none.
+    As ``share_pairs`` of `seqopt.engines.rigid._grip_equations`. ``inner`` (b,), (l + 1, b): the
+    inner edges, and what loads mean to them; ``size`` (S, r): of the forces; ``idle`` (S, p): inner
+    edges that carry nothing then, -1 for none.
     """
     columns, index = held
-    width = axis.shape[1]
+    edge, mean = inner
+    width, own = axis.shape[1], np.empty(force.shape[1])
     for s in range(len(columns)):
-        pairs, at = 0, columns[s]
-        for second in range(1, len(at)):
+        pairs = 0
+        for k in range(len(own)):
+            own[k] = force[s, k]
+        for second in range(1, columns.shape[1]):
             for first in range(second):
-                brick = at[first] // 2
-                if at[second] // 2 != brick:
+                node, brick = columns[s, first], columns[s, first] // 2
+                if columns[s, second] // 2 != brick:
                     continue
-                carried = inner[-1, brick]
-                for k in range(index.shape[1]):
-                    carried += force[s, k] * inner[index[s, k], brick]
-                between[s, pairs] = brick
+                idle[s, pairs] = edge[brick]
                 pairs += 1
-                carried *= 1.0 - 2.0 * (at[first] % 2)  # the axis leads to the second node
+                carried = _sum_of(mean, brick, index, s, own)
+                carried *= 1.0 - 2.0 * (node % 2)  # the axis leads to the second node
                 for i in range(width):
-                    force[s, width * first + i] += carried * axis[brick, i]
-                    force[s, width * second + i] -= carried * axis[brick, i]
+                    own[width * first + i] += carried * axis[brick, i]
+                    own[width * second + i] -= carried * axis[brick, i]
+        for k in range(pairs, idle.shape[1]):
+            idle[s, k] = -1
+        _measure(own, size, s)
+
+
+@_compiled()
+def _sum_of(mean: Floats, column: int, index: Ints, s: int, force: Floats) -> float:
+    """Return what the weight, the last row, and forces (k,) at the loads of a set mean."""
+    out = mean[len(mean) - 1, column]
+    for k in range(len(force)):
+        out += force[k] * mean[index[s, k], column]
+    return float(out)
+
+
+@_compiled()
+def _measure(force: Floats, size: Floats, s: int) -> None:
+    """Find how large the forces (r, d) of a set are."""
+    width = len(force) // max(1, size.shape[1])
+    for grip in range(size.shape[1]):
+        squared = 0.0
+        for i in range(width * grip, width * grip + width):
+            squared += force[i] * force[i]
+        size[s, grip] = np.sqrt(squared)
 
 
 @_compiled()
 def _eliminate(low: Floats, pivots: Floats) -> None:
     """Turn lower triangles (k, k, w) into their factors, with reciprocals of the pivots (k, w)."""
-    count, _, wide = low.shape
+    count = len(low)
+    row = np.empty((count, _SIDE_BY_SIDE))
     for j in range(count):
+        _pick_row(low, pivots, j, row)
         for i in range(j, count):
             for k in range(j):
-                for s in range(wide):
-                    low[i, j, s] -= low[i, k, s] * low[j, k, s] * pivots[k, s]
-        for s in range(wide):
+                for s in range(_SIDE_BY_SIDE):
+                    low[i, j, s] -= low[i, k, s] * row[k, s]
+        for s in range(_SIDE_BY_SIDE):
             pivots[j, s] = low[j, j, s]
             low[j, j, s] = 1.0 / low[j, j, s]
         for i in range(j + 1, count):
-            for s in range(wide):
+            for s in range(_SIDE_BY_SIDE):
                 low[i, j, s] *= low[j, j, s]
+
+
+@_compiled()
+def _pick_row(low: Floats, pivots: Floats, j: int, row: Floats) -> None:
+    """Find a row of the factors, left of the diagonal, times the pivots."""
+    for k in range(j):
+        for s in range(_SIDE_BY_SIDE):
+            row[k, s] = low[j, k, s] * pivots[k, s]
 
 
 @_compiled()
 def _substitute(low: Floats, share: Floats) -> None:
     """Turn loads (k, w) into answers."""
-    count, wide = share.shape
+    count = len(share)
     for i in range(count):
         for k in range(i):
-            for s in range(wide):
+            for s in range(_SIDE_BY_SIDE):
                 share[i, s] -= low[i, k, s] * share[k, s]
     for i in range(count - 1, -1, -1):
-        for s in range(wide):
+        for s in range(_SIDE_BY_SIDE):
             share[i, s] *= low[i, i, s]
         for k in range(i + 1, count):
-            for s in range(wide):
+            for s in range(_SIDE_BY_SIDE):
                 share[i, s] -= low[k, i, s] * share[k, s]
 
 
 @_compiled()
-def _sum_into(out: Floats, rows: Floats, at: Ints, force: Floats) -> None:
-    """Find what the weight, the last of the rows (l + 1, n), and forces at others mean."""
-    count, done = len(at), 0
+def _sum_into(out: Floats, rows: Floats, part: int, loads: tuple[Ints, Floats], s: int) -> None:
+    """Find what the weight, the last of the rows (p, l + 1, n), and forces of a set mean in a part.
+
+    Rows are not cut out, for each part and set: it takes as long as summing a hundred numbers.
+    """
+    index, force = loads
+    count, done, weight = index.shape[1], 0, rows.shape[1] - 1
     if count >= 9:
-        done = _sum_nine(out, rows, at, force)
+        done = _sum_nine(out, rows, part, loads, s)
     elif count >= 6:
-        done = _sum_six(out, rows, at, force)
+        done = _sum_six(out, rows, part, loads, s)
     else:
-        out[:] = rows[-1]
-    for k in range(done, count):
-        own, much = rows[at[k]], force[k]
         for n in range(len(out)):
-            out[n] += much * own[n]
+            out[n] = rows[part, weight, n]
+    for k in range(done, count):
+        at, much = index[s, k], force[s, k]
+        for n in range(len(out)):
+            out[n] += much * rows[part, at, n]
 
 
 @_compiled()
-def _sum_nine(out: Floats, rows: Floats, at: Ints, force: Floats) -> int:
+def _sum_nine(out: Floats, rows: Floats, m: int, loads: tuple[Ints, Floats], s: int) -> int:
     """Begin a sum with the weight and nine loads: three grips in space."""
-    weight, a, b, c, d = rows[-1], rows[at[0]], rows[at[1]], rows[at[2]], rows[at[3]]
-    e, f, g, h, i = rows[at[4]], rows[at[5]], rows[at[6]], rows[at[7]], rows[at[8]]
-    p, q, r, s, t, u = force[0], force[1], force[2], force[3], force[4], force[5]
-    v, w, x = force[6], force[7], force[8]
+    at, force = loads
+    last, a, b, c, d = rows.shape[1] - 1, at[s, 0], at[s, 1], at[s, 2], at[s, 3]
+    e, f, g, h, i = at[s, 4], at[s, 5], at[s, 6], at[s, 7], at[s, 8]
+    p, q, r, t, u = force[s, 0], force[s, 1], force[s, 2], force[s, 3], force[s, 4]
+    v, w, x, y = force[s, 5], force[s, 6], force[s, 7], force[s, 8]
     for n in range(len(out)):
-        first = weight[n] + p * a[n] + q * b[n] + r * c[n]
-        second = s * d[n] + t * e[n] + u * f[n]
-        out[n] = first + second + v * g[n] + w * h[n] + x * i[n]
+        first = rows[m, last, n] + p * rows[m, a, n] + q * rows[m, b, n] + r * rows[m, c, n]
+        second = t * rows[m, d, n] + u * rows[m, e, n] + v * rows[m, f, n]
+        out[n] = first + second + w * rows[m, g, n] + x * rows[m, h, n] + y * rows[m, i, n]
     return 9
 
 
 @_compiled()
-def _sum_six(out: Floats, rows: Floats, at: Ints, force: Floats) -> int:
+def _sum_six(out: Floats, rows: Floats, m: int, loads: tuple[Ints, Floats], s: int) -> int:
     """Begin a sum with the weight and six loads: two grips in space."""
-    weight, a, b, c, d = rows[-1], rows[at[0]], rows[at[1]], rows[at[2]], rows[at[3]]
-    e, f = rows[at[4]], rows[at[5]]
-    p, q, r, s, t, u = force[0], force[1], force[2], force[3], force[4], force[5]
+    at, force = loads
+    last, a, b, c, d = rows.shape[1] - 1, at[s, 0], at[s, 1], at[s, 2], at[s, 3]
+    e, f = at[s, 4], at[s, 5]
+    p, q, r, t, u, v = force[s, 0], force[s, 1], force[s, 2], force[s, 3], force[s, 4], force[s, 5]
     for n in range(len(out)):
-        first = weight[n] + p * a[n] + q * b[n] + r * c[n]
-        out[n] = first + s * d[n] + t * e[n] + u * f[n]
+        first = rows[m, last, n] + p * rows[m, a, n] + q * rows[m, b, n] + r * rows[m, c, n]
+        out[n] = first + t * rows[m, d, n] + u * rows[m, e, n] + v * rows[m, f, n]
     return 6
 
 
@@ -222,14 +266,13 @@ def reduce_rows(
     and of how many edges in all; ``idle`` (S, q): edges that carry nothing, -1 for none.
     """
     edges, nodes, ends, total = counts
-    index, force = loads
     out = np.empty(rows.shape[2])
     tension, x, y, z = out[:edges], out[edges:], out[edges + nodes :], out[edges + 2 * nodes :]
     behind = edges + 3 * nodes
     u, v, w = out[behind:], out[behind + ends :], out[behind + 2 * ends :]
     for part in range(len(rows)):
-        for s in range(len(index)):
-            _sum_into(out, rows[part], index[s], force[s])
+        for s in range(len(idle)):
+            _sum_into(out, rows, part, loads, s)
             for k in range(idle.shape[1]):
                 place = idle[s, k] - min(part * edges, total - edges)
                 if idle[s, k] >= 0 and 0 <= place < edges:

@@ -83,7 +83,7 @@ class _GripForces(NamedTuple):
     @property
     def lowest(self) -> Floats:
         """The smallest pivot of each set, (S,): one where there are no grips."""
-        return np.asarray(self.pivot.min(axis=0, initial=1.0))
+        return np.asarray(np.minimum.reduce(self.pivot, axis=0, initial=1.0))
 
 
 def grip_forces(
@@ -127,13 +127,11 @@ def trusted(
     out = np.asarray(most * lowest >= least)
     if np.count_nonzero(out) == len(out):
         return out
-    rest = np.flatnonzero(~out & (lowest > 0))
-    if len(rest) == len(out):
-        return np.asarray(_doubts(operator, index, found, hands) <= most)
-    if len(rest):
-        part = _GripForces(found.force[rest], found.pivot[:, rest])
-        own_hands = None if hands is None else hands.of(rest)
-        out[rest] = _doubts(operator, index[rest], part, own_hands) <= most
+    rest = slice(None) if len(out) <= _MANY else np.flatnonzero(~out & (lowest > 0))
+    part = _GripForces(found.force[rest], found.pivot[:, rest])
+    own_hands = None if hands is None else hands.of(rest)
+    sure = _doubts(operator, index[rest], part, own_hands) <= most
+    out[rest] |= sure & (lowest[rest] > 0)
     return out
 
 
@@ -231,7 +229,6 @@ def share_pairs(
         found = operator.answer("edge_force", index[sets], force[sets])
         between = found[np.arange(len(sets)), edges]
     shift = between[:, None] * pairs.axis
-    shift[columns[sets, pairs.first] % 2 == 1] *= -1.0  # the axis leads to the second node
     own = _count_grips(operator, force.shape[1]) * operator.directions
     nodes = force[:, :own].reshape(len(force), -1, pairs.axis.shape[1])
     nodes[sets, pairs.first] += shift

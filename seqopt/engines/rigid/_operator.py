@@ -5,9 +5,11 @@ The operators of all brick counts come from what grows with the build.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -26,6 +28,7 @@ from seqopt.engines.rigid._response_maps import (
 )
 from seqopt.network.network import Network
 
+_Made = TypeVar("_Made")
 _OF_TWISTS = ("displacement", "brick_twist")  # the other fields follow from wrenches
 _TOGETHER = 1000  # sets up to which one product takes less than one for every field
 _FEW = 200  # loads whose responses take little, and are always made once for all
@@ -91,9 +94,15 @@ class ComplianceOperator(FrozenValue):
         return frozen(out)
 
     @cached_property
-    def _nodes(self) -> Ints:
-        """Which of the nodes that are loaded each inner node is, (2b,)."""
-        return frozen(np.add.outer(2 * self.place, np.arange(2)).ravel())
+    def _loads_at(self) -> Ints:
+        """The loads at each inner node, (2b, w): forces, and then moments on its brick."""
+        nodes = np.add.outer(2 * self.place, np.arange(2)).reshape(2 * self.bricks, 1)
+        return frozen(_load_rows(nodes, self.directions, self.moments))
+
+    @cached_property
+    def across(self) -> Floats:
+        """Unit vectors from each inner node to the other of its brick, (2b, d)."""
+        return frozen(np.stack([self.axis, -self.axis], axis=1).reshape(-1, self.directions))
 
     @cached_property
     def shares(self) -> Floats:
@@ -120,13 +129,16 @@ class ComplianceOperator(FrozenValue):
 
     def load_index(self, columns: Ints) -> Ints:
         """Return which loads act at every grip, and after them all loose motions, (S, k)."""
-        every = len(self.held) == self.bricks
-        nodes = columns if every else self._nodes.take(columns)
-        rows = _load_rows(nodes, self.directions, self.moments)
+        each, width = self._loads_at.take(columns, axis=0), self.directions
+        if self.moments:  # those of all grips come after all forces
+            parts = each[:, :, :width], each[:, :, width:]
+            rows = np.hstack([part.reshape(len(part), prod(part.shape[1:])) for part in parts])
+        else:
+            rows = each.reshape(len(each), prod(each.shape[1:]))
         if self.loose:
             after = len(self.flexibility) - self.loose + np.arange(self.loose)
             rows = np.hstack([rows, np.tile(after, (len(rows), 1))])
-        return np.asarray(rows)
+        return rows
 
     def loads(self, index: Ints, force: Floats, weight: float = 1.0) -> Loads:
         """Return forces (S, k) at loads (S, k), and a share of the weight."""
@@ -186,7 +198,7 @@ class ComplianceOperator(FrozenValue):
 
     def of_loads(self, *names: str) -> Floats:
         """Return fields under every load side by side, (l + 1, Q), made when first asked for."""
-        return self.made(" ".join(names), lambda: np.hstack([self.mean(name) for name in names]))
+        return self.made(names, lambda: np.hstack([self.mean(name) for name in names]))
 
     def mean(self, name: str) -> Floats:
         """Return a field under every load, (l + 1, Q), and keep it nowhere."""
@@ -201,14 +213,15 @@ class ComplianceOperator(FrozenValue):
             out[-1] += self.maps.ground
         return out
 
-    def made(self, name: str, make: Callable[[], Floats]) -> Floats:
-        """Return an array that is kept with the operator, made when it is first asked for."""
-        if name not in self._made:
-            self._made[name] = frozen(make())
-        return self._made[name]
+    def made(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
+        """Return arrays that are kept with the operator, made when they are first asked for."""
+        known: _Made | None = self._made.get(name)
+        if known is None:
+            known = self._made[name] = frozen(make())
+        return known
 
     @cached_property
-    def _made(self) -> dict[str, Floats]:
+    def _made(self) -> dict[Hashable, Any]:
         return {}
 
     def _states(self, name: str) -> Floats:

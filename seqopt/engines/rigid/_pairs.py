@@ -18,7 +18,7 @@ class Pairs(NamedTuple):
     """Two grips on one brick.
 
     ``sets``, ``first``, ``second``, ``brick`` (p,): the grip set, which two of its grips, and the
-    brick; ``axis`` (p, d): unit vectors from the brick's first node to its second.
+    brick; ``axis`` (p, d): unit vectors from the first grip to the second.
     """
 
     sets: Ints
@@ -48,13 +48,13 @@ class Pairs(NamedTuple):
 def pairs_of(operator: ComplianceOperator, columns: Ints) -> Pairs:
     """Return all pairs of grips of the sets that share a brick."""
     couples = _couples(columns.shape[1])
-    brick, other = (columns // 2).T.take(couples, axis=0)
-    same = brick == other
+    one, other = columns.T.take(couples, axis=0)
+    same = one ^ 1 == other  # the two nodes of a brick
     if not np.count_nonzero(same):
         return _none(operator.axis.shape[1])
     couple, sets = same.nonzero()
-    brick, (first, second) = brick[couple, sets], couples.take(couple, axis=1)
-    return Pairs(sets, first, second, brick, operator.axis[brick])
+    node, (first, second) = one[same], couples.take(couple, axis=1)
+    return Pairs(sets, first, second, node // 2, operator.across.take(node, axis=0))
 
 
 @cache

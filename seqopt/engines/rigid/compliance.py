@@ -13,8 +13,8 @@ Brick counts are best asked in ascending order: what all of them share grows in 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from math import prod
+from functools import cache, cached_property
+from math import isfinite, prod
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -58,6 +58,12 @@ _CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's ca
 ACCURACY = 1e-9  # largest error of fields over the largest of each
 _UNSEEN = 100 * np.finfo(float).eps  # largest error met, over what is read off the equations
 _CANCEL = 10.0  # what the grips undo over what is left, where pivots do not
+
+
+@cache
+def _is_screen(want: Want) -> bool:
+    """Return whether fields are only to be compared; flags take long to meet."""
+    return Want.SCREEN in want
 
 
 @dataclass(frozen=True)
@@ -119,7 +125,7 @@ def _try_forces(
         good[part] = trusted(operator, index[part], found, accuracy / _UNSEEN, own)
     if np.count_nonzero(good) < sets:
         force[~good] = 0.0
-    if len(pairs.sets):
+    if hands is not None and len(pairs.sets):
         pairs = pairs.only(pairs.rigid(hands, *columns.shape))
     if not even:
         good &= ~_cancels(operator, index, force)
@@ -149,14 +155,20 @@ def _try_extremes(
 
     These are the sets that an operator alone answers not well enough.
     """
-    index = operator.load_index(columns)
-    force, pivot, shared, idle = solve_compiled(operator, columns, index)
-    apart = ~trusted(operator, index, _GripForces(force, pivot.T), accuracy / _UNSEEN)
-    force[apart] = 0.0
-    found = extremes_of(rows_of(operator, want), index, force, idle)
-    each = shared.reshape(*columns.shape, operator.directions)
-    size = np.sqrt((each * each).sum(axis=2))
-    return found, size, apart | ~np.isfinite(found).all(axis=0)
+    sets = len(columns)
+    found, size, apart = np.empty((4, sets)), np.empty(columns.shape), np.empty(sets, dtype=bool)
+    for start in range(0, sets, _CHUNK):
+        part = slice(start, start + _CHUNK)
+        index = operator.load_index(columns[part])
+        force, pivot, size[part], idle = solve_compiled(operator, columns[part], index)
+        wrong = ~trusted(operator, index, _GripForces(force, pivot), accuracy / _UNSEEN)
+        if np.count_nonzero(wrong):
+            force[wrong] = 0.0
+        found[:, part] = extremes_of(rows_of(operator, want), index, force, idle)
+        apart[part] = wrong
+    if not isfinite(found.sum()):
+        apart |= ~np.isfinite(found).all(axis=0)
+    return found, size, apart
 
 
 _KEPT = 32e6  # bytes of operators that may stay when another is made
@@ -202,7 +214,7 @@ class ComplianceEngine(NamedEngine):
         tried: _Tried | None = None
         if bricks <= len(self._tree.spring):
             operator, even = self._operator(bricks, columns), bricks <= self._even
-            accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
+            accuracy = self._accepted(want)
             own = None if hands is None else hands.within(self._basis.force, self._basis.wrench)
             tried = _try_forces(operator, columns, own, even=even, accuracy=accuracy)
         sure = 0 if tried is None else np.count_nonzero(tried.trusted)
@@ -240,13 +252,17 @@ class ComplianceEngine(NamedEngine):
         if bricks <= min(self._even, len(self._tree.spring)):
             operator = self._operator(bricks, columns)
             if operator.few_loads(len(columns)):
-                accuracy = max(_SCREEN, self._accuracy) if want & Want.SCREEN else self._accuracy
+                accuracy = self._accepted(want)
                 found, size, apart = _try_extremes(operator, columns, want, accuracy)
-        if apart.any():
+        if np.count_nonzero(apart):
             fields = self._found(bricks, columns[apart], None, want)
             rest = extremes_in(require_finite(fields, bricks, numbers[apart]), want)
             found[:, apart], size[apart] = rest[:4], rest.force
         return Extremes(found[0], found[1], found[2], found[3], size)
+
+    def _accepted(self, want: Want) -> float:
+        """Return the largest error of fields that is accepted, over the largest entry of each."""
+        return max(_SCREEN, self._accuracy) if _is_screen(want) else self._accuracy
 
     def _operator(self, bricks: int, columns: Ints) -> ComplianceOperator:
         """Return an operator that answers grip sets: one that is kept, or else a new one."""
@@ -289,7 +305,7 @@ class ComplianceEngine(NamedEngine):
 
     def _refined(self, bricks: int, columns: Ints, hands: Hands | None, want: Want) -> Fields:
         """Return what is wanted of grip sets that the operator alone answers not well enough."""
-        largest = _SCREEN if want & Want.SCREEN else LAST_CORRECTION
+        largest = _SCREEN if _is_screen(want) else LAST_CORRECTION
         operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
         with one_thread():
             if self._refinement is None or self._refinement.bricks != bricks:
