@@ -121,12 +121,13 @@ class _Balance:
         places, self._starts = np.unique(place[order], return_index=True)
         every = np.union1d(places, each * (bodies + 1))  # bodies may be loose
         self._met = np.searchsorted(every, places)
+        self._blocks = len(every)
         self._diagonal = np.searchsorted(every, each * (bodies + 1))
         rows, columns = np.divmod(every, bodies)
         line = 6 * (rows - columns)[:, None, None] + np.subtract.outer(np.arange(6), np.arange(6))
         column = np.broadcast_to(6 * columns[:, None, None] + np.arange(6), line.shape)
-        self._lower = line >= 0
-        self._band = line[self._lower], column[self._lower]
+        self._lower, self._lines = np.flatnonzero(line >= 0), int(line.max()) + 1
+        self._band = (column * self._lines + line).ravel()[self._lower]
 
     def wrench(self, force: Floats) -> Floats:
         """Return the wrenches (6B,) of forces (N, 3)."""
@@ -145,13 +146,14 @@ class _Balance:
         np.matmul(across, weight[self._owner], out=self._half)
         np.take(self._half, self._first, axis=0, out=self._left, mode="clip")
         np.matmul(self._left, self._right, out=self._products)
-        block = np.zeros((len(self._lower), 6, 6))
+        block = np.zeros((self._blocks, 6, 6))
         block[self._met] = np.add.reduceat(self._products, self._starts)
         regular = _REGULAR * np.abs(block).max()
         block[self._diagonal] += regular * np.eye(6)
-        lines, bodies = int(self._band[0].max()) + 1, len(self._order)
-        band = np.zeros((lines, 6 * bodies), order="F")
-        band[self._band] = block[self._lower]
+        lines, bodies = self._lines, len(self._order)
+        flat = np.zeros(6 * bodies * lines)
+        flat[self._band] = block.ravel()[self._lower]
+        band = flat.reshape(6 * bodies, lines).T
         factor = linalg.cholesky_banded(band, lower=True, check_finite=False), True
 
         def solution(right: Floats) -> Floats:
@@ -221,7 +223,7 @@ class _Search:
         """
         balance, cones, square = self._balance, self._cones, inverse @ inverse
         weighed = square @ cones.map
-        soft = np.asarray(np.linalg.inv(cones.owned(cones.map.transpose(0, 2, 1) @ weighed)), float)
+        soft = _inverse(cones.owned(cones.map.transpose(0, 2, 1) @ weighed))
         solve = balance.solver(soft)
         lift, stiff = cones.owned(weighed[:, 0]), square[:, 0, 0].sum()
         left = balance.wrench(point.force) + self._load
@@ -290,6 +292,24 @@ def _scaling(slack: Floats, press: Floats) -> tuple[Floats, Floats]:
     turn = middle[:, :, None] * middle[:, None] / middle[:, :1, None] - _MIRROR
     size = np.sqrt(sizes[0] / sizes[1])[:, None]
     return turn * size, turn * (_FLIP[:, None] * _FLIP) / size
+
+
+def _inverse(matrices: Floats) -> Floats:
+    """Return the inverses of positive definite matrices (N, 3, 3): a tenth of NumPy's time."""
+    (a, b, c), (_, d, e), (_, _, f) = np.ascontiguousarray(matrices.transpose(1, 2, 0))
+    first, second = b / a, c / a
+    d = d - first * b
+    third = (e - second * b) / d
+    f = f - second * c - third * third * d
+    far = first * third - second
+    out = np.empty_like(matrices)
+    out[:, 2, 2] = 1 / f
+    out[:, 1, 2] = out[:, 2, 1] = -third / f
+    out[:, 0, 2] = out[:, 2, 0] = far / f
+    out[:, 1, 1] = 1 / d + third * third / f
+    out[:, 0, 1] = out[:, 1, 0] = -first / d - far * third / f
+    out[:, 0, 0] = 1 / a + first * first / d + far * far / f
+    return out
 
 
 def _reach(cones: Floats, step: Floats) -> float:
