@@ -61,7 +61,7 @@ def quick_verdicts(
     """Yield the verdict of every step as soon as it is found; best by ascending brick counts."""
     parts = PartialAssemblies(built, _most(steps)) if isinstance(built, Network) else built
     network = parts.network
-    prove = VerdictChain(parts, lambda each: bonded(each, mortar), compile_equilibrium)
+    prove = VerdictChain(parts, lambda each: bonded(each, mortar), compile_equilibrium, near=True)
     groups = [(bricks, [*each]) for bricks, each in groupby(steps, attrgetter("bricks"))]
     patience, sought = {each: _Patience() for each in _Sought}, _Sought.FORCES
     for i, (bricks, group) in enumerate(groups):

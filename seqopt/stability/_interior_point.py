@@ -17,14 +17,15 @@ Primal-dual method with the scaling of Nesterov and Todd and Mehrotra's predicto
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Bools, Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.stability.limit_analysis import Answer, Case, Claim, limits
 
@@ -53,6 +54,35 @@ class _Point:
     press: Floats
 
 
+class Part(NamedTuple):
+    """What of an assembly changes: other blocks stay where they are, other corners as they press.
+
+    ``blocks`` (B,), ``corners`` (K,), ``grips`` (G,): which; ``kept`` (K, 3): what others bear,
+    over the force scale.
+    """
+
+    blocks: Bools
+    corners: Bools
+    grips: Bools
+    kept: Floats
+
+
+def _whole(assembly: Assembly) -> Part:
+    counts = len(assembly.centroid), len(assembly.corner), len(assembly.payload)
+    blocks, corners, grips = (np.ones(count, dtype=bool) for count in counts)
+    return Part(blocks, corners, grips, np.zeros((len(corners), 3)))
+
+
+def _cut(assembly: Assembly, part: Part) -> list[sparse.csr_array]:
+    """Return the maps of contacts and grips, of a part alone."""
+    maps = assembly.contact_map, assembly.grip_map
+    if part.blocks.all() and part.corners.all():
+        return [*maps]
+    rows = np.flatnonzero(np.repeat(part.blocks, 6))
+    pairs = zip(maps, (part.corners, part.grips), strict=True)
+    return [sparse.csr_array(each)[rows][:, np.repeat(own, 3).nonzero()[0]] for each, own in pairs]
+
+
 class _Cones:
     """What corners and grips bear: cones of friction and payload, then cut-offs of tension.
 
@@ -61,8 +91,10 @@ class _Cones:
     the cone of friction ends before it.
     """
 
-    def __init__(self, assembly: Assembly, case: Case) -> None:
+    def __init__(self, assembly: Assembly, case: Case, part: Part) -> None:
         tension, cohesion, payload = limits(assembly, case, 0.0)
+        tension, cohesion = tension[part.corners], cohesion[part.corners]
+        payload = payload[part.grips]
         corners, self.owners = len(tension), len(tension) + len(payload)
         cut = case.friction == 0 or bool((case.friction * tension < cohesion).any())
         self._cuts = corners if cut else 0
@@ -96,8 +128,7 @@ class _Balance:
     Bodies that touch are numbered close together, so that such a system is a narrow band.
     """
 
-    def __init__(self, assembly: Assembly) -> None:
-        maps = assembly.contact_map, assembly.grip_map
+    def __init__(self, maps: Sequence[sparse.csr_array]) -> None:
         self._map = sparse.hstack(maps, format="csr")
         self._transposed = blocks = self._map.T.tobsr((3, 6))
         bodies = blocks.shape[1] // 6
@@ -169,9 +200,12 @@ class _Balance:
 
 
 class _Search:
-    def __init__(self, assembly: Assembly, case: Case) -> None:
-        self._load, self._corners = case.loads(assembly)[0], len(assembly.corner)
-        self._balance, self._cones = _Balance(assembly), _Cones(assembly, case)
+    def __init__(self, assembly: Assembly, case: Case, part: Part) -> None:
+        self._part, self._corners = part, np.count_nonzero(part.corners)
+        load = case.loads(assembly)[0] + assembly.contact_map @ part.kept.ravel()
+        self._load = load.reshape(-1, 6)[part.blocks].ravel()
+        self._balance = _Balance(_cut(assembly, part))
+        self._cones = _Cones(assembly, case, part)
 
     @np.errstate(all="ignore")
     def start(self, force: Floats, level: Floats) -> tuple[_Point, Floats]:
@@ -248,9 +282,12 @@ class _Search:
 
     def claim(self, point: _Point) -> Answer:
         """Return a point as an answer, whose z is what all bear more than they can."""
-        forces = point.force[: self._corners], point.force[self._corners :]
-        z = max(point.raised, 0.0)
-        return Answer(Claim.SOLVED, z, *forces, point.motion.reshape(-1, 6))
+        part, contact = self._part, self._part.kept.copy()
+        grip, motion = np.zeros((len(part.grips), 3)), np.zeros((len(part.blocks), 6))
+        contact[part.corners] = point.force[: self._corners]
+        grip[part.grips] = point.force[self._corners :]
+        motion[part.blocks] = point.motion.reshape(-1, 6)
+        return Answer(Claim.SOLVED, max(point.raised, 0.0), contact, grip, motion)
 
     def promises(self, point: _Point) -> bool:
         """Return whether a point's forces or its motion may prove something."""
@@ -258,16 +295,19 @@ class _Search:
         return point.raised <= _DONE or bool(self._load @ point.motion > rest)
 
 
-def approach(assembly: Assembly, case: Case, force: Floats, level: Floats) -> Iterator[Answer]:
+def approach(
+    assembly: Assembly, case: Case, force: Floats, level: Floats, part: Part | None = None
+) -> Iterator[Answer]:
     """Yield forces and motions, each nearer to a proof, until it is stuck or `ROUNDS` are over.
 
     Of the case, only what it bears at a z of zero counts. The first answer has the forces in
     equilibrium next to ``force`` (N, 3), of corners and then of grips, over the force scale;
-    ``level`` (N, 3), positive: how much each may change for that beside the others.
+    ``level`` (N, 3), positive: how much each may change for that beside the others; ``part``: what
+    alone changes, by default all; forces and levels are then those of its corners and grips.
     """
     if not len(force):
         return
-    search = _Search(assembly, case)
+    search = _Search(assembly, case, _whole(assembly) if part is None else part)
     try:
         point: _Point | None
         point, motion = search.start(force, level)
