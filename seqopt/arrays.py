@@ -101,7 +101,7 @@ def frozen(content: _Content) -> _Content:
         for part in content.values() if isinstance(content, dict) else content:
             if type(part) is np.ndarray:
                 part.setflags(write=False)
-            elif not isinstance(part, str):  # names are many
+            elif not isinstance(part, str | int):  # names are many
                 frozen(part)
     return content
 

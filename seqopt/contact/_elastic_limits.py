@@ -93,10 +93,11 @@ class ElasticLimits(FrozenValue):
     stress: Floats
 
     def excess(self, wrench: Floats) -> Floats:
-        """Return by how much wrenches (S, J, 6) exceed the limits of the joints, (S, J), Pa."""
-        face, mortar = self.assembly.contact, self.mortar
-        stress = np.einsum("kij,skj->ski", self.stress, wrench[:, face])
-        shear = np.linalg.norm(stress[..., 1:], axis=2)
+        """Return by how much wrenches (S, J, 6) of first joints exceed their limits, (S, J), Pa."""
+        corners = int(np.searchsorted(self.assembly.contact, wrench.shape[1]))
+        face, mortar = self.assembly.contact[:corners], self.mortar
+        stress = np.einsum("kij,skj->ski", self.stress[:corners], wrench[:, face])
+        shear = np.sqrt(stress[..., 1] ** 2 + stress[..., 2] ** 2)
         sliding = shear - mortar.cohesion - mortar.friction * stress[..., 0]
         beyond = np.maximum(-stress[..., 0] - mortar.tensile_strength, sliding)
         most = np.maximum.reduceat(beyond, first_points(face, wrench.shape[1]), axis=1)

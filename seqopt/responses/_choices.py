@@ -212,12 +212,21 @@ class Evaluation(Terse):
         Which responses every move needs; no others are computed.
     resources : Resources, optional
         Processes, memory and a folder for answers; by default this process alone.
+    beside : float, optional
+        About how much work is done beside it, as `seqopt.responses._blocks.work` has it.
     """
 
     engine: Engine
     schedule: Schedule
     wanted: Wanted
     resources: Resources = HERE
+    beside: float = 0.0
+
+    @property
+    def work(self) -> float:
+        """About how much work it is."""
+        steps = (step for step in self.schedule.steps if step.moves)
+        return sum(work(choices_of(self.schedule, step), step.bricks) for step in steps)
 
     @cached_property
     def streams(self) -> bool:
@@ -313,9 +322,9 @@ def _by_level(
             groups = [batch_of(schedule, steps, evaluation.wanted) for steps in level]
             under_way.append(groups)
             for group in groups:
-                yield from group.blocks(compiled=total >= COMPILED)
+                yield from group.blocks(compiled=total + evaluation.beside >= COMPILED)
 
-    total = sum(work(choices_of(schedule, step), step.bricks) for step in chain(*chain(*levels)))
+    total = evaluation.work
     engine, resources = evaluation.engine, evaluation.resources
     with closing(_answer_blocks(engine, blocks(), total, resources, apart=apart)) as answers:
         for first in answers:  # blocks, and so `under_way`, are taken no earlier

@@ -9,6 +9,7 @@ import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -173,20 +174,29 @@ class LinearRange:
                 self._known[key] = self._of(found)
         return np.array([self._known[key] for key in keys])
 
+    @cached_property
+    def _lever(self) -> Floats:
+        """How far every corner is from the center of its joint, (K,), m."""
+        assert self._limits is not None
+        assembly = self._limits.assembly
+        return lengths(assembly.corner - self._network.springs.position[assembly.contact])
+
     def _of(self, fields: Fields) -> Floats:
         """Return rotation, rad, strain, stress beyond elastic limits, Pa, and in which joint."""
-        springs = self._network.springs
-        wrench = fields.joint_wrench[0].reshape(-1, 2, 3) @ springs.axes.transpose(0, 2, 1)
-        stiffness = springs.stiffness.reshape(-1, 2, 3)
+        springs, bricks = self._network.springs, fields.brick_twist.shape[1]
+        acting = max(1, int(np.searchsorted(springs.since, bricks, side="right")))
+        joints = fields.joint_wrench[:, :acting]  # others bear nothing
+        wrench = joints[0].reshape(-1, 2, 3) @ springs.axes[:acting].transpose(0, 2, 1)
+        stiffness = springs.stiffness[:acting].reshape(-1, 2, 3)
         given = np.divide(wrench, stiffness, out=np.zeros_like(wrench), where=stiffness > 0)
         shift, turn = lengths(given).T
         turned = np.concatenate([turn, lengths(fields.brick_twist[0][:, 3:])]).max()
         if self._limits is None:
-            return np.array([turned, (shift / self._thickness).max(), -np.inf, 0])
-        face = self._limits.assembly.contact
-        lever = lengths(self._limits.assembly.corner - springs.position[face])
+            return np.array([turned, (shift / self._thickness[:acting]).max(), -np.inf, 0])
+        corners = int(np.searchsorted(self._limits.assembly.contact, acting))
+        face, lever = self._limits.assembly.contact[:corners], self._lever[:corners]
         strain = (shift[face] + turn[face] * lever) / self._thickness[face]
-        excess = self._limits.excess(fields.joint_wrench)[0]
+        excess = self._limits.excess(joints)[0]
         first = np.isclose(excess, excess.max(), rtol=1e-9, atol=0.0).argmax()  # of those that tie
         return np.array([turned, strain.max(), excess.max(), first])
 

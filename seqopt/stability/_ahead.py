@@ -7,7 +7,8 @@ structure is proven before one of the steps is. It may be of no use; it is never
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import pickle
+from collections.abc import Iterable, Iterator, Sequence
 from enum import Enum
 from functools import partial
 from itertools import groupby
@@ -17,13 +18,16 @@ from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.mortar import Mortar
 from seqopt.network.network import Network
 from seqopt.sequence.steps import Grips, Step
+from seqopt.stability._step_verdicts import beside, given_out, parts_sent
 from seqopt.stability._verdict_chain import VerdictChain, Way
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.limit_analysis import compile_equilibrium
+from seqopt.work._workers import Crew
 
 _DEAR = 50  # bricks from which on a proof takes much longer than trying others
 _SPAN = 8  # brick counts whose grips hold a structure that is to fall all the same
 _MOST = 16  # brick counts for which nothing is sought at most after it was of no use
+_PORTIONS = 6  # of the steps with one mortar: what is found for one does not prove the next one
 _EARLIER = (Way.EARLIER_FORCES, Way.EARLIER_MOTION)
 
 
@@ -51,11 +55,13 @@ class _Patience:
         self._rest = self._next
 
 
-def quick_verdicts(network: Network, steps: Sequence[Step], mortar: Mortar) -> Iterator[Verdict]:
+def quick_verdicts(
+    built: Network | PartialAssemblies, steps: Sequence[Step], mortar: Mortar
+) -> Iterator[Verdict]:
     """Yield the verdict of every step as soon as it is found; best by ascending brick counts."""
-    most = max((step.bricks for step in steps), default=1) or 1
-    parts = PartialAssemblies(network, most)
-    prove = VerdictChain(parts, lambda each: bonded(each, mortar), compile_equilibrium)
+    parts = PartialAssemblies(built, _most(steps)) if isinstance(built, Network) else built
+    network = parts.network
+    prove = VerdictChain(parts, lambda each: bonded(each, mortar), compile_equilibrium, near=True)
     groups = [(bricks, [*each]) for bricks, each in groupby(steps, attrgetter("bricks"))]
     patience, sought = {each: _Patience() for each in _Sought}, _Sought.FORCES
     for i, (bricks, group) in enumerate(groups):
@@ -75,6 +81,57 @@ def quick_verdicts(network: Network, steps: Sequence[Step], mortar: Mortar) -> I
             if way not in _EARLIER:
                 sought = _Sought.MOTION if proven.bound > 0 else _Sought.FORCES
             yield _verdict_of(proven)
+
+
+def _most(steps: Iterable[Step]) -> int:
+    return max((step.bricks for step in steps), default=1) or 1
+
+
+class SharedVerdicts:
+    """The verdicts of steps with one mortar after the other, shared with workers.
+
+    They begin at once, so that something else can be done here before verdicts are taken.
+    """
+
+    def __init__(
+        self, network: Network, asked: Sequence[tuple[Mortar, Sequence[Step]]], crew: Crew
+    ) -> None:
+        crew.submit(_ready)  # one starts while this prepares
+        self._parts = PartialAssemblies(network, _most(step for _, each in asked for step in each))
+        self._portions = [part for mortar, steps in asked for part in _cut(steps, mortar)]
+        self._crew, self._task = crew, partial(_sent, pickle.dumps(self._parts))
+        first = self._portions[: len(self._portions) // 2]
+        self._begun = [given_out(crew, self._task, portion) for portion in first]
+
+    def __iter__(self) -> Iterator[Verdict]:
+        """Yield the verdicts, in the order in which they were asked."""
+        return beside(self._task, self._portions, self._crew, self._here, self._begun)
+
+    def _here(self, portion: _Portion) -> Iterator[Verdict]:
+        return quick_verdicts(self._parts, *portion)
+
+
+_Portion = tuple[Sequence[Step], Mortar]
+
+
+def _cut(steps: Sequence[Step], mortar: Mortar) -> Iterator[_Portion]:
+    """Yield steps in portions that end between brick counts."""
+    part: list[Step] = []
+    for _, same in groupby(steps, attrgetter("bricks")):
+        part += same
+        if len(part) * _PORTIONS >= len(steps):
+            yield part, mortar
+            part = []
+    if part:
+        yield part, mortar
+
+
+def _ready() -> None:
+    """Do nothing: a worker that can has started."""
+
+
+def _sent(parts: bytes, portion: _Portion) -> tuple[Verdict, ...]:
+    return tuple(quick_verdicts(parts_sent(parts), *portion))
 
 
 def _try(prove: VerdictChain, bricks: int, grips: Grips, tried: list[object]) -> None:

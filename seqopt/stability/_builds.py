@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain, groupby
@@ -17,16 +18,20 @@ from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.steps import Grips, Step
-from seqopt.stability._ahead import quick_verdicts
+from seqopt.stability._ahead import SharedVerdicts, quick_verdicts
 from seqopt.stability._screens import OPEN, STANDS, Screen
 from seqopt.stability._step_verdicts import each_verdict
 from seqopt.stability.assessment import Verdict
+from seqopt.work._threads import cores
+from seqopt.work._workers import Crew, hire
 from seqopt.work.progress import Tell, with_progress
 
 SHOWN = {"dry": DRY, "epoxy": EPOXY}  # with which it is said what stands
 SCREENED = 60  # bricks up to which a program for all grips at once is quickly solved
 _SETS = 6  # grips of as many bricks, in the mean, from which on such a program pays
+_SHARED = 5e4  # bricks in all steps from which on a process more takes less than it saves
 _State = tuple[int, Grips]  # bricks that stand, and nodes held
+_Asked = dict[str, list[Step]]  # steps by the mortar with which they are asked
 _Found = Iterator[tuple[_State, Verdict]]
 _Told = Callable[[], Iterator[Step]]  # steps, told as they are asked
 _Way = Callable[[Network, Sequence[Step], Mortar, _Told], _Found]
@@ -98,6 +103,7 @@ class BuildProver:
     ) -> None:
         self._network, self._mortars, self._progress = network, mortars, progress
         self._known: dict[str, dict[_State, Verdict]] = {name: {} for name in mortars}
+        self._shared: tuple[_Asked, SharedVerdicts] | None = None
         self.refusal = ""
 
     def of_tables(self, tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[BuildVerdicts, ...]]:
@@ -116,6 +122,29 @@ class BuildProver:
             if self._ask(chain.from_iterable(builds.values()))
         }
 
+    @contextmanager
+    def beside(self, steps: Sequence[Step]) -> Iterator[None]:
+        """Let another process begin with a large build, while something else is done here."""
+        asked = self._new({_state(step): step for step in steps})
+        work = sum(step.bricks for each in asked.values() for step in each)
+        shares = work >= _SHARED and cores() > 1
+        with hire(workers=2 if shares else 1, beside=True) as crew:
+            if crew is not None:
+                self._shared = self._begin(asked, crew)
+            try:
+                yield
+            finally:
+                self._shared = None
+
+    def _begin(self, asked: _Asked, crew: Crew) -> tuple[_Asked, SharedVerdicts] | None:
+        if any(self._way(steps) is not _one_by_one for steps in asked.values()):
+            return None
+        pairs = [(self._mortars[name], steps) for name, steps in asked.items()]
+        try:
+            return asked, SharedVerdicts(self._network, pairs, crew)
+        except SceneError:  # said where it is asked
+            return None
+
     def _ask(self, steps: Iterable[Step]) -> bool:
         """Ask what is not known of steps yet; return whether anything is asked at all."""
         if self.refusal:
@@ -128,13 +157,21 @@ class BuildProver:
         return bool(self._mortars)
 
     def _ask_all(self, distinct: Mapping[_State, Step]) -> None:
-        for name, mortar in self._mortars.items():
-            known = self._known[name]
-            new = [step for state, step in distinct.items() if state not in known]
-            new.sort(key=_asking)
-            what = f"proving what stands, {name}"
+        asked = self._new(distinct)
+        shared = self._shared is not None and self._shared[0] == asked
+        found = iter(self._shared[1]) if self._shared is not None and shared else None
+        for name, new in asked.items():
+            what, mortar = f"proving what stands, {name}", self._mortars[name]
             tell = partial(with_progress, what, new, self._progress)
-            known.update(self._way(new)(self._network, new, mortar, tell) if new else ())
+            way = self._way(new) if found is None else partial(_as_found, found)
+            self._known[name].update(way(self._network, new, mortar, tell) if new else ())
+
+    def _new(self, distinct: Mapping[_State, Step]) -> _Asked:
+        """Return by mortar which steps are not known, in the order in which they are asked."""
+        return {
+            name: sorted((s for state, s in distinct.items() if state not in known), key=_asking)
+            for name, known in self._known.items()
+        }
 
     def _way(self, steps: Sequence[Step]) -> _Way:
         """Return what proves most quickly which of some steps stand."""
@@ -158,6 +195,14 @@ def _one_by_one(
     told = steps if tell is None else tell()
     for step, found in zip(told, quick_verdicts(network, steps, mortar), strict=True):
         yield _state(step), found
+
+
+def _as_found(
+    found: Iterator[Verdict], _: Network, __: Sequence[Step], ___: Mortar, tell: _Told
+) -> _Found:
+    """Yield verdicts as others find them, in the order in which they were asked."""
+    for step in tell():
+        yield _state(step), next(found)
 
 
 def _screened(network: Network, _: Sequence[Step], mortar: Mortar, tell: _Told) -> _Found:

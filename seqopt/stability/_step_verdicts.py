@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
+from typing import TypeVar
 
 import numpy as np
 import pandas as pd
@@ -156,7 +157,7 @@ def each_stability(
         portions = [replace(whole, steps=part) for part in cut]
         task = partial(_sent, pickle.dumps(parts))
         if shared[0] is None:
-            yield from _beside(task, portions, crew, lambda portion: _each(parts, portion))
+            yield from beside(task, portions, crew, lambda portion: _each(parts, portion))
             return
         for found in map_ordered(task, portions, crew):
             yield from found
@@ -167,26 +168,33 @@ def _ready() -> None:
 
 
 def _sent(parts: bytes, portion: _Portion) -> tuple[Stability, ...]:
-    return tuple(_each(_parts(parts), portion))
+    return tuple(_each(parts_sent(parts), portion))
 
 
 @lru_cache(maxsize=1)
-def _parts(parts: bytes) -> PartialAssemblies:
+def parts_sent(parts: bytes) -> PartialAssemblies:
     """Return what a worker is sent for all portions of a build."""
     out: PartialAssemblies = pickle.loads(parts)  # our own, of `each_stability`
     return out
 
 
-_Sent = Callable[[_Portion], tuple[Stability, ...]]
-_Here = Callable[[_Portion], Iterator[Stability]]
+_Task = TypeVar("_Task")
+_Found = TypeVar("_Found")
 
 
-def _beside(
-    task: _Sent, portions: Sequence[_Portion], crew: Crew, here: _Here
-) -> Iterator[Stability]:
-    """Yield what is found of portions, in their order: by workers, and meanwhile here."""
-    left, given = deque(range(len(portions))), dict[int, Future[tuple[Stability, ...]]]()
-    found, taken = dict[int, tuple[Stability, ...]](), 0
+def beside(
+    task: Callable[[_Task], tuple[_Found, ...]],
+    portions: Sequence[_Task],
+    crew: Crew,
+    here: Callable[[_Task], Iterator[_Found]],
+    begun: Sequence[Future[tuple[_Found, ...]]] = (),
+) -> Iterator[_Found]:
+    """Yield what is found of portions, in their order: by workers, and meanwhile here.
+
+    ``begun``: the calls of the first portions, if they are given out already.
+    """
+    left, given = deque(range(len(begun), len(portions))), dict(enumerate(begun))
+    found, taken = dict[int, tuple[_Found, ...]](), 0
     while taken < len(portions):
         if taken in given and (given[taken].done() or not left):
             found[taken] = _answered(given.pop(taken), crew) or tuple(here(portions[taken]))
@@ -196,7 +204,7 @@ def _beside(
             continue
         mine = left.popleft()
         while left and sum(not each.done() for each in given.values()) < _AHEAD * crew.workers:
-            given[left[0]] = _given_out(crew, task, portions[left[0]])
+            given[left[0]] = given_out(crew, task, portions[left[0]])
             left.popleft()
         if mine == taken:  # told as it is found
             yield from here(portions[mine])
@@ -205,17 +213,19 @@ def _beside(
             found[mine] = tuple(here(portions[mine]))
 
 
-def _given_out(crew: Crew, task: _Sent, portion: _Portion) -> Future[tuple[Stability, ...]]:
+def given_out(
+    crew: Crew, task: Callable[[_Task], tuple[_Found, ...]], portion: _Task
+) -> Future[tuple[_Found, ...]]:
     """Return the call of a portion; one that has failed where workers take no more."""
     try:
         return crew.submit(task, portion)
     except BrokenExecutor as error:
-        call = Future[tuple[Stability, ...]]()
+        call = Future[tuple[_Found, ...]]()
         call.set_exception(error)
         return call
 
 
-def _answered(call: Future[tuple[Stability, ...]], crew: Crew) -> tuple[Stability, ...] | None:
+def _answered(call: Future[tuple[_Found, ...]], crew: Crew) -> tuple[_Found, ...] | None:
     """Return what a worker answers; None if it died, or an error that is then raised here."""
     while not call.done():
         wait([call], timeout=_PATIENCE)

@@ -11,12 +11,14 @@ from enum import Enum
 from itertools import islice
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.csgraph import dijkstra
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.network.network import GROUND
 from seqopt.sequence.steps import Grips
-from seqopt.stability._interior_point import approach
+from seqopt.stability._interior_point import Part, approach
 from seqopt.stability._prover import Proven, Prover
 from seqopt.stability.limit_analysis import EXACT, Answer, Case, Claim, Compile, bound, violation
 from seqopt.work._threads import one_thread
@@ -25,6 +27,9 @@ _TIGHT = 0.01 * EXACT  # largest violation of forces that are believed without a
 _CLEAR = 10 * EXACT  # least bound of a motion that is
 _LEAST = 1e-3  # corner force below which it changes no less, over the force scale
 _KEPT = 8  # answers that are tried on steps with more grips
+_NEAR = 0.7  # share of all blocks up to which those near a change take less than all
+_BESIDE = 2  # contacts from where something changes, within which all may
+_MOVES = 1e-2  # of the largest motion, over which a block falls
 _ACROSS = 0.3  # how much forces along faces change, beside those across them
 
 
@@ -74,14 +79,18 @@ class VerdictChain:
 
     Forces and a motion are remembered in N, m and rad. Where not the cone program proves a case, z
     is only as good as the answer to whether it is zero.
+
+    ``near``: whether what is sought is sought near what has changed first.
     """
 
-    def __init__(self, parts: Parts, ask: Ask, compiled: Compile) -> None:
-        self._parts, self._ask, self._compile = parts, ask, compiled
+    def __init__(self, parts: Parts, ask: Ask, compiled: Compile, *, near: bool = False) -> None:
+        self._parts, self._ask, self._compile, self._near = parts, ask, compiled, near
         self._corner_force: Floats | None = None
         self._grip_force: dict[int, Floats] = {}
         self._motion: Floats | None = None
         self._stood = False  # the last one, by forces
+        self._blocks = 0  # that stood
+        self._bore = np.zeros(0, dtype=np.int64)  # blocks whose grips bore something then
         self._kept: list[tuple[Floats, dict[int, Floats]]] = []  # of as many corners
 
     def __call__(
@@ -124,6 +133,8 @@ class VerdictChain:
         if case.tension[0] > 0 or case.cohesion[0] > 0:
             for answer in islice(approach(assembly, case, force, level), 1):
                 yield _labeled(judged(assembly, case, answer), Way.FORCES)
+        if self._near:
+            yield from self._sought_near(assembly, case, held)
         way = Way.FORCES
         if self._corner_force is not None:
             force, level = self._earlier(assembly, held)
@@ -131,6 +142,49 @@ class VerdictChain:
         for answer in approach(assembly, case, force, level):
             yield _labeled(judged(assembly, case, answer), way)
             way = Way.FORCES
+
+    def _sought_near(self, assembly: Assembly, case: Case, held: Sequence[int]) -> Iterator[_Tried]:
+        """Yield the same of what changes near new blocks and grips, or near what fell before."""
+        part = self._bearing(assembly) if self._stood else self._falling(assembly)
+        if part is None or part.blocks.mean() > _NEAR:
+            return
+        forces = np.concatenate([part.corners, part.grips])
+        force, level = self._earlier(assembly, held) if self._stood else _none_yet(len(forces))
+        way = Way.EARLIER_FORCES if self._stood else Way.FORCES
+        answers = approach(assembly, case, force[forces], level[forces], part)
+        for answer in islice(answers, 1, None):  # the first is near what was before
+            if not self._stood and answer.value <= _TIGHT:
+                return  # others may fall
+            proven = judged(assembly, case, answer)
+            yield _labeled(proven, way)
+            if self._stood and answer.value <= _TIGHT:
+                return  # it does not hold what is beside it
+
+    def _bearing(self, assembly: Assembly) -> Part | None:
+        """Return what may bear new blocks and grips instead of those before, down to the ground."""
+        blocks, corners = len(assembly.centroid), len(assembly.corner)
+        if self._corner_force is None or self._blocks > blocks:
+            return None
+        new = np.arange(self._blocks, blocks)
+        near = _around(assembly, np.concatenate([new, self._bore, assembly.grip_block]), _BESIDE)
+        bodies = assembly.bodies[assembly.contact]
+        changes = ((bodies == GROUND) | near[bodies]).all(axis=1)
+        kept = np.zeros((corners, 3))
+        kept[: len(self._corner_force)] = self._corner_force / assembly.scales[0]
+        kept[changes] = 0.0
+        return Part(near, changes, np.ones(len(assembly.payload), dtype=bool), kept)
+
+    def _falling(self, assembly: Assembly) -> Part | None:
+        """Return what fell before, and what is beside it; the rest is held."""
+        if self._motion is None:
+            return None
+        blocks, size = len(assembly.centroid), np.abs(self._motion).max(axis=1)
+        falls = np.ones(blocks, dtype=bool)  # as new ones do
+        falls[: len(size)] = size[:blocks] > _MOVES * size.max()
+        near = _neighbors(assembly, falls)
+        bodies = assembly.bodies[assembly.contact]
+        changes = ((bodies != GROUND) & near[bodies]).any(axis=1)
+        return Part(near, changes, near[assembly.grip_block], np.zeros((len(assembly.corner), 3)))
 
     def _kept_forces(self, assembly: Assembly, held: Sequence[int]) -> Iterator[Answer]:
         """Yield forces that hold the same bricks with fewer grips: one more bears nothing."""
@@ -161,11 +215,53 @@ class VerdictChain:
         self._stood = proven.held <= EXACT
         if self._stood:
             self._corner_force = force * answer.contact_force
+            self._blocks = len(assembly.centroid)
+            self._bore = assembly.grip_block[answer.grip_force.any(axis=1)]
             self._grip_force = dict(zip(held, force * answer.grip_force, strict=True))
             same = [each for each in self._kept if len(each[0]) == len(self._corner_force)]
             self._kept = [*same, (self._corner_force, self._grip_force)][-_KEPT:]
         if proven.bound > EXACT and np.isfinite(answer.motion).all():
             self._motion = answer.motion / np.repeat([1.0, length], 3)
+
+
+def _none_yet(count: int) -> tuple[Floats, Floats]:
+    """Return no forces, which may all change alike."""
+    return np.zeros((count, 3)), np.ones((count, 3))
+
+
+def _neighbors(assembly: Assembly, which: Bools) -> Bools:
+    """Return some blocks (B,) and those that touch them."""
+    between = assembly.bodies[(assembly.bodies != GROUND).all(axis=1)]
+    out = which.copy()
+    out[between[which[between].any(axis=1)].ravel()] = True
+    return out
+
+
+def _around(assembly: Assembly, blocks: Ints, steps: int) -> Bools:
+    """Return blocks (B,), those on their shortest ways to the ground, and so many steps beside."""
+    bodies, count = assembly.bodies, len(assembly.centroid)
+    grounded = (bodies == GROUND).any(axis=1)
+    if not grounded.any():
+        return np.ones(count, dtype=bool)
+    first, second = bodies[~grounded].T
+    touching = sparse.csr_array((np.ones(len(first)), (first, second)), shape=(count, count))
+    _, before, _ = dijkstra(
+        touching,
+        directed=False,
+        indices=np.unique(bodies[grounded].max(axis=1)),
+        unweighted=True,
+        min_only=True,
+        return_predecessors=True,
+    )
+    out = np.zeros(count, dtype=bool)
+    for on_way in blocks.tolist():
+        block = on_way
+        while block >= 0 and not out[block]:
+            out[block] = True
+            block = int(before[block])
+    for _ in range(steps):
+        out = _neighbors(assembly, out)
+    return out
 
 
 def _extended(assembly: Assembly, known: Floats | None) -> Iterator[Floats]:

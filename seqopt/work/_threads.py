@@ -1,9 +1,14 @@
-"""Linear algebra of small matrices on one thread."""
+"""Linear algebra of small matrices on one thread; loops that need no lock on several."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager
 from functools import cache
+from multiprocessing import parent_process
+from typing import TypeVar
 
 import numpy as np
 from scipy.linalg import blas, lapack
@@ -11,6 +16,9 @@ from threadpoolctl import ThreadpoolController
 
 from seqopt.errors import MemoryShortError
 from seqopt.work._workers import free_memory
+
+_Task = TypeVar("_Task")
+_Result = TypeVar("_Result")
 
 _BUFFERS = 100e6  # bytes; taken at once: OpenBLAS waits without end for buffers it does not get
 
@@ -24,6 +32,23 @@ def one_thread() -> AbstractContextManager[object]:
     """
     limited: AbstractContextManager[object] = _libraries().limit(limits=1, user_api="blas")
     return limited
+
+
+@cache
+def cores() -> int:
+    """Return on how many cores this process may work: one where it is one of several workers."""
+    if parent_process() is not None:
+        return 1
+    known = getattr(os, "sched_getaffinity", None)  # not everywhere
+    return len(known(0)) if known else os.cpu_count() or 1
+
+
+def beside(function: Callable[[_Task], _Result], tasks: Sequence[_Task]) -> list[_Result]:
+    """Return what a function that leaves Python's lock alone makes of tasks, one a thread."""
+    if len(tasks) == 1:
+        return [function(tasks[0])]
+    with ThreadPoolExecutor(len(tasks)) as pool:
+        return [*pool.map(function, tasks)]
 
 
 @cache

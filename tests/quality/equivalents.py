@@ -154,9 +154,7 @@ EQUIVALENT = (
         for size in ("31999999.0", "32000001.0")
     ),
     *(
-        Equivalent(
-            OPERATOR, "2 * self.axis.size", "2 *", new, "which way of two that agree is taken"
-        )
+        Equivalent(OPERATOR, "2 * unknowns", "2 *", new, "which way of two that agree is taken")
         for new in ("1 *", "3 *", "2 +", "2 -", "2 /")
     ),
     *(

@@ -63,6 +63,17 @@ def test_every_way_says_the_same(flat, builds, found, monkeypatch, how):
     assert BuildProver(flat).of_builds(builds) == found
 
 
+def test_another_process_that_begins_says_the_same(flat, builds, found, monkeypatch):
+    monkeypatch.setattr(_builds, "SCREENED", 0)
+    monkeypatch.setattr(_builds, "_SHARED", 0)
+    monkeypatch.setattr(_builds, "cores", lambda: 2)
+    prover, steps = BuildProver(flat), builds["cantilever"]
+    with prover.beside(steps):
+        assert prover._shared is not None
+        assert prover.of_builds({"cantilever": steps})["cantilever"] == found["cantilever"]
+    assert prover._shared is None
+
+
 def test_what_fails_first_is_what_the_first_fallen_step_says(flat, builds, found):
     for name, steps in builds.items():
         dry = found[name][0]

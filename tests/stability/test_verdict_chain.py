@@ -25,8 +25,9 @@ from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability import _verdict_chain as chain
+from seqopt.stability._interior_point import approach
 from seqopt.stability._step_verdicts import each_verdict, step_verdicts
-from seqopt.stability.assessment import Verdict, bonded, verdict
+from seqopt.stability.assessment import Verdict, _verdict_of, bonded, verdict
 from seqopt.stability.limit_analysis import EXACT, Answer, Claim, bound, violation
 from tests.blocks import with_shapes
 from tests.builders import branch, from_both_ends, six_bricks
@@ -381,3 +382,38 @@ def test_a_vault_is_proven_without_cone_programs():
     assert "cone program" not in {step.proof for step in dry}
     for k in range(0, 200, 20):
         assert dry[k].verdict is one_by_one(network, steps[k : k + 1], DRY)[0]
+
+
+def near_verdicts(network, steps, mortar):
+    parts = PartialAssemblies(network, max(step.bricks for step in steps))
+    prove = chain.VerdictChain(parts, lambda a: bonded(a, mortar), compile_equilibrium, near=True)
+    return tuple(_verdict_of(prove(step.bricks, step.grips)[1]) for step in steps)
+
+
+@pytest.mark.parametrize("lie", [False, True])
+@pytest.mark.parametrize("name", ["both ends", "wall", "branch"])
+def test_what_is_sought_near_a_change_is_proven_of_the_whole(name, lie, monkeypatch):
+    """Also where what is said to stay as it is does not hold: then it proves nothing."""
+    monkeypatch.setattr(chain, "_NEAR", 1.0)
+    monkeypatch.setattr(chain, "_BESIDE", 0)
+    asked, proven = [], []
+    sought = chain.VerdictChain._sought_near
+
+    def watched(self, *arguments):
+        asked.append(self._stood)
+        for found, way in sought(self, *arguments):
+            proven.append(found is not None)
+            yield found, way
+
+    def false(assembly, case, force, level, part=None):
+        wrong = part if part is None else part._replace(kept=part.kept + 0.1)
+        return approach(assembly, case, force, level, wrong)
+
+    monkeypatch.setattr(chain.VerdictChain, "_sought_near", watched)
+    if lie:
+        monkeypatch.setattr(chain, "approach", false)
+    network = build_network(SCENES[name]())
+    steps = random_steps(network, 40, seed=3)
+    assert near_verdicts(network, steps, DRY) == one_by_one(network, steps, DRY)
+    assert {*asked} == {True, False}
+    assert any(proven) or lie

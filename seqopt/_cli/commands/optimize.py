@@ -230,7 +230,8 @@ def answered(options: argparse.Namespace, found: Found) -> Answer:
         name = "bases.csv" if found.props is None else "fewest_props.csv"
         return made if outer is None else made | {name: csv_text(outer.tried)}
 
-    return _answer(options, found, write_outputs(options, files))
+    with found.prover.beside(plan.steps):
+        return _answer(options, found, write_outputs(options, files))
 
 
 def _from_empty(whole: Problem | None, plan: Plan, choose: Callable[[Problem], Plan]) -> str:

@@ -9,7 +9,7 @@ from scipy.linalg import lapack
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._hands import Hands
-from seqopt.engines.rigid._operator import ComplianceOperator
+from seqopt.engines.rigid._operator import ComplianceOperator, Doubts
 from seqopt.engines.rigid._pairs import (
     Pairs,
     _as_rows,
@@ -110,7 +110,7 @@ def grip_forces(
 
 
 def trusted(
-    operator: ComplianceOperator,
+    operator: ComplianceOperator | Doubts,
     index: Ints,
     found: _GripForces,
     most: float,
@@ -118,12 +118,14 @@ def trusted(
 ) -> Bools:
     """Return which sets' forces (S,) rounding changes little enough.
 
-    ``most``: largest of `_doubts` that is accepted; ``hands``: as of `grip_forces`.
+    ``operator``: or, without hands, its doubts alone; ``most``: largest of `_doubts` that is
+    accepted; ``hands``: as of `grip_forces`.
     """
+    doubts = operator.doubts if isinstance(operator, ComplianceOperator) else operator
     lowest, least = found.lowest, np.inf
     if hands is None or hands.moved is None:  # else forces may undo what the weight does
         own = 0.0 if hands is None else 2.0  # of what hands give, that forces undo as well
-        least = len(found.pivot) * operator.worst_doubt + own
+        least = len(found.pivot) * doubts.worst + own
     out = np.asarray(most * lowest >= least)
     if np.count_nonzero(out) == len(out):
         return out
@@ -136,7 +138,10 @@ def trusted(
 
 
 def _doubts(
-    operator: ComplianceOperator, index: Ints, found: _GripForces, hands: Hands | None = None
+    operator: ComplianceOperator | Doubts,
+    index: Ints,
+    found: _GripForces,
+    hands: Hands | None = None,
 ) -> Floats:
     """Return the error (S,) of forces for rounding of one part in one, over the largest of each.
 
@@ -145,11 +150,12 @@ def _doubts(
     leaves undetermined.
     """
     size = np.abs(found.force.T)
-    root, own, scale = operator.shares.take(np.ascontiguousarray(index.T), axis=1)
+    doubts = operator.doubts if isinstance(operator, ComplianceOperator) else operator
+    root, own, scale = doubts.shares.take(np.ascontiguousarray(index.T), axis=1)
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         own += (root * size).sum(axis=0)
         own *= scale
-        if hands is not None:
+        if isinstance(operator, ComplianceOperator) and hands is not None:
             own = _with_hands(operator, own, size, root / scale, hands)
         own /= found.pivot
         most = size.max(axis=0, initial=np.finfo(float).tiny)

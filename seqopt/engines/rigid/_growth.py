@@ -24,6 +24,7 @@ from scipy import linalg
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.interface import SPACE, Basis
 from seqopt.network.network import GROUND, Network
+from seqopt.work._threads import beside, cores
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,6 +72,7 @@ def compliances(network: Network, first: int, basis: Basis) -> Floats:
 
 TINY, ROUNDING = np.finfo(float).tiny, np.finfo(float).eps
 _AT_ONCE = 2**17  # numbers changed at a time: they stay in the processor's cache
+_LEAST = 4  # times as many, from which on a thread more is worth starting
 _SUMMED = 2**19  # the same, where much is done with each
 _TAKEN = 1e3  # times less a brick moves in closed loops: rounding of what is gone would show
 _WORSE = 10.0  # times the rounding that was left when they were summed anew
@@ -314,7 +316,13 @@ class Growth:
 def _add_product(target: Floats, left: Floats, right: Floats) -> None:
     """Add the product of matrices (n, p) and (p, m) to one (n, m), a few rows at a time."""
     step = max(1, _AT_ONCE // target.shape[1])
-    room = np.empty((step, target.shape[1]))
-    for start in range(0, len(target), step):
-        part = target[start : start + step]
-        part += np.matmul(left[start : start + step], right, out=room[: len(part)])
+    starts = range(0, len(target), step)
+    threads = min(cores(), len(starts) // _LEAST)
+
+    def add(first: int) -> None:
+        room = np.empty((step, target.shape[1]))
+        for start in starts[first :: max(threads, 1)]:
+            part = target[start : start + step]
+            part += np.matmul(left[start : start + step], right, out=room[: len(part)])
+
+    beside(add, range(max(threads, 1)))

@@ -35,13 +35,44 @@ _FEW = 200  # loads whose responses take little, and are always made once for al
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Doubts(FrozenValue):
+    """How far rounding may reach: of every load what it moves itself, the weight, and lost digits.
+
+    Arrays are the flexibility's diagonal, ``dead_displacement`` and ``loss`` (l,) of
+    `ComplianceOperator`.
+    """
+
+    flexibility: Floats
+    dead: Floats
+    loss: Floats
+
+    @cached_property
+    def shares(self) -> Floats:
+        """Roots of flexibilities, what weight adds to their sum, what makes it forces; (3, l)."""
+        own = np.maximum(np.abs(self.flexibility), np.finfo(float).tiny)
+        root = np.sqrt(own * self.loss)
+        return frozen(np.stack([root, np.abs(self.dead) * self.loss / root, root / own]))
+
+    @cached_property
+    def worst(self) -> float:
+        """Most that a grip's force can be in doubt where pivots are one, over the loads at grips.
+
+        As `_doubts` of `seqopt.engines.rigid._grip_equations`: forces undo the displacements, so
+        these are no more in doubt than what the forces add up to.
+        """
+        most = np.abs(self.flexibility).max(initial=0.0)
+        own = np.sqrt(most * self.loss.max(initial=1.0))
+        return float(2 * own * self.shares[2].max(initial=0.0))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class ComplianceOperator(FrozenValue):
     """What loads on a partial structure of b bricks move and stress; rows of arrays are loads.
 
     Row ``dm + i`` is a unit force in direction ``i`` of d at the ``m``-th inner node
     (`Network.inner`) of the h bricks that are loaded, l = 2dh loads in all: d = 3 in space, 2 in a
     plane. Where hands bear moments, those on a brick, over a lever, follow the forces at its nodes,
-    and what they move are rotations times the lever: see `_load_rows`. One more row at the end of
+    and what they move are rotations times the lever: see `load_rows`. One more row at the end of
     all but the first two arrays is the weight of the b bricks, with what else loads them and how
     the ground moves.
 
@@ -97,7 +128,7 @@ class ComplianceOperator(FrozenValue):
     def _loads_at(self) -> Ints:
         """The loads at each inner node, (2b, w): forces, and then moments on its brick."""
         nodes = np.add.outer(2 * self.place, np.arange(2)).reshape(2 * self.bricks, 1)
-        return frozen(_load_rows(nodes, self.directions, self.moments))
+        return frozen(load_rows(nodes, self.directions, self.moments))
 
     @cached_property
     def across(self) -> Floats:
@@ -105,23 +136,9 @@ class ComplianceOperator(FrozenValue):
         return frozen(np.stack([self.axis, -self.axis], axis=1).reshape(-1, self.directions))
 
     @cached_property
-    def shares(self) -> Floats:
-        """Roots of flexibilities, what weight adds to their sum, what makes it forces; (3, l)."""
-        own = np.maximum(np.abs(self.flexibility.diagonal()), np.finfo(float).tiny)
-        root = np.sqrt(own * self.loss)
-        dead = np.abs(self.dead_displacement) * self.loss / root
-        return frozen(np.stack([root, dead, root / own]))
-
-    @cached_property
-    def worst_doubt(self) -> float:
-        """Most that a grip's force can be in doubt where pivots are one, over the loads at grips.
-
-        As `_doubts` of `seqopt.engines.rigid._grip_equations`: forces undo the displacements, so
-        these are no more in doubt than what the forces add up to.
-        """
-        most = np.abs(self.flexibility.diagonal()).max(initial=0.0)
-        own = np.sqrt(most * self.loss.max(initial=1.0))
-        return float(2 * own * self.shares[2].max(initial=0.0))
+    def doubts(self) -> Doubts:
+        """What rounding may leave of the answers to its loads."""
+        return Doubts(self.flexibility.diagonal(), self.dead_displacement, self.loss)
 
     def covers(self, bricks: Ints) -> bool:
         """Return whether loads act at the nodes of bricks."""
@@ -184,7 +201,7 @@ class ComplianceOperator(FrozenValue):
 
     def few_loads(self, sets: int) -> bool:
         """Return whether what all loads mean is made before that of so many grip sets."""
-        return 2 * self.axis.size <= max(_FEW, sets)
+        return are_few(self.axis.size, sets)
 
     def _add_grips(self, index: Ints, force: Floats, out: Floats) -> None:
         """Add to edge forces (S, E) what forces (S, k) at second nodes send into inner edges."""
@@ -229,7 +246,15 @@ class ComplianceOperator(FrozenValue):
         return self.twist if name in _OF_TWISTS else self.wrench
 
 
-def _load_rows(nodes: Ints, directions: int, moments: int) -> Ints:
+def are_few(unknowns: int, sets: int) -> bool:
+    """Return whether loads are few beside grip sets: of both nodes of bricks in all directions.
+
+    ``unknowns``: bricks times directions.
+    """
+    return 2 * unknowns <= max(_FEW, sets)
+
+
+def load_rows(nodes: Ints, directions: int, moments: int) -> Ints:
     """Return the loads (S, k) at nodes (S, r): forces at all of them, then moments on bricks.
 
     ``nodes``: as indices into ``network.inner.ravel()`` of the bricks that are loaded.
@@ -251,13 +276,13 @@ class OperatorBuilder:
     def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
         self.network, self.basis = network, basis
         self.growth = Growth(network, tree, basis)
-        self._maps = scene_maps(network, basis)
-        self._nodes = inner_motions(network, basis)
-        self._moments = len(basis.moment) if network.scene.grip_kinds.turns.any() else 0
-        if self._moments:
-            turned = np.zeros((len(self._nodes), self._moments, len(basis.wrench)))
-            turned[..., -self._moments :] = _lever_of(network) * np.eye(self._moments)
-            self._nodes = np.concatenate([self._nodes, turned], axis=1)
+        self.maps = scene_maps(network, basis)
+        self.nodes = inner_motions(network, basis)
+        self.moments = len(basis.moment) if network.scene.grip_kinds.turns.any() else 0
+        if self.moments:
+            turned = np.zeros((len(self.nodes), self.moments, len(basis.wrench)))
+            turned[..., -self.moments :] = _lever_of(network) * np.eye(self.moments)
+            self.nodes = np.concatenate([self.nodes, turned], axis=1)
 
     def operator(self, bricks: int, held: Ints | None = None) -> ComplianceOperator:
         """Return the operator of at most as many bricks as the tree has.
@@ -267,7 +292,7 @@ class OperatorBuilder:
         self.growth.reach(bricks)
         held = np.arange(bricks) if held is None else held
         which = slice(bricks) if len(held) == bricks else held
-        nodes = self._nodes[which]
+        nodes = self.nodes[which]
         k, loads = nodes.shape[2], nodes.shape[0] * nodes.shape[1]
         springs = int(np.searchsorted(self.network.springs.since, bricks, side="right"))
         found = []  # twists and wrenches under unit loads at nodes, and under the weight
@@ -289,10 +314,10 @@ class OperatorBuilder:
             dead_displacement=moved[-1],
             twist=twist,
             wrench=wrench,
-            maps=ResponseMaps(self._maps, bricks),
+            maps=ResponseMaps(self.maps, bricks),
             at_second=at_second,
             axis=axis @ self.basis.force.T,
             inner_edge=inner_edge,
             loss=np.repeat(self.growth.loss[held], nodes.shape[1]),
-            moments=self._moments,
+            moments=self.moments,
         )

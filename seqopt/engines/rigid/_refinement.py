@@ -46,7 +46,7 @@ from seqopt.engines.rigid._mixed import (
     unchanged,
     unscaled,
 )
-from seqopt.engines.rigid._operator import ComplianceOperator, _load_rows
+from seqopt.engines.rigid._operator import ComplianceOperator, load_rows
 from seqopt.engines.rigid._pairs import _by_grip
 from seqopt.engines.rigid._response_maps import ResponseMaps, inner_edges, scene_maps
 from seqopt.errors import SolverError
@@ -196,7 +196,7 @@ def _operator(
     network, bricks = parts.network, parts.bricks
     moments = (len(states) - loose) // bricks - 6
     weight = np.zeros(len(states))
-    at = _load_rows(np.arange(2 * bricks)[None], 3, moments)[0]
+    at = load_rows(np.arange(2 * bricks)[None], 3, moments)[0]
     weight[at[: 6 * bricks]] = network.inner_weight[: 2 * bricks].ravel()
     wrench, twist = unscaled(parts, states)
     wrench = wrench[:, parts.acting].reshape(len(states), -1)
@@ -280,7 +280,7 @@ class Refinement:
 
 
 def _loaded(parts: Ungripped) -> sparse.csr_array:
-    """Return what loads do to scaled twists, (l, 6b), as `_load_rows` numbers them in space."""
+    """Return what loads do to scaled twists, (l, 6b), as `load_rows` numbers them in space."""
     network, size = parts.network, 6 * parts.bricks
     if not network.scene.grip_kinds.turns.any():
         return parts.inner
@@ -394,7 +394,7 @@ class _Corrector:
         """Return what must be added to scaled answers (S, n) and grip forces (S, 3r)."""
         operator, parts, columns = self.operator, self.parts, asked.columns
         joints, grips = len(parts.wrench_unit), columns.shape[1]
-        at = _load_rows(columns, 3, 3 if operator.moments else 0)
+        at = load_rows(columns, 3, 3 if operator.moments else 0)
         load = np.zeros((len(at), self.inner.shape[0]))
         np.add.at(load, (np.arange(len(at))[:, None], at), force)  # a brick may be turned twice
         pulled = (self.inner.T @ load.T).T / parts.unit + parts.load

@@ -18,7 +18,7 @@ AT_ONCE = 2**18  # numbers mapped at a time: they stay in the processor's cache
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class _SceneMaps(FrozenValue):
+class SceneMaps(FrozenValue):
     """What twists and wrenches of all bricks and springs of a scene mean, once all springs act.
 
     ``basis``: k directions of twists and wrenches. ``edge`` (E, kS): what edges carry of wrenches.
@@ -36,7 +36,7 @@ class _SceneMaps(FrozenValue):
     support: Floats
 
 
-def scene_maps(network: Network, basis: Basis = SPACE) -> _SceneMaps:
+def scene_maps(network: Network, basis: Basis = SPACE) -> SceneMaps:
     """Return the maps of a scene."""
     statics, springs = build_statics(network), network.springs
     pick = np.zeros((3, len(basis.wrench)))
@@ -50,14 +50,14 @@ def scene_maps(network: Network, basis: Basis = SPACE) -> _SceneMaps:
     of_node = np.where(network.node_spring >= 0, springs.since[network.node_spring], 0)
     since = np.repeat(np.repeat(of_node, 3), np.diff(motion.indptr))
     support = basis.wrench @ statics.support_of_spring.transpose(0, 2, 1)
-    return _SceneMaps(network, basis, edge, motion, since, support)
+    return SceneMaps(network, basis, edge, motion, since, support)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ResponseMaps(FrozenValue):
     """What twists (.., kb) and wrenches (.., ks) of the first b bricks and s springs mean."""
 
-    scene: _SceneMaps
+    scene: SceneMaps
     bricks: int  # how many stand
 
     @cached_property

@@ -43,11 +43,12 @@ from seqopt.engines.rigid._extremes import (
     solve_compiled,
 )
 from seqopt.engines.rigid._grip_equations import _GripForces, grip_forces, share_pairs, trusted
+from seqopt.engines.rigid._grown import GrownExtremes
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._hanging import Hanging
 from seqopt.engines.rigid._mechanism import Shared, share
 from seqopt.engines.rigid._mixed import LAST_CORRECTION
-from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder
+from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder, are_few, load_rows
 from seqopt.engines.rigid._pairs import Pairs, _by_grip, pairs_of
 from seqopt.engines.rigid._refinement import Refinement
 from seqopt.network.network import Network
@@ -171,6 +172,19 @@ def _try_extremes(
     return found, size, apart
 
 
+def _try_grown(
+    grown: GrownExtremes, columns: Ints, want: Want, accuracy: float
+) -> tuple[Floats, Floats, Bools]:
+    """Return the same straight from what grows with the build."""
+    index = load_rows(columns, 3, 0)
+    force, pivot = grown.forces(columns)
+    apart = ~trusted(grown.doubts, index, _GripForces(force, pivot), accuracy / _UNSEEN)
+    force[apart] = 0.0
+    found = grown.extremes(columns, force, want)
+    size = np.sqrt((force.reshape(*columns.shape, 3) ** 2).sum(axis=2))
+    return found, size, apart | ~np.isfinite(found).all(axis=0)
+
+
 _KEPT = 32e6  # bytes of operators that may stay when another is made
 _SCREEN = 1e-6  # the same, of what is only to be compared
 _EVEN = 5e-5  # softest over stiffest joint from which on pivots tell the whole error
@@ -250,10 +264,13 @@ class ComplianceEngine(NamedEngine):
         apart = np.ones(len(columns), dtype=bool)  # what fields are computed of
         found, size = np.empty((4, len(columns))), np.empty(columns.shape)
         if bricks <= min(self._even, len(self._tree.spring)):
-            operator = self._operator(bricks, columns)
-            if operator.few_loads(len(columns)):
-                accuracy = self._accepted(want)
+            accuracy = self._accepted(want)
+            if are_few(bricks * len(self._basis.force), len(columns)):
+                operator = self._operator(bricks, columns)
                 found, size, apart = _try_extremes(operator, columns, want, accuracy)
+            elif self._grown is not None and self._builder.growth.bricks <= bricks:
+                self._grown.reach(bricks)
+                found, size, apart = _try_grown(self._grown, columns, want, accuracy)
         if np.count_nonzero(apart):
             fields = self._found(bricks, columns[apart], None, want)
             rest = extremes_in(require_finite(fields, bricks, numbers[apart]), want)
@@ -302,6 +319,13 @@ class ComplianceEngine(NamedEngine):
     def _builder(self) -> OperatorBuilder:
         """Made when the first operator is: a scene that is loose from the start has none."""
         return OperatorBuilder(self._network, self._tree, self._basis)
+
+    @cached_property
+    def _grown(self) -> GrownExtremes | None:
+        """What answers few grip sets of large structures, where loops are made for the scene."""
+        rests = not self._network.springs.movement.any()
+        plain = self._basis is SPACE and rests and not self._builder.moments
+        return GrownExtremes(self._builder) if plain else None
 
     def _refined(self, bricks: int, columns: Ints, hands: Hands | None, want: Want) -> Fields:
         """Return what is wanted of grip sets that the operator alone answers not well enough."""

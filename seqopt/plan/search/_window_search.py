@@ -80,8 +80,9 @@ class _Walk:
     """A search on its way: what was looked at, and what is chosen."""
 
     def __init__(self, problem: Layers) -> None:
-        self._problem, self._schedule = problem, problem.schedule
-        self.alone = alone_steps(problem)
+        self.alone, self._schedule = alone_steps(problem), problem.schedule
+        whole = replace(problem.evaluation, beside=self.alone.evaluation.work)
+        self._problem = replace(problem, evaluation=whole)  # of which little is asked at a time
         if self.alone.evaluation.streams:
             raise MemoryShortError(
                 "the responses of steps with one open grip do not fit into the memory that may be "
