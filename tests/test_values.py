@@ -56,7 +56,7 @@ def values(arch25):
     parts = ungripped_system(network, 2)
     proven = Prover(assembly, _compiled())(bonded(assembly, EPOXY))
     plane = _Plane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.eye(3)[[0, 2]])
-    maps = scene_maps(network)
+    maps, operator = scene_maps(network), OperatorBuilder(network, tree).operator(2)
     shapes = boxes(arch25.bricks)
     joined = overlaps(shapes, [(0, 1)])
     (touching,) = touching_faces([box((1, 1, 1)), box((1, 1, 1), at=(0, 0, 1))], 1e-3)
@@ -66,7 +66,7 @@ def values(arch25):
         *(touching, flat_face(touching.corners), Surface(np.zeros((3, 3)), ((0, 1, 2),))),
         *(network, network.springs, build_statics(network)),
         *(assembly, face_quadrature(assembly), find_elastic_limits(network, EPOXY)),
-        *(SPACE, plane, tree, OperatorBuilder(network, tree).operator(2), parts, share(network)),
+        *(SPACE, plane, tree, operator, operator.doubts, parts, share(network)),
         *(mixed_system(parts, grips), rigid_structure(network, 2)),
         *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points, held),
         *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),

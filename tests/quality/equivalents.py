@@ -158,9 +158,7 @@ EQUIVALENT = (
         for new in ("1 *", "3 *", "2 +", "2 -", "2 /")
     ),
     *(
-        Equivalent(
-            OPERATOR, "self.axis.size <= max", "<=", new, "which way of two that agree is taken"
-        )
+        Equivalent(OPERATOR, "unknowns <= max", "<=", new, "which way of two that agree is taken")
         for new in ("<", "!=", ">", ">=", "==")
     ),
     Equivalent(GRIPS, "doubts(", "<=", "<", "no doubt is it to the last bit"),
