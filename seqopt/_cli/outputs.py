@@ -161,8 +161,7 @@ def time_files(build: ShownBuild) -> dict[str, bytes | str]:
 
 def _task_files(plan: Plan) -> dict[str, str]:
     """Return what robots do, for those who program them, by file name."""
-    from seqopt.sequence.exports._arm_tasks import _in_postures  # noqa: PLC0415
-    from seqopt.sequence.exports._tasks import plan_tasks, tasks_csv, tasks_json  # noqa: PLC0415  # only where files are written
+    from seqopt.sequence.exports._tasks import _in_postures, plan_tasks, tasks_csv, tasks_json  # noqa: PLC0415  # only where files are written
 
     scene = plan.engine.network.scene
     tasks = [*plan_tasks(scene, plan.steps)]

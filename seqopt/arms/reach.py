@@ -2,15 +2,89 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
+import re
+import zipfile
+from collections.abc import Callable, Iterator
+from dataclasses import fields
 from functools import lru_cache, partial
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from seqopt._files import make_folder, read_bytes, write_bytes
+from seqopt.arms._model import UP, model_path
 from seqopt.arms._reached import Site
-from seqopt.arms._stored import stored_table
 from seqopt.arms.table import PostureTable, _compute_table, _with_compliance
 from seqopt.scene.arm import Arm
 from seqopt.scene.scene import Scene
 from seqopt.work.progress import Tell
+
+_VERSION = 1  # of what is computed: tables of another one are not taken
+_NAMES = ("robots", "nodes", "bricks")
+_MESH = re.compile(rb'filename="(?:package://|file://)?([^"]+)"')
+
+
+def _stored_table(folder: Path, site: Site, compute: Callable[[], PostureTable]) -> PostureTable:
+    """Return the table of a site from a folder, or compute it and keep it there."""
+    make_folder(folder)
+    path = folder / f"postures-{_key(site)}.npz"
+    if path.exists() and (found := _read(path)) is not None:
+        return found
+    table = compute()
+    write_bytes(path, _content(table))
+    return table
+
+
+def _key(site: Site) -> str:
+    """Return the content that postures depend on, condensed: robots, bricks, models, meshes."""
+    found = hashlib.sha256(repr((_VERSION, site.up, site.blocked)).encode())
+    for brick in site.bricks:
+        shape = None if brick.shape is None else brick.shape.vertices
+        own = (brick.name, brick.position, brick.length_axis, brick.width_axis, brick.dimensions)
+        found.update(repr((*own, brick.nodes, brick.node_offsets, shape)).encode())
+    for robot in site.robots:
+        arm = robot.arm
+        assert arm is not None
+        own = tuple(getattr(arm, each.name) for each in fields(arm) if each.name != "urdf")
+        found.update(repr((robot.name, robot.reach, own)).encode())
+        for content in _model(model_path(arm)):
+            found.update(hashlib.sha256(content).digest())
+    return found.hexdigest()[:32]
+
+
+def _model(path: Path) -> Iterator[bytes]:
+    """Yield the content of a URDF and of the meshes that it names, as far as they are found."""
+    text = read_bytes(path)
+    yield text
+    folders = [*path.resolve().parents][:UP]
+    for name in sorted({*_MESH.findall(text)}):
+        for each in folders:
+            mesh = each / name.decode("utf-8", "replace")
+            if mesh.is_file():
+                yield read_bytes(mesh)
+                break
+
+
+def _content(table: PostureTable) -> bytes:
+    """Return a table as the bytes of a NumPy archive."""
+    out = io.BytesIO()
+    arrays = {each.name: np.asarray(getattr(table, each.name)) for each in fields(table)}
+    np.savez_compressed(out, **arrays)  # type: ignore[arg-type]
+    return out.getvalue()
+
+
+def _read(path: Path) -> PostureTable | None:
+    """Return the table of a file; None if it is none, or damaged."""
+    try:
+        with np.load(io.BytesIO(read_bytes(path)), allow_pickle=False) as archive:
+            content: dict[str, Any] = {n.name: archive[n.name] for n in fields(PostureTable)}
+    except (KeyError, ValueError, OSError, EOFError, zipfile.BadZipFile):
+        return None
+    return PostureTable(**content | {name: tuple(content[name].tolist()) for name in _NAMES})
+
 
 _SITES = 16  # of which tables are kept, the last ones that were asked for
 
@@ -48,7 +122,7 @@ def find_postures(
     known = _known(site)
     compute = partial(_compute_table, site, progress or (lambda _: None))
     if cache is not None and Path(cache) not in known:
-        known[Path(cache)] = stored_table(Path(cache), site, lambda: known.get(None) or compute())
+        known[Path(cache)] = _stored_table(Path(cache), site, lambda: known.get(None) or compute())
         known.setdefault(None, known[Path(cache)])
     if None not in known:
         known[None] = compute()

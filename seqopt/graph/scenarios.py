@@ -17,8 +17,13 @@ from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError
-from seqopt.graph.layers._arcs import array_by_array, least_path, least_to_go
-from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.costs import (
+    Budget,
+    LayeredCosts,
+    _array_by_array,
+    _least_path,
+    _least_to_go,
+)
 from seqopt.graph.layers.layers import Layers
 from seqopt.problem.problem import Aim, RobustAim
 from seqopt.problem.requirements import ResponsesAsked
@@ -194,7 +199,7 @@ class ScenarioArcs(FrozenValue):
             np.where(shut, np.inf, np.tensordot(weights, arc, 1))
             for arc, shut in zip(self.arcs, self.shut, strict=True)
         ]
-        return costs, least_to_go(costs)
+        return costs, _least_to_go(costs)
 
     def cheapest(self, weights: Floats) -> tuple[Choice, float]:
         """Return the choice of least weighted total, and that total.
@@ -202,7 +207,7 @@ class ScenarioArcs(FrozenValue):
         ``weights`` (S,). Result (tuple of int, float).
         """
         costs, rest = self.to_go(weights)
-        return least_path(costs, rest), float(rest[0][0])
+        return _least_path(costs, rest), float(rest[0][0])
 
     def improved(self, choice: Choice) -> tuple[Choice, float]:
         """Return what a choice becomes by changing the one move that helps most, again and again.
@@ -395,7 +400,7 @@ def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
 
     ``layers``: of the same moves. Raises `InfeasibleError` if no choice is allowed in all of them.
     """
-    out = array_by_array(_largest, *layers)
+    out = _array_by_array(_largest, *layers)
     try:
         out.continuable()
     except InfeasibleError as error:

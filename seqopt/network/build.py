@@ -11,7 +11,7 @@ import numpy as np
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network, PartKind, Springs
-from seqopt.scene._axes import frames
+from seqopt.scene._checks import frames
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene, in_order
 

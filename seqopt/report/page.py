@@ -37,8 +37,7 @@ from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Order, Scene
 from seqopt.scene.shape import normal_of
-from seqopt.sequence.exports._arm_tasks import _known_tasks
-from seqopt.sequence.exports._tasks import plan_tasks, tasks_csv, tasks_json
+from seqopt.sequence.exports._tasks import _known_tasks, plan_tasks, tasks_csv, tasks_json
 from seqopt.sequence.steps import Step
 from seqopt.stability._builds import WORDS, BuildVerdicts
 

@@ -15,8 +15,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, Vector
 from seqopt.errors import SceneError
-from seqopt.scene._axes import frames
-from seqopt.scene._checks import rows, short, vector, whole
+from seqopt.scene._checks import frames, rows, short, vector, whole
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron
 

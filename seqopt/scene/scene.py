@@ -13,12 +13,19 @@ from seqopt._showing import Shown, display
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import check, not_negative, printable, short, vector, wholes
-from seqopt.scene._grip_kinds import GripKinds, grip_kinds
 from seqopt.scene._loads import Load
-from seqopt.scene._sides import from_both_sides
 from seqopt.scene.holders._durations import _durations_in_words
 from seqopt.scene.holders._props import Prop, centered, settled_props
-from seqopt.scene.parts import Brick, Ground, Joint, Reach, Robot
+from seqopt.scene.parts import (
+    Brick,
+    Ground,
+    Joint,
+    Reach,
+    Robot,
+    _from_both_sides,
+    _grip_kinds,
+    _GripKinds,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -377,10 +384,10 @@ class Scene(Shown):
         return replace(self, robots=tuple(replace(r, durations=each) for r, each in pairs))
 
     @cached_property
-    def grip_kinds(self) -> GripKinds:
+    def grip_kinds(self) -> _GripKinds:
         """How its robots give way where they hold, and after them its props."""
         holders = [*self.robots, *(prop.as_robot for prop in self.props)]
-        return grip_kinds(holders, [*self.brick_of_node])
+        return _grip_kinds(holders, [*self.brick_of_node])
 
     @cached_property
     def prop_of_number(self) -> dict[int, Prop]:
@@ -479,7 +486,7 @@ def _from_all_ends(scene: Scene) -> Order:
 ORDERS: dict[str, Callable[[Scene], Order]] = {
     "reversed": lambda scene: scene.build_order[::-1],
     "ends": _from_all_ends,
-    "sides": lambda s: from_both_sides(s.build_order, [b.position for b in s.placed], s.up),
+    "sides": lambda s: _from_both_sides(s.build_order, [b.position for b in s.placed], s.up),
 }
 """Orders by name.
 

@@ -24,8 +24,7 @@ import numpy as np
 from seqopt._files import read_text, write_text
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
-from seqopt.scene._checks import cut, reading_json, short
-from seqopt.scene._fitting import which_fit
+from seqopt.scene._checks import cut, reading_json, short, which_fit
 from seqopt.scene._loads import Load
 from seqopt.scene.arm import Arm
 from seqopt.scene.holders._durations import Durations

@@ -63,7 +63,7 @@ def _files(scene: Scene, table: pd.DataFrame) -> dict[str, bytes | str]:
     files["postures.csv"] = csv_text(find_table(scene).table())
     if figure_notes():
         return files
-    from seqopt.report._reach import reach_picture  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report._pictures import reach_picture  # noqa: PLC0415  # matplotlib is an extra
     from seqopt.report._style import picture_files  # noqa: PLC0415
 
     return files | picture_files("reach", reach_picture(table))

@@ -15,8 +15,7 @@ from seqopt.engines.registry import recipe_of
 from seqopt.errors import InfeasibleError, SeqoptError, SolverError
 from seqopt.graph._counted import least_by_counts
 from seqopt.graph._explore import Explorer
-from seqopt.graph.layers._arcs import array_by_array, where_allowed
-from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.costs import Budget, LayeredCosts, _array_by_array, _where_allowed
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.paths import distances, least_peak, tied
 from seqopt.graph.scenarios import engine_for
@@ -52,7 +51,7 @@ def smallest_conflict(problem: PlacementProblem) -> tuple[Budget, ...]:
 
 def _conflict(costs: LayeredCosts, budgets: tuple[Budget, ...]) -> bool:
     """Return whether it is proven that no allowed choice keeps all budgets."""
-    nothing = where_allowed(costs, array_by_array(np.zeros_like, costs))
+    nothing = _where_allowed(costs, _array_by_array(np.zeros_like, costs))
     return least_within(CostProblem(nothing, budgets), 1.0, {}, 1.0) >= PROVEN
 
 
@@ -68,7 +67,7 @@ def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
             f"claimed by {name}, and not proven: no choice is within all budgets; raise a bound"
         )
     if len(found) == 1:
-        return too_small(found[0], least_sum(where_allowed(problem.sums, found[0])))
+        return too_small(found[0], least_sum(_where_allowed(problem.sums, found[0])))
     named = [f"{budget.bound:.6g} of {budget.name!r}" for budget in found]
     fewer = "each can alone" if len(found) == 2 else "any fewer of them can"
     return InfeasibleError(

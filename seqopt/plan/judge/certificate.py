@@ -10,9 +10,8 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import FileError, SolverError
-from seqopt.graph.layers._arcs import array_by_array
 from seqopt.graph.layers._partial_costs import PartialCosts, least_possible
-from seqopt.graph.layers.costs import TINY, LayeredCosts
+from seqopt.graph.layers.costs import TINY, LayeredCosts, _array_by_array
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.scenarios import ScenarioLayers
@@ -318,4 +317,4 @@ def _proven(
         parts = [weight * each for weight, each in zip(weights, costs, strict=True) if weight > 0]
         return np.where(np.isfinite(costs).all(axis=0), sum(parts), np.inf)
 
-    return least_sum(array_by_array(weighed, *layers))
+    return least_sum(_array_by_array(weighed, *layers))

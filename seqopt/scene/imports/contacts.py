@@ -15,8 +15,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import FileError, SceneError
-from seqopt.scene._axes import units
-from seqopt.scene._checks import positive, short
+from seqopt.scene._checks import positive, short, units
 from seqopt.scene.boxes import as_vector, spring_fields
 from seqopt.scene.imports._content import GROUND, Content, FileJoint, Given
 from seqopt.scene.imports._meshes import Repaired

@@ -9,7 +9,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SceneError
-from seqopt.scene._axes import units
+from seqopt.scene._checks import units
 from seqopt.scene.boxes import Boxes, as_vector, boxes, spring_fields
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.parts import THICKEST, Brick, Ground, Joint

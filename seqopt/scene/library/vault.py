@@ -17,8 +17,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.scene._axes import units
-from seqopt.scene._checks import check, finite, length, whole_between
+from seqopt.scene._checks import check, finite, length, units, whole_between
 from seqopt.scene.boxes import as_vector, require_apart
 from seqopt.scene.library._joints import ground_under, joints_between
 from seqopt.scene.library.common import (
