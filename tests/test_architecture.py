@@ -46,7 +46,6 @@ SHARED = {  # what formulations may import
     "formulations.whole_program",
     "formulations._weights",
     "formulations.states._search",
-    "formulations.states._bare",
     "formulations.times._search",
     "formulations.times._labels",
     "formulations.times._prices",

@@ -161,6 +161,18 @@ class ArmModel:
         turned[:3] += np.cross(turned[3:], away, axis=0)
         return np.asarray(turned)
 
+    def grip_compliance(self, posture: Floats) -> Floats:
+        """Return how a grip gives way in a posture (6, 6): J diag(1/k) Jᵀ, of the node held.
+
+        Motion by force, translations first, in the axes of the scene: m/N, rad/N, m/(N m) and
+        rad/(N m). Links and tool are rigid here; joints alone give way, each by its own stiffness.
+        """
+        stiffness = np.array(self.arm.joint_stiffness)
+        if not len(stiffness):
+            raise SceneError("arm: its joints have no stiffness; give joint_stiffness")
+        jacobian = self.jacobian(posture)
+        return np.asarray(jacobian / stiffness @ jacobian.T)
+
     def placed(self, postures: Floats, tools: Floats) -> Placed:
         """Return where moving bodies are in postures (P, joints).
 

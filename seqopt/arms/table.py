@@ -16,7 +16,6 @@ import pandas as pd
 from seqopt.arms._collisions import collide_pairs
 from seqopt.arms._model import ArmModel
 from seqopt.arms._reached import Reached, Site, beside_others, reached_alone
-from seqopt.arms._stiffness import _compliance
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import SceneError
 from seqopt.scene.arm import MOST, Arm
@@ -182,5 +181,5 @@ def _with_compliance(table: PostureTable, arms: Sequence[tuple[str, Arm]]) -> Po
             except SceneError as error:
                 raise SceneError(f"robot {name}: {str(error).removeprefix('arm: ')}") from error
             for row in rows.tolist():
-                found[row] = _compliance(model, table.joints[row, : model.joints])
+                found[row] = model.grip_compliance(table.joints[row, : model.joints])
     return replace(table, compliance=found)

@@ -18,7 +18,7 @@ from seqopt._files import read_bytes, write_bytes
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import FileError, ProblemError, StepError
 from seqopt.graph._explore import Visited
-from seqopt.graph._to_go import to_go
+from seqopt.graph.paths import _to_go
 from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import States
 from seqopt.plan.judge._policy import check_policy
@@ -324,7 +324,7 @@ def _states_with_policy(problem: Problem) -> States:
 def _of_graph(states: States, visited: Visited) -> Policy:
     """Return the policy of all states of a graph."""
     graph, space = visited.graph, states.space
-    left = to_go(graph)
+    left = _to_go(graph)
     after = np.where(left.move < 0, -1, graph.target[left.move])
     bricks = [np.full(len(rows), space.bricks_at(level)) for level, _, rows in visited.states]
     return Policy(

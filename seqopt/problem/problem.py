@@ -532,3 +532,27 @@ READ: dict[str, Callable[[Any], Any]] = {
     "orders": lambda given: None if given is None else Orders.of(given),
     "also": tuple,
 }
+
+
+class _Asked(Protocol):
+    """What is asked of a build."""
+
+    @property
+    def standing(self) -> Standing | None: ...
+    @property
+    def goals(self) -> Sequence[Goal]: ...
+    @property
+    def scenarios(self) -> Sequence[Engine]: ...
+    @property
+    def network(self) -> Network: ...
+
+
+def _require_for_curing(problem: _Asked) -> None:
+    """Raise a `ProblemError` where mortar cures and what is asked beside it is not modeled."""
+    if problem.standing is None or problem.standing.curing is None:
+        return
+    wrong = [str(goal) for goal in problem.goals if goal.of_margins]
+    wrong += ["props"] if problem.network.scene.props else []
+    wrong += ["scenarios"] if problem.scenarios else []
+    if wrong:
+        raise ProblemError(f"curing: {wrong[0]} beside it is not modeled; leave one of them out")

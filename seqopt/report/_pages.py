@@ -20,8 +20,8 @@ from seqopt.plan.front import Front
 from seqopt.plan.plan import Plan
 from seqopt.problem._arms import arm_faults
 from seqopt.problem.requirements import overloads
-from seqopt.report._opening._says import worst_along
 from seqopt.report._robots import _known_arms
+from seqopt.report._says import worst_along
 from seqopt.report._speed._table import SpeedTable
 from seqopt.report.comparison import CLOSED, Comparison, fixed_methods, largest, shown_table
 from seqopt.report.page import Build, Scatter, _Drawn, _grips_off, report_page

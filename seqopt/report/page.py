@@ -27,8 +27,8 @@ from seqopt.engines.interface import Engine, Want
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, _prop_faults, overloads
-from seqopt.report._opening._says import deciding_step, far_off, in_a_sentence, robot_words
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
+from seqopt.report._says import deciding_step, far_off, in_a_sentence, robot_words
 from seqopt.report.text import in_words
 from seqopt.responses._tolerance import each_tolerance, held_in_steps, is_linear
 from seqopt.responses.quantities import _number_text

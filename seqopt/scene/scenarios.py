@@ -18,9 +18,8 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene._checks import short, whole_between
-from seqopt.scene._loads import Load
 from seqopt.scene.boxes import as_vector
-from seqopt.scene.parts import Brick, Ground, Joint, Robot
+from seqopt.scene.parts import Brick, Ground, Joint, Load, Robot
 from seqopt.scene.scene import Scene
 
 _End = TypeVar("_End", Joint, Ground)

@@ -13,13 +13,13 @@ from seqopt._showing import Shown, display
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import check, not_negative, printable, short, vector, wholes
-from seqopt.scene._loads import Load
 from seqopt.scene.holders._durations import _durations_in_words
 from seqopt.scene.holders._props import Prop, centered, settled_props
 from seqopt.scene.parts import (
     Brick,
     Ground,
     Joint,
+    Load,
     Reach,
     Robot,
     _from_both_sides,

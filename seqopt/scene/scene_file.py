@@ -25,16 +25,21 @@ from seqopt._files import read_text, write_text
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import cut, reading_json, short, which_fit
-from seqopt.scene._loads import Load
 from seqopt.scene.arm import Arm
 from seqopt.scene.holders._durations import Durations
 from seqopt.scene.holders._props import Prop
-from seqopt.scene.library._barrel import BarrelShape, barrel
-from seqopt.scene.library.arch_form import ArchForm, arch, barrel_vault, chain
+from seqopt.scene.library.arch_form import (
+    ArchForm,
+    _barrel,
+    _BarrelShape,
+    arch,
+    barrel_vault,
+    chain,
+)
 from seqopt.scene.library.dome import DomeShape, dome
 from seqopt.scene.library.vault import VaultShape, herringbone_vault
 from seqopt.scene.library.wall import WallShape, wall
-from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Reach, Robot, Side, Sphere
+from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Load, Reach, Robot, Side, Sphere
 from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.shape import Polyhedron
 
@@ -192,7 +197,7 @@ KINDS = {
         VaultShape,
     ),
     "vault": _Kind(
-        "a barrel vault in running bond: vault:span=2,rise=0.8,columns=3", barrel, BarrelShape
+        "a barrel vault in running bond: vault:span=2,rise=0.8,columns=3", _barrel, _BarrelShape
     ),
     "wall": _Kind(
         "a wall in running bond: wall:columns=6,courses=4,corbel=0.02, or wall:length=2,height=0.6",

@@ -9,8 +9,7 @@ import pytest
 
 import seqopt
 from seqopt.arms import find_postures
-from seqopt.arms._listing import reach_table
-from seqopt.arms._permits import permits, reachable, within_reach
+from seqopt.arms._permits import permits, reach_table, reachable, within_reach
 from seqopt.arms._reached import Site, reached_alone
 from seqopt.arms.reach import _stored_table
 from seqopt.arms.table import _compute_table

@@ -11,7 +11,7 @@ import pytest
 
 from seqopt.problem.criteria import WORST_OVER_METHODS
 from seqopt.problem.requirements import SceneFacts
-from seqopt.report._opening._says import deciding_step, in_a_sentence, worst_along
+from seqopt.report._says import deciding_step, in_a_sentence, worst_along
 from seqopt.report.page import Build, report_page
 from seqopt.responses.table import Departure, analyze
 from seqopt.sequence.two_robots import sequential

@@ -14,7 +14,7 @@ from seqopt._cli.outputs import figure_notes, require_out, write_outputs
 from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
-from seqopt.arms._listing import find_table, reach_table
+from seqopt.arms._permits import find_table, reach_table
 from seqopt.arms.reach import find_postures
 from seqopt.scene.scene import Scene
 

@@ -16,7 +16,6 @@ from seqopt.errors import ProblemError
 from seqopt.graph.scenarios import engine_for, require_alike
 from seqopt.graph.states._checks import checked_limits, of_states
 from seqopt.network.network import Network
-from seqopt.problem._cures import require_for_curing
 from seqopt.problem.problem import (
     LARGEST,
     STATE_RESPONSES,
@@ -26,6 +25,7 @@ from seqopt.problem.problem import (
     Measure,
     RobustAim,
     _goals,
+    _require_for_curing,
 )
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Criterion, Limit, state_costs
 from seqopt.problem.standing import Standing, StandingSets
@@ -499,5 +499,5 @@ def _asked(problem: States) -> States:
         _ = problem.stability  # what cannot be asked is refused now
     if problem.is_timed:
         require_for_makespan(problem.network.scene, problem.rules)
-    require_for_curing(problem)
+    _require_for_curing(problem)
     return problem

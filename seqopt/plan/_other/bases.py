@@ -21,8 +21,8 @@ from seqopt.arms._permits import permits, within_reach
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Terse, Vector
 from seqopt.errors import InfeasibleError, ProblemError, SceneError
-from seqopt.plan._kept import moved
 from seqopt.plan.plan import Plan
+from seqopt.plan.solving import _moved
 from seqopt.problem.problem import Problem
 from seqopt.scene.arm import Arm
 from seqopt.scene.parts import Robot
@@ -275,11 +275,11 @@ class _Search:
             lacking = _lacking(apart)
             if lacking is not None:
                 return f"no plan: nobody reaches brick {lacking}", (inf,)
-            alone = (-inf,) if soft else _bound(self._solved(moved(self._problem, apart)))
+            alone = (-inf,) if soft else _bound(self._solved(_moved(self._problem, apart)))
             if self._plan is not None and not _is_below(alone, self._best):
                 return "skipped: by reach alone no better", alone
             find_postures(scene, self._problem.resources.cache, self._tell)
-            problem = moved(self._problem, scene)
+            problem = _moved(self._problem, scene)
             plan = self._solved(problem)
         except InfeasibleError:
             return "no plan", (inf,)

@@ -16,11 +16,10 @@ import pandas as pd
 
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError, StepError
-from seqopt.plan._kept import moved
 from seqopt.plan._other.bases import _bound, _is_below, _value
 from seqopt.plan.judge._proof import Proof
 from seqopt.plan.plan import Plan
-from seqopt.plan.solving import states_of
+from seqopt.plan.solving import _moved, states_of
 from seqopt.problem.problem import Measure, Problem
 from seqopt.scene.holders._props import Prop
 from seqopt.scene.scene import Scene
@@ -172,7 +171,7 @@ class _Search:
     def _outcome(self, chosen: _Set, scene: Scene) -> tuple[str, tuple[float, ...]]:
         """Return what is known of a set, in words, and the values of its best plan."""
         try:
-            problem = moved(self._problem, scene)
+            problem = _moved(self._problem, scene)
             stop = Proof(states_of(problem)).stops_at(self._wanted())
             if stop is not None:
                 self._cuts.setdefault(stop, set()).add(self._until(chosen, stop))

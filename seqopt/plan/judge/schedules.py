@@ -21,9 +21,8 @@ from seqopt.graph._counted import least_by_counts
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.judge._mortar.check import check_cured
-from seqopt.plan.judge._posture_rules import check_postures
+from seqopt.plan.judge._posture_rules import check_postures, check_props
 from seqopt.plan.judge._proof import BELOW, Hint, Proof
-from seqopt.plan.judge._prop_rules import check_props
 from seqopt.plan.judge._standing_proof import proven_margins, require_margin
 from seqopt.plan.judge._time_proof import makespan, step_ends
 from seqopt.plan.judge._timed_goals import Claim

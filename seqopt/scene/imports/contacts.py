@@ -342,7 +342,7 @@ class Contacts:
         return [*(pair for pair, _ in self.faces), *(joint.blocks for joint in self.joints)]
 
 
-def find_contacts(
+def _find_contacts(
     content: Content, given: Given, blocks: Sequence[Repaired], bricks: Mapping[int, Brick]
 ) -> Contacts:
     """Return where blocks touch each other and the ground, which those not built belong to."""

@@ -25,8 +25,14 @@ from seqopt.scene._checks import printable, short
 from seqopt.scene.arch import STANDARD_GRAVITY
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.imports._building import build_scene
-from seqopt.scene.imports._compas_models import read_assembly, read_model, read_timber
-from seqopt.scene.imports._compas_scenes import is_meshes, read_meshes, read_scene
+from seqopt.scene.imports._compas_models import (
+    is_meshes,
+    read_assembly,
+    read_meshes,
+    read_model,
+    read_scene,
+    read_timber,
+)
 from seqopt.scene.imports._compas_shapes import kind, payload
 from seqopt.scene.imports._content import (
     GROUND,

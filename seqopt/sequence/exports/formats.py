@@ -23,8 +23,7 @@ from seqopt.arrays import Floats
 from seqopt.errors import FileError, StepError
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import vertices_of
-from seqopt.scene.imports._building import block_numbers
-from seqopt.scene.imports._carried import carry
+from seqopt.scene.imports._building import block_numbers, carry
 from seqopt.scene.imports._compas_models import assembly_graph, by_guid
 from seqopt.scene.imports._compas_shapes import kind, payload
 from seqopt.scene.imports._content import entry, parse_json
