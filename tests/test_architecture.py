@@ -48,7 +48,6 @@ SHARED = {  # what formulations may import
     "formulations.states._search",
     "formulations.times._search",
     "formulations.times._labels",
-    "formulations.times._prices",
     "formulations.times._stages",
     "formulations.states._totals",
 }

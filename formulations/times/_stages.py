@@ -15,8 +15,16 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from formulations.states._search import StopError
-from formulations.times._labels import STEPS, Caps, Labels, LateError, Sweep, Swept
-from formulations.times._prices import Prices, best_prices
+from formulations.times._labels import (
+    STEPS,
+    Caps,
+    Labels,
+    LateError,
+    Prices,
+    Sweep,
+    Swept,
+    best_prices,
+)
 from seqopt.arrays import Bools
 from seqopt.errors import InfeasibleError
 from seqopt.graph._explore import Visited

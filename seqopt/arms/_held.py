@@ -14,8 +14,7 @@ import numpy as np
 
 from seqopt.arms._model import ArmModel
 from seqopt.arms._reached import Site, choose
-from seqopt.arms.reach import find_postures
-from seqopt.arms.table import PostureTable
+from seqopt.arms.reach import PostureTable, find_postures
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.scene.arm import Arm
 from seqopt.scene.scene import Scene

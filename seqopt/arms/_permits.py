@@ -15,8 +15,7 @@ import pandas as pd
 
 from seqopt.arms._held import held_postures
 from seqopt.arms._reached import choose
-from seqopt.arms.reach import find_postures
-from seqopt.arms.table import PostureTable
+from seqopt.arms.reach import PostureTable, find_postures
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError
 from seqopt.scene.parts import Robot

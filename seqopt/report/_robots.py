@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from seqopt.arms._drawn import PosedArm, idle_arm
+from seqopt.arms._model import PosedArm, idle_arm
 from seqopt.arrays import Floats
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.scene.boxes import vertices_of

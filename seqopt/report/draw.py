@@ -23,7 +23,7 @@ from matplotlib.patches import PathPatch, Polygon
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 
-from seqopt.arms._drawn import PosedArm
+from seqopt.arms._model import PosedArm
 from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind
 from seqopt.report._robots import ROBOT_COLORS, Cell

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from seqopt.arms._held import held_postures
-from seqopt.arms.reach import find_postures
-from seqopt.arms.table import PostureTable
+from seqopt.arms.reach import PostureTable, find_postures
 from seqopt.arrays import Terse
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds

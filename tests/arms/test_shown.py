@@ -18,8 +18,7 @@ import seqopt
 from seqopt._cli.main import main
 from seqopt._cli.outputs import _task_files
 from seqopt._files import csv_text
-from seqopt.arms._drawn import idle_arm
-from seqopt.arms._model import ArmModel
+from seqopt.arms._model import ArmModel, idle_arm
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.plan._other.bases import without_arms
 from seqopt.report._films._film import Film

@@ -15,10 +15,9 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import InfeasibleError
 from seqopt.graph._budgets import budget_bounds, is_beyond
-from seqopt.graph._lazy import FAILS, PASSES, lazy_path
 from seqopt.graph.duality import lexicographic_bounds
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import lexicographic, reached, tied
+from seqopt.graph.paths import FAILS, PASSES, _lazy_path, lexicographic, reached, tied
 from seqopt.graph.states._visits import move_amounts
 from seqopt.graph.states.states import States
 from seqopt.plan.judge._answers import alike, ask, near, screens
@@ -375,7 +374,7 @@ class Proof:
         def recall(part: int, rows: Ints) -> Ints:
             return passable.recalled(*of(part, rows))
 
-        lazy_path(graph, parts, known, ask, recall)
+        _lazy_path(graph, parts, known, ask, recall)
         left = reached(graph, (known != FAILS)[graph.target])
         self.states = max(self.states, int(left.sum()))
         return not graph.ends[left].any()
