@@ -30,13 +30,7 @@ def needs_extra() -> None:
 
 
 def model_path(arm: Arm) -> Path:
-    """Return where the URDF of an arm is.
-
-    Raises
-    ------
-    SceneError
-        If there is no such file, or no such package is installed.
-    """
+    """Return where the URDF of an arm is; a `SceneError` says that there is none."""
     if not arm.in_package:
         path = Path(arm.urdf)
         if not path.is_file():

@@ -30,19 +30,11 @@ class Permits(FrozenValue):
     """What the postures of a table allow in the build order of a scene.
 
     Robots are those of the scene; nodes are places in build order from 1, brick by brick, and 0 is
-    that of a robot that holds nothing, or has no arm.
-
-    Attributes
-    ----------
-    rows : (R, 2B + 1, K) int
-        The postures with which plans are made, as rows of the table, the best first; -1 for none.
-    ends : (P + 1,) float
-        By row, from which brick count on something stands that is hit in it; infinite for never,
-        and zero, as the last one, for no posture.
-    collide : (P + 1, P + 1) bool
-        Which rows are in each other's way; no posture is in no one's.
-    armed : tuple of int
-        The robots that have arms.
+    that of a robot that holds nothing, or has no arm. ``rows`` (R, 2B + 1, K): the postures with
+    which plans are made, as rows of the table, the best first; -1 for none. ``ends`` (P + 1,): by
+    row, from which brick count on something stands that is hit in it; infinite for never, and zero,
+    as the last one, for no posture. ``collide`` (P + 1, P + 1): which rows are in each other's way;
+    no posture is in no one's. ``armed``: the robots that have arms.
     """
 
     rows: Ints
@@ -176,24 +168,12 @@ def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
 def reach_table(scene: Scene) -> pd.DataFrame:
     """Return which robot reaches which node, with how many postures, and how long.
 
-    Parameters
-    ----------
-    scene : Scene
-        With a robot that has an arm.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row for every robot with an arm and every node, in build order: ``robot``, ``brick``,
-        ``node``; ``postures``, how many were found that touch neither ground, bases, the arm itself
-        nor the brick that it grips; ``from_bricks``, with how many bricks that of the node is
-        placed; ``to_bricks``, up to how many a posture hits none of them, zero if there is none;
-        ``clear``, how many of the kept postures hit no brick of the finished structure.
-
-    Raises
-    ------
-    SceneError
-        If no robot has an arm.
+    A row for every robot with an arm and every node, in build order: ``robot``, ``brick``,
+    ``node``; ``postures``, how many were found that touch neither ground, bases, the arm itself nor
+    the brick that it grips; ``from_bricks``, with how many bricks that of the node is placed;
+    ``to_bricks``, up to how many a posture hits none of them, zero if there is none; ``clear``, how
+    many of the kept postures hit no brick of the finished structure. Raises `SceneError` if no
+    robot has an arm.
     """
     table, allowed = find_table(scene), permits(scene)
     assert allowed is not None

@@ -109,15 +109,7 @@ class PostureTable(FrozenValue):
 
 
 def _compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
-    """Return the posture table of a site.
-
-    Raises
-    ------
-    ExtraError
-        If pinocchio and coal are not installed.
-    SceneError
-        If a model cannot be read, or a base stands in a brick or in another base.
-    """
+    """Return the posture table of a site, if its models can be read and bases stand clear."""
     kept = max(1, min(MOST, _MOST_ROWS // max(1, len(site.robots) * len(site.nodes))))
     alone = []
     for number, robot in enumerate(site.robots):

@@ -272,89 +272,35 @@ def _rounded_up(values: Floats, steps: Floats) -> Floats:
 TOLERANCE = 1e-6  # of a value: how far a point may be from what the engine says of its plan
 
 
-class FrontProblem(Protocol):
+class _FrontProblem(Protocol):
     """What a formulation of Pareto sets is given."""
 
     @property
     def names(self) -> tuple[str, ...]:
         """The numbers that are to be small."""
 
-    def anew(self) -> FrontProblem:
-        """Return the same problem with nothing known of it, for its judge.
-
-        Returns
-        -------
-        FrontProblem
-        """
+    def anew(self) -> _FrontProblem:
+        """Return the same problem with nothing known of it, for its judge."""
 
     def best_below(self, bounds: Floats) -> tuple[Floats, object] | None:
-        """Return a plan below bounds that no other such plan beats in everything.
+        """Return a plan, as `steps` takes it, that no other one below bounds (k,) beats in all.
 
-        Parameters
-        ----------
-        bounds : (k,) float
-            Every number must be less.
-
-        Returns
-        -------
-        point : (k,) float
-            Its numbers, SI units.
-        plan : object
-            What `steps` takes.
+        Its point (k,) in SI units is before it; every number is less than its bound.
         """
 
     def is_empty_below(self, bounds: Floats) -> bool:
-        """Return whether there is no plan below bounds, found by another route.
-
-        Parameters
-        ----------
-        bounds : (k,) float
-
-        Returns
-        -------
-        bool
-        """
+        """Return whether there is no plan below bounds (k,), found by another route."""
 
     def steps(self, plan: object) -> tuple[Step, ...]:
-        """Return the checked steps of a plan.
-
-        Parameters
-        ----------
-        plan : object
-            From `best_below`.
-
-        Returns
-        -------
-        tuple of Step
-        """
+        """Return the checked steps of a plan from `best_below`."""
 
     def engine(self, plan: object) -> Engine:
-        """Return what computes the responses of a plan, of the scene in its build order.
-
-        Parameters
-        ----------
-        plan : object
-            From `best_below`.
-
-        Returns
-        -------
-        Engine
-        """
+        """Return what computes the responses of a plan, of the scene in its build order."""
 
     def values(self, plan: object, claimed: Floats) -> Floats:
-        """Return the numbers of a plan, from the responses of its steps.
+        """Return the numbers (k,) of a plan, from the responses of its steps; SI units, rounded.
 
-        Parameters
-        ----------
-        plan : object
-            From `best_below`.
-        claimed : (k,) float
-            The values with which margins of stability are compared.
-
-        Returns
-        -------
-        (k,) float
-            SI units, rounded as the problem's are.
+        ``claimed`` (k,): the values with which margins of stability are compared.
         """
 
 
@@ -394,7 +340,7 @@ class Front(Terse):
 
 
 def find_front(
-    problem: Problem | FrontProblem,
+    problem: Problem | _FrontProblem,
     formulation: Formulation | str = "pareto_zones",
     *,
     rounding: Mapping[str, float] | None = None,
@@ -435,7 +381,7 @@ def find_front(
     return Front(_table(problem, points, plans), plans, engines, not found.stopped, spent)
 
 
-def _posed(problem: Problem, rounding: Mapping[str, float] | None) -> FrontProblem:
+def _posed(problem: Problem, rounding: Mapping[str, float] | None) -> _FrontProblem:
     """Return the states whose paths are plans, in one build order or in all."""
     found = graph_of(problem)
     if isinstance(found, AllOrders):
@@ -446,7 +392,7 @@ def _posed(problem: Problem, rounding: Mapping[str, float] | None) -> FrontProbl
 
 
 def _found(
-    name: str, problems: tuple[FrontProblem, FrontProblem], solve: Callable[[], object]
+    name: str, problems: tuple[_FrontProblem, _FrontProblem], solve: Callable[[], object]
 ) -> FrontSelection:
     """Return what a formulation says; an error that no plan is allowed, once that is proven."""
     twin = problems[1]
@@ -478,7 +424,7 @@ def _require_apart(points: Floats) -> None:
             raise SolverError(f"the point {point.tolist()} is dominated by another one")
 
 
-def _require_complete(problem: FrontProblem, points: Floats, progress: Tell) -> None:
+def _require_complete(problem: _FrontProblem, points: Floats, progress: Tell) -> None:
     """Raise an error if a plan exists that no point dominates: bounds are searched again."""
     bounds = upper_bounds(points)
     for bound in with_progress("proving that no plan is missing", bounds, progress):
@@ -513,7 +459,7 @@ def upper_bounds(points: Floats) -> Floats:
     return np.array(kept)
 
 
-def _table(problem: FrontProblem, points: Floats, plans: Sequence[Sequence[Step]]) -> pd.DataFrame:
+def _table(problem: _FrontProblem, points: Floats, plans: Sequence[Sequence[Step]]) -> pd.DataFrame:
     table = pd.DataFrame(points, columns=[*problem.names])
     counts = {
         "steps": [len(steps) for steps in plans],

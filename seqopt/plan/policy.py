@@ -34,20 +34,10 @@ FILE = "policy.npz"
 class Advice(NamedTuple):
     """The best next move from a state.
 
-    Attributes
-    ----------
-    kind : StepKind or None
-        What it does; None where the build has ended.
-    robots : tuple of str
-        Who moves; several where all let go at once.
-    nodes : tuple of int
-        The nodes that they take or let go.
-    site : Site
-        Where the build stands then.
-    values : mapping of str to float
-        The least that every goal takes of the rest of the build, this move included.
-    brick : int
-        The brick that is placed, or removed; zero where none is.
+    ``kind``: what it does; None where the build has ended. ``robots``, ``nodes``: who moves,
+    several where all let go at once, and what they take or let go. ``site``: where the build stands
+    then. ``values``: the least that every goal takes of the rest of the build, this move included.
+    ``brick``: the brick that is placed, or removed; zero where none is.
     """
 
     kind: StepKind | None
@@ -260,25 +250,10 @@ def find_policy(
 ) -> Policy:
     """Return what is best from every state that the builds of a free schedule reach.
 
-    Parameters
-    ----------
-    problem : Problem
-        Of rules; its aims have at most one worst step, which totals may precede and follow.
-    tell : callable, optional
-        Told what is being done.
-    proof : bool, optional
-        Whether a second version of the rules and responses computed anew check every move.
-
-    Returns
-    -------
-    Policy
-
-    Raises
-    ------
-    ProblemError
-        If aims are margins or totals over scenarios, or there are budgets.
-    SolverError
-        If the check finds a move that leads to less than the table says.
+    The aims of ``problem`` have at most one worst step, which totals may precede and follow. With
+    ``proof`` a second version of the rules and responses computed anew check every move. Raises
+    `ProblemError` if aims are margins or totals over scenarios, or there are budgets; `SolverError`
+    if the check finds a move that leads to less than the table says.
 
     Examples
     --------

@@ -38,37 +38,17 @@ from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 
 
-class Costs(Protocol):
+class _Costs(Protocol):
     """Costs of choices, of which an aim takes the sum or the largest."""
 
     def cost(self, choice: Sequence[int]) -> float:
-        """Return the sum of the costs that a choice meets.
-
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
-
-        Returns
-        -------
-        float
-        """
+        """Return the sum of the costs that a choice, a candidate for every move, meets."""
 
     def worst(self, choice: Sequence[int]) -> float:
-        """Return the largest cost that a choice meets.
-
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
-
-        Returns
-        -------
-        float
-        """
+        """Return the largest cost that a choice meets."""
 
 
-Found_co = TypeVar("Found_co", bound=Costs, covariant=True)
+Found_co = TypeVar("Found_co", bound=_Costs, covariant=True)
 
 
 class _Costed(Protocol[Found_co]):
@@ -89,7 +69,7 @@ class Aim(Enum):
     SUM = "sum"
     PEAK = "peak"
 
-    def value_of(self, costs: Costs, choice: Sequence[int]) -> float:
+    def value_of(self, costs: _Costs, choice: Sequence[int]) -> float:
         """Return the value of a choice: its total, or its largest cost."""
         return costs.cost(choice) if self is Aim.SUM else costs.worst(choice)
 

@@ -63,24 +63,12 @@ def held_softly(
 ) -> pd.DataFrame:
     """Return the largest responses of builds for grips of several stiffnesses.
 
-    Parameters
-    ----------
-    engine : Engine
-        Made by name; engines of its kind compute the scene with other grips.
-    tables : mapping of str to pandas.DataFrame
-        The builds, as `seqopt.analyze` tells of them, by name.
-    stiffness : sequence of float
-        Of the grips of all robots, N/m, infinite if rigid, instead of that of hands and joints of
-        arms; how they resist turning stays.
-    progress : callable, optional
-        Told how far it is.
-
-    Returns
-    -------
-    pandas.DataFrame
-        A row for every ``build`` and ``stiffness``: largest ``F_rob`` [N], ``M_sup`` [N m],
-        ``T_max`` [N] and ``D_max`` [1e-3 mm] of any step, and ``payload_share``: the largest force
-        of a grip over its robot's payload.
+    ``engine``: made by name; engines of its kind compute the scene with other grips. ``tables``:
+    the builds, as `seqopt.analyze` tells of them. ``stiffness``: of the grips of all robots, N/m,
+    infinite if rigid, instead of that of hands and joints of arms; how they resist turning stays. A
+    row for every ``build`` and ``stiffness``: largest ``F_rob`` [N], ``M_sup`` [N m], ``T_max`` [N]
+    and ``D_max`` [1e-3 mm] of any step, and ``payload_share``: the largest force of a grip over its
+    robot's payload.
 
     Examples
     --------

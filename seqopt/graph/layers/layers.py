@@ -326,32 +326,11 @@ def candidate_layers(
     also: Sequence[str] = (),
     resources: Resources = HERE,
 ) -> Layers:
-    """Return the problem of choosing the open grips of a schedule.
+    """Return the problem of choosing the open grips of a schedule; nothing is computed yet.
 
-    Parameters
-    ----------
-    engine : Engine
-        The engine that computes responses.
-    schedule : Schedule
-        The schedule whose open grips are to be chosen.
-    criterion : Criterion
-        What a step costs.
-    limits : sequence of Limit
-        Bounds that no step may exceed, whether or not a grip is open in it.
-    also : sequence of str
-        Further responses to compute, besides those that criterion and limits use.
-    resources : Resources, optional
-        Processes, memory and a folder for results; by default only this process.
-
-    Returns
-    -------
-    Layers
-        The problem; nothing is computed yet.
-
-    Raises
-    ------
-    ProblemError
-        If there is no such response, or no grip is open.
+    ``limits``: what no step may exceed, whether or not a grip is open in it. ``also``: responses to
+    compute besides those that criterion and limits use. Raises `ProblemError` if there is no such
+    response, or no grip is open.
     """
     known = {
         *CHOICE_RESPONSES,

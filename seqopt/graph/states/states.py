@@ -396,31 +396,11 @@ def build_states(
 ) -> States:
     """Return the problem of the free schedule of an engine's scene.
 
-    Parameters
-    ----------
-    engine : Engine
-        What computes responses.
-    rules : FreeRules or Schedule
-        Which moves are possible: what rules allow, or the open grips of a schedule, however many
-        are open in a step; where its states must stand, robots keep their payloads.
-    criterion : Criterion
-        What a step costs; ranks among choices cannot be used.
-    goals : sequence of Goal or str
-        What to minimize; see `parse_goals`.
-    limits : sequence of Limit
-        What no step may exceed.
-    stands : Standing, Mortar or str, optional
-        Requires that every state stands, with this mortar: ``"dry"``, ``"bond=3e3"`` (Pa).
-
-    Returns
-    -------
-    States
-        Nothing is computed yet, except scales that a criterion takes from the scene.
-
-    Raises
-    ------
-    ProblemError
-        If goals, criterion or limits use a response that a state does not have.
+    ``rules``: what they allow, or the open grips of a schedule, however many are open in a step;
+    where its states must stand, robots keep their payloads. ``goals``: see `parse_goals`.
+    ``stands``: that every state does, with this mortar: ``"dry"``, ``"bond=3e3"`` (Pa). Nothing is
+    computed yet, except scales that a criterion takes from the scene. Raises `ProblemError` if
+    goals, criterion or limits use a response that a state does not have, or ranks among choices.
 
     Examples
     --------
