@@ -339,8 +339,6 @@ def asked_resources(options: argparse.Namespace, progress: Tell | None = None) -
 def parse_size(text: str) -> float:
     """Return a number of bytes from words as ``2GB``, ``500 MB`` or ``1.5GiB``.
 
-    Examples
-    --------
     >>> parse_size("1.5GB")
     1500000000.0
     """

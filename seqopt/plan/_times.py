@@ -84,8 +84,6 @@ def times_table(
 
     ``waits``: as of `step_times`, where mortar cures; ``begin``: where a part of a build begins.
 
-    Examples
-    --------
     >>> import seqopt
     >>> scene = seqopt.load_scene("arch25")
     >>> scene = scene.with_durations("fetch=30,place=10,approach=10,grip=5,release=5")

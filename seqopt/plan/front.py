@@ -90,10 +90,7 @@ class _StateFront:
         return [k for k, measure in enumerate(measures) if measure is not Measure.PEAK]
 
     def best_below(self, bounds: Floats) -> tuple[Floats, object] | None:
-        """Return a plan that none beats among those below bounds.
-
-        ``bounds`` (k,). Results: ``point`` (k,); ``plan``: None for both where there is no plan.
-        """
+        """Return a plan below bounds (k,) that none beats, and before it its point (k,), if any."""
         below = self._below(bounds)
         if not below.ends[reached(below)].any():
             return None
@@ -138,10 +135,7 @@ class _StateFront:
         return out
 
     def is_empty_below(self, bounds: Floats) -> bool:
-        """Return whether there is no plan below bounds, by distances from the empty site.
-
-        ``bounds`` (k,).
-        """
+        """Return whether there is no plan below bounds (k,), by distances from the empty site."""
         graph = self._below(bounds)
         if not self._counted:
             return not graph.ends[reached(graph)].any()
@@ -167,17 +161,11 @@ class _StateFront:
         return np.concatenate(grips)
 
     def steps(self, plan: object) -> tuple[Step, ...]:
-        """Return the checked steps of a plan.
-
-        ``plan``: its states.
-        """
+        """Return the checked steps of a plan, which is its states."""
         return steps_of(self._problem.space, plan)  # type: ignore[arg-type]
 
     def values(self, plan: object, claimed: Floats) -> Floats:
-        """Return the goals' values of a plan, from the responses of its steps.
-
-        ``claimed`` (k,): the values with which margins of stability are compared. Result (k,).
-        """
+        """Return the goals' values (k,) of a plan, from the responses of its steps."""
         found = plan_values(self._of_plan(plan), self.steps(plan), claimed.tolist())
         return _rounded_up(np.array(found), self._round)
 

@@ -255,8 +255,6 @@ def find_policy(
     `ProblemError` if aims are margins or totals over scenarios, or there are budgets; `SolverError`
     if the check finds a move that leads to less than the table says.
 
-    Examples
-    --------
     >>> import seqopt
     >>> from seqopt.plan.policy import find_policy
     >>> scene = seqopt.load_scene("wall:columns=2,courses=2")

@@ -94,8 +94,6 @@ class RobustAim:
     scenario, or the mean total of the worst scenarios (conditional value at risk), where ``level``
     is the share of scenarios that is left out, from 0 (the mean over all) to below 1.
 
-    Examples
-    --------
     >>> aim = RobustAim(RobustKind.CVAR, 0.5)
     >>> aim, aim.value(np.array([1.0, 4.0, 2.0, 3.0]))
     (RobustAim(cvar=0.5), 3.5)
@@ -247,8 +245,6 @@ def parse_goals(text: str) -> tuple[Goal, ...]:
     every state stands), ``tilt`` (the largest that every state survives) and ``tolerance`` (how far
     grips may be off in every state).
 
-    Examples
-    --------
     >>> [str(goal) for goal in parse_goals("minmax,steps,sum(T_max)")]
     ['minmax', 'steps', 'sum(T_max)']
     """

@@ -38,8 +38,6 @@ class Standing:
     direction, rad; ``curing``: which share of its bond mortar has at an age, or its words, by
     default all at once. Where nobody asks for time, all wait until it has cured.
 
-    Examples
-    --------
     >>> Standing("dry").described()["tilt_deg"]
     0.0
     """

@@ -24,8 +24,6 @@ _SHORTEST = 1e-6  # m: below, a length is no tolerance that anybody keeps
 def robot_words(name: str) -> str:
     """Return what a robot is called on a page.
 
-    Examples
-    --------
     >>> robot_words("rob2"), robot_words("left_arm")
     ('robot 2', 'left arm')
     """
@@ -168,8 +166,6 @@ def _off_said(scene: Scene, table: pd.DataFrame, off: Floats) -> list[str]:
 def far_off(length: float) -> str:
     """Return how far grips may be off, in words.
 
-    Examples
-    --------
     >>> far_off(0.000312), far_off(2.7e-7), far_off(0.0)
     ('may be 310 µm off', 'may not even be 0.001 mm off', 'may not be off at all')
     """

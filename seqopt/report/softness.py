@@ -41,8 +41,6 @@ WORDS = {
 def _grip_range(softest: float, stiffest: float) -> tuple[float, ...]:
     """Return stiffnesses of grips from the softest to the stiffest, evenly spaced, then rigid, N/m.
 
-    Examples
-    --------
     >>> [f"{stiffness:.3g}" for stiffness in _grip_range(1e6, 1e7)]
     ['1e+06', '1.78e+06', '3.16e+06', '5.62e+06', '1e+07', 'inf']
     """
@@ -70,8 +68,6 @@ def held_softly(
     and ``D_max`` [1e-3 mm] of any step, and ``payload_share``: the largest force of a grip over its
     robot's payload.
 
-    Examples
-    --------
     >>> import seqopt
     >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
     >>> tables = {"cantilever": seqopt.analyze(engine, seqopt.cantilever(engine.network))}
@@ -141,8 +137,6 @@ def turning_points(table: pd.DataFrame, fixed: Sequence[str] = ()) -> tuple[str,
 
     ``table``: of `held_softly`.
 
-    Examples
-    --------
     >>> import pandas as pd
     >>> rows = [("a", 1e6, 8.0), ("b", 1e6, 9.0), ("a", 1e7, 2.0), ("b", 1e7, 9.0)]
     >>> table = pd.DataFrame(rows, columns=["build", "stiffness", "D_max"])

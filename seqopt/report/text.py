@@ -176,8 +176,6 @@ def _number(value: object) -> str:
 def in_words(name: str) -> str:
     """Return what a method or formulation is called, or its name where nobody gave it words.
 
-    Examples
-    --------
     >>> in_words("overlap_dp"), in_words("my_own")
     ('dynamic programming', 'my_own')
     """
@@ -187,8 +185,6 @@ def in_words(name: str) -> str:
 def typed(name: str) -> str:
     """Return words for a method or formulation, with what is typed behind where it differs.
 
-    Examples
-    --------
     >>> typed("overlap_dp"), typed("cantilever")
     ('dynamic programming (overlap_dp)', 'cantilever')
     """

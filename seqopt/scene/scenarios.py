@@ -182,8 +182,6 @@ class Scenarios:
         same for all robots that give way alike, joints of arms with them; log-uniform. Rigid grips
         stay rigid.
 
-        Examples
-        --------
         >>> import seqopt
         >>> drawn = seqopt.scenarios(seqopt.load_scene("arch25").with_grips(1e6), count=2)
         >>> [f"{each.robots[0].stiffness[0]:.3g}" for each in drawn.with_grips((0.5, 2)).scenes]

@@ -82,8 +82,6 @@ def step_times(
     since nothing is gained by acting later, every step is done as soon as it may. A `StepError`
     names robots that act of which it is not known how long they take.
 
-    Examples
-    --------
     >>> import seqopt
     >>> words = "fetch=30,place=10,approach=10,grip=5,release=5"
     >>> scene = seqopt.load_scene("arch25").with_durations(words)

@@ -68,8 +68,6 @@ def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sch
     shares that placing with the move after it. At least one robot grips, and the newest brick is
     held, at every step before the last. Robots are those of `seqopt.sequential`.
 
-    Examples
-    --------
     >>> import seqopt
     >>> schedule = _two_robot_loop(seqopt.build_network(seqopt.load_scene("arch25")))
     >>> [(step.kind.value, step.moves) for step in schedule.steps[1:4]]
@@ -98,8 +96,6 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
     ``robots``: how many take part, or their names in the order in which they place the first
     bricks; by default all robots of the scene. Which of them takes which role follows from reach.
 
-    Examples
-    --------
     >>> import seqopt
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
     >>> robot_loop(network, 3).steps == seqopt.three_robot_loop(network).steps

@@ -402,8 +402,6 @@ def build_states(
     computed yet, except scales that a criterion takes from the scene. Raises `ProblemError` if
     goals, criterion or limits use a response that a state does not have, or ranks among choices.
 
-    Examples
-    --------
     >>> import seqopt
     >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
     >>> build_states(engine, FreeRules(), seqopt.CRITERIA["worst-ratio"], "minmax,steps")
@@ -424,8 +422,6 @@ def within(problem: States, caps: Mapping[str, float]) -> States:
     ``caps``: ``steps``, ``regrips``, ``travel`` (m) or ``sum(RESPONSE)``, and how much each may be.
     Raises `ProblemError` if something is no total, or a cap is no number from 0.
 
-    Examples
-    --------
     >>> import seqopt
     >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
     >>> problem = build_states(engine, FreeRules(), seqopt.CRITERIA["worst-ratio"])

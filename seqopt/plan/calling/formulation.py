@@ -72,8 +72,6 @@ class Watch:
 
     ``time_limit``: after which the formulation is to stop, s; ``progress``: told every finding.
 
-    Examples
-    --------
     >>> watch = Watch(time_limit=60.0)
     >>> watch.tell(objective=12.0)
     >>> watch.tell(bound=9.0)
