@@ -321,7 +321,6 @@ class Sweep:
         return out
 
     def _acted(self, labels: Labels, counts: Ints, numbers: Ints) -> Labels:
-        """Return what follows from labels by one act each."""
         row = np.repeat(np.arange(labels.size), counts)
         firsts = np.repeat(self._starts[labels.state] - np.cumsum(counts) + counts, counts)
         act = firsts + np.arange(len(row))

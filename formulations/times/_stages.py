@@ -308,7 +308,6 @@ class Stages:
         return [self._taken(path, k) for k in range(len(self._problem.goals))]
 
     def _proof(self, labels: Sequence[Labels], prices: Prices) -> LabelProof:
-        """Return labels with the states that they are of."""
         columns = self._timed.free.shape[1]
         kinds = self._timed.kinds
         each = np.column_stack([prices.each[:, :1], prices.each[:, 1:][:, kinds]])

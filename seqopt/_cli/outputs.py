@@ -222,7 +222,6 @@ def keep_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
 
 
 def _inputs(options: argparse.Namespace) -> list[Path]:
-    """Return the files that a command reads."""
     asked = (options.scene, getattr(options, "plan", None), getattr(options, "schedule", None))
     named = [Path(name) for name in asked if isinstance(name, str | Path)]
     folders = [path for path in named if is_folder(path)]

@@ -272,7 +272,6 @@ def asked_standing(options: argparse.Namespace) -> Standing | None:
 
 
 def _curing_words(words: Sequence[str]) -> Curing:
-    """Return how mortar cures by its words."""
     try:
         return _find_curing(" ".join(words))
     except SceneError as error:

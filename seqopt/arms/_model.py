@@ -246,7 +246,6 @@ def _read(pin: Any, path: Path, arm: Arm) -> tuple[Any, Any]:
 
 
 def _bodies(geometry: Any) -> Iterator[Body]:
-    """Yield the convex bodies of a model."""
     import coal  # noqa: PLC0415  # an extra
 
     for each in geometry.geometryObjects:

@@ -132,7 +132,6 @@ def targets(model: ArmModel, brick: Brick, node: int) -> Iterator[Target]:
 
 
 def _signed(faces: tuple[str, ...]) -> tuple[str, ...]:
-    """Return faces by their signs, each once."""
     both = (f"{sign}{face}" if face in _AXES else face for face in faces for sign in "+-")
     return tuple(dict.fromkeys(both))
 

@@ -146,7 +146,6 @@ def _find_curing(given: Curing | str | Iterable[str]) -> Curing:
 
 
 def _in_words(word: str, text: str) -> Points:
-    """Return points by the words of one law."""
     if text == "never":
         return ()
     if "=" not in text:

@@ -312,7 +312,6 @@ class OrderStates:
 
     @cached_property
     def _asked(self) -> States:
-        """What counts: the first goal, or all."""
         states = self.problem.states
         return states if self._all_count else replace(states, goals=states.goals[:1])
 

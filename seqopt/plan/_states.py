@@ -58,7 +58,6 @@ def solve_states(graph: States, formulation: Formulation, run: Run) -> Plan:
 def _solved(
     problem: States, formulation: Formulation, options: Mapping[str, Any], *, proof: bool
 ) -> Plan:
-    """Return the plan of a formulation, judged."""
     start, twin = time.perf_counter(), replace(problem)  # which no formulation can reach
     selection = _selected(formulation, problem, twin, options)
     solved = time.perf_counter()

@@ -156,7 +156,6 @@ class _StateFront:
 
     @cached_property
     def _held(self) -> Ints:
-        """How many grips every state holds."""
         grips = [self._problem.space.grips(rows) for _, _, rows in self._visited.states]
         return np.concatenate(grips)
 
@@ -174,7 +173,6 @@ class _StateFront:
         return self._of_plan(plan).engine
 
     def _of_plan(self, plan: object) -> States:
-        """Return the states of the order of a plan."""
         return self._problem
 
 

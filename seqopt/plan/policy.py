@@ -124,7 +124,6 @@ class Policy(FrozenValue):
         return self._move(site, row, after, values)
 
     def _move(self, site: Site, row: int, after: int, values: Mapping[str, float]) -> Advice:
-        """Return the move from a site to the state of a row."""
         grips = list(site.grips or (None,) * len(self.robots))
         stays = list(site.stays or (None,) * len(self.robots))
         moved: list[tuple[int, int]] = []
@@ -185,7 +184,6 @@ class Policy(FrozenValue):
         return bool((self.held < 0).any())
 
     def _row_of(self, site: Site) -> int:
-        """Return the row of a site."""
         grips = site.grips or (None,) * len(self.robots)
         stays = site.stays or (None,) * len(self.robots)
         key = [site.bricks]
@@ -295,7 +293,6 @@ def _states_with_policy(problem: Problem) -> States:
 
 
 def _of_graph(states: States, visited: Visited) -> Policy:
-    """Return the policy of all states of a graph."""
     graph, space = visited.graph, states.space
     left = _to_go(graph)
     after = np.where(left.move < 0, -1, graph.target[left.move])

@@ -93,7 +93,6 @@ def _floor(plan: Plan) -> tuple[dict[str, float], tuple[float, ...]]:
 
 
 def _no_worse(plan: Plan, floor: dict[str, float]) -> bool:
-    """Return whether a plan is at the floor in every goal."""
     pairs = [(value, floor[name]) for name, value in plan.objective.items() if name in floor]
     return all(value <= low + _SAME * max(abs(value), abs(low)) for value, low in pairs)
 

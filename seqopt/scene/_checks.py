@@ -61,7 +61,6 @@ def which_fit(make: Callable[[Mapping[str, Any]], object], given: Mapping[str, A
 
 
 def _near(value: Any) -> Iterator[Any]:
-    """Yield values near one, the nearest first."""
     if isinstance(value, int):
         yield from (value + sign * k for k in COUNTS for sign in (1, -1) if value + sign * k > 0)
     elif isinstance(value, float):

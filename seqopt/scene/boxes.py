@@ -53,7 +53,6 @@ def block_brick(
 
 
 def _from(center: Floats, name: int, grips: _Places) -> tuple[Vector, Vector]:
-    """Return where grips are from a center."""
     where = f"brick {name}: grips"
     found = [vector(where, row) for row in rows(where, grips or ())]
     if len(found) != 2:

@@ -276,7 +276,6 @@ def _held(scene: Scene, factors: tuple[float, float], stream: tuple[int, int]) -
 
 
 def _factors(name: str, given: Sequence[float]) -> tuple[float, float]:
-    """Return the least and the largest factor."""
     try:
         low, high = (float(value) for value in given)
     except (TypeError, ValueError):

@@ -445,7 +445,6 @@ class Scene(Shown):
 
 
 def _parts(where: str, values: Iterable[_Part], kind: type[_Part]) -> tuple[_Part, ...]:
-    """Return parts of a scene if all are of one kind."""
     found = tuple(values) if isinstance(values, Iterable) else (values,)
     for value in found:
         if not isinstance(value, kind):

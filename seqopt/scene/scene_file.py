@@ -277,12 +277,10 @@ def builtin_scenes() -> tuple[str, ...]:
 
 
 def _stored() -> tuple[str, ...]:
-    """Return the names of the scenes that ship as files."""
     return tuple(item.name.removesuffix(".json") for item in _DATA.joinpath("scenes").iterdir())
 
 
 def _load_stored(name: str) -> Scene:
-    """Return a scene that ships as a file."""
     text = _DATA.joinpath("scenes", f"{name}.json").read_text("utf-8")
     return _scene_from_dict(json.loads(text))  # ours obey the schema: a test asks
 
@@ -487,7 +485,6 @@ def save_scene(scene: Scene, path: Path) -> None:
 
 
 def _from(folder: Path, model: str) -> Path:
-    """Return where a model is, from a folder if it is in it."""
     place = Path(os.path.abspath(model))  # noqa: PTH100
     return place.relative_to(folder) if place.is_relative_to(folder) else place
 

@@ -76,7 +76,6 @@ def _lack(reach: Reach, point: Sequence[float]) -> float:
 
 
 def _longer(scene: Scene, some: Sequence[Robot], more: float) -> Scene:
-    """Return a scene in which some robots reach farther."""
 
     def changed(robot: Robot) -> Robot:
         reach = robot.reach

@@ -306,7 +306,6 @@ def _nowhere_above(first: _Label, second: _Label) -> bool:
 def _with_robots(
     scene: Scene, steps: Sequence[Step], every: Sequence[Hold], chosen: dict[int, int]
 ) -> list[Step]:
-    """Return steps with the grips of chosen robots."""
     out = []
     for step in steps:
         grips: list[int | None] = [None] * len(scene.robots)

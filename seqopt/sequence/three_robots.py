@@ -39,7 +39,6 @@ def open_schedule(method: str, network: Network, steps: Sequence[OpenStep]) -> S
 
 
 def _move(network: Network, steps: Sequence[OpenStep], number: int) -> Move:
-    """Return a move with its candidates."""
     scene = network.scene
     present = [step for step in steps if number in step.moves]
     first = present[0]
@@ -140,7 +139,6 @@ def _rotation(count: int, turns: int) -> list[_Turn]:
 
 
 def _loop(network: Network, order: Sequence[int], turns: Sequence[_Turn]) -> list[OpenStep]:
-    """Return the steps of the loop; `order` says which robot has which role."""
     scene = network.scene
     grips: list[int | OpenGrip | None] = [None] * len(scene.robots)
     steps: list[OpenStep] = []

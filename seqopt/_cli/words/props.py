@@ -38,7 +38,6 @@ def parse_props(text: str, scene: Scene, where: str = "--props") -> tuple[Prop, 
 
 
 def _placed(word: str, scene: Scene, where: str) -> Sequence[Prop]:
-    """Return the props of one word."""
     place, colon, stiffness = word.partition(":")
     own = number_word(stiffness, where) if colon else None
     if place == "every":

@@ -55,7 +55,6 @@ def _column(instance: Instance, values: np.ndarray) -> tuple[str, np.ndarray]:
 
 
 def _document(instance: Instance, columns: list[dict[str, str]]) -> dict[str, Any]:
-    """Return the text of an instance, as a document."""
     return {
         "format": FORMAT,
         "version": VERSION,

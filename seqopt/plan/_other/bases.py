@@ -211,7 +211,6 @@ def _standing(scene: Scene, bases: Mapping[str, Base]) -> Scene:
 
 
 def _with_arms(scene: Scene, change: Callable[[Arm], Arm | None]) -> Scene:
-    """Return a scene whose arms are changed."""
     pairs = ((robot, robot.arm) for robot in scene.robots)
     return scene.with_robots(
         *(r if arm is None else replace(r, arm=change(arm)) for r, arm in pairs)

@@ -225,7 +225,6 @@ def _motion(given: Floats) -> Floats:
 
 
 def _arrays(proof: LabelProof) -> LabelProof:
-    """Return labels as arrays of numbers."""
     states, labels, prices = proof
     numbers = [np.array(part, dtype=float) for part in (labels, prices)]
     return LabelProof(np.array(states, dtype=np.int64), *numbers)
@@ -289,7 +288,6 @@ def select(
 def _called(
     formulation: Formulation, problem: PlacementProblem, watch: Watch, options: dict[str, Any]
 ) -> Selection:
-    """Return what a formulation returns, if that is a selection."""
     told = {WATCH: watch} if formulation.watched else {}
 
     def judged() -> tuple[object, ...]:

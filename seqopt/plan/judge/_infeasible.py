@@ -170,7 +170,6 @@ def _why_impossible(problem: States, seconds: float = np.inf) -> str:
 
 
 def _where(problem: States, look: Look) -> str:
-    """Return where it stops."""
     placed = problem.network.scene.placed
     stops = look(replace(problem, goals=STEPS)).reached
     if isinstance(problem.rules, Schedule):
@@ -251,7 +250,6 @@ def _with_arms(problem: States, changed: Callable[[Arm | None], Arm | None]) -> 
 
 
 def _in_scene(problem: States, scene: Scene) -> States:
-    """Return a problem in another scene of the same bricks."""
     engine, rules = engine_for(problem.engine, scene), problem.rules
     moves = replace(rules, scene=engine.network.scene) if isinstance(rules, Schedule) else rules
     return replace(problem, engine=engine, rules=moves)

@@ -75,7 +75,6 @@ class SpeedTable:
         return "\n".join([self.sentence, "", *self.lines()])
 
     def _repr_html_(self) -> str:
-        """Return the sentence and the table as HTML."""
         return f"<p>{self.sentence}</p>{self.rows()._repr_html_()}"  # type: ignore[operator]
 
     def plot(self) -> Figure:

@@ -75,7 +75,6 @@ class Prop(Terse):
 
 
 def _unit(where: str, values: Iterable[float]) -> Vector:
-    """Return a direction as a unit vector."""
     x, y, z = vector(where, values)
     size = math.hypot(x, y, z)
     if not size > 0:
@@ -99,7 +98,6 @@ def settled_props(props: Sequence[Prop], bricks: Mapping[int, Brick]) -> tuple[P
 
 
 def _at_node(prop: Prop, position: Vector, bricks: Mapping[int, Brick]) -> Prop:
-    """Return a prop at the node next to a position."""
     away, node = min((math.dist(b.node_position(n), position), n) for n, b in bricks.items())
     most = _NEAR * min(bricks[node].dimensions)
     if away > most:

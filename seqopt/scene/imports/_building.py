@@ -266,7 +266,6 @@ def _up(content: Content, given: Given, said: list[str]) -> str:
 
 
 def _supports(content: Content, given: Given, said: list[str]) -> set[int]:
-    """Return the places of the blocks that are the ground."""
     named = defaultdict[str, set[int]](set)
     for i, block in enumerate(content.blocks):
         named[block.group].add(i)
@@ -347,7 +346,6 @@ def _law(content: Content, given: Given, touching: Contacts, said: list[str]) ->
 def _springs(
     touching: Contacts, bricks: Mapping[int, Brick], law: JointLaw
 ) -> tuple[tuple[Joint, ...], tuple[Ground, ...]]:
-    """Return the joints and ground ends where blocks touch."""
     made: list[Joint | Ground] = []
     for (a, b), face in touching.faces:
         last = bricks[b]
@@ -366,7 +364,6 @@ def _springs(
 
 
 def _faceless(joint: FileJoint, bricks: Mapping[int, Brick], law: JointLaw) -> Joint | Ground:
-    """Return a joint, or a ground end, that has no face."""
     a, b = joint.blocks
     shift, turn = law.stiffness(joint.side**2, (joint.side**4 / 12,) * 2)
     stiffness = (joint.translational or shift, joint.rotational or turn)
@@ -380,7 +377,6 @@ def _faceless(joint: FileJoint, bricks: Mapping[int, Brick], law: JointLaw) -> J
 def _order(
     touching: Contacts, content: Content, bricks: Mapping[int, Brick], said: list[str]
 ) -> list[int]:
-    """Return the places of the bricks in the order of building."""
     places = [*bricks]
     row = {i: k for k, i in enumerate(places)}
     courses = [content.blocks[i].course for i in places]

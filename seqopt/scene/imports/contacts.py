@@ -115,7 +115,6 @@ class _Facets:
 
 
 def _require_polygons() -> None:
-    """Require what cuts polygons."""
     if find_spec("shapely") is None:
         raise FileError("finding where blocks touch needs shapely; pip install 'seqopt[blocks]'")
 

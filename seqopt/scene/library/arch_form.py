@@ -189,7 +189,6 @@ def arch(form: ArchForm, name: str = "", *, robots: Sequence[Robot] | None = Non
 
 
 def _arch(form: ArchForm, count: int, name: str, robots: Sequence[Robot] | None) -> Scene:
-    """Return the scene of an arch with a number of bricks."""
     gap, points = _laid(form, form.line, count)
     step = np.diff(points, axis=0)
     long, width, thickness = form.dimensions
@@ -339,7 +338,6 @@ def barrel_vault(
 
 
 def _vault_shape(row: dict[str, str], law: JointLaw) -> ArchShape:
-    """Return the shape of a tested vault."""
     span, rise, width = (float(row[key]) for key in ("L_m", "r_m", "b_m"))
     thickness, bricks = float(row["t_mm"]) / 1e3, int(row["n_bricks"])
     half = 2 * math.atan(2 * rise / span)
@@ -361,7 +359,6 @@ def _vault_shape(row: dict[str, str], law: JointLaw) -> ArchShape:
 
 
 def _tested(test: int) -> dict[str, str]:
-    """Return the printed numbers of a test."""
     source = resources.files("seqopt").joinpath("data/paper/arch_tests.csv")
     rows = {row["test"]: row for row in csv.DictReader(source.read_text("utf-8").splitlines())}
     if isinstance(test, bool) or not isinstance(test, int) or str(test) not in rows:
@@ -433,7 +430,6 @@ def _barrel(shape: _BarrelShape, name: str = "") -> Scene:
 
 
 def _vault(shape: _BarrelShape, laid: Laid, name: str) -> Scene:
-    """Return the scene of a vault whose courses are laid."""
     _, points = laid
     courses = len(points) - 1
     bricks = [

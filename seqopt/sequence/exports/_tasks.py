@@ -142,7 +142,6 @@ def _grip(
     robot: Robot,
     node: int,
 ) -> _Grip:
-    """Return how a robot holds a node."""
     brick = scene.brick_of_node[node]
     away = max(brick.dimensions) if far is None else far
     posture = known.get((robot.name, node))
@@ -218,7 +217,6 @@ def tasks_json(scene: Scene, tasks: Iterable[Task]) -> str:
 
 
 def _block(brick: Brick) -> Document:
-    """Return a block: its shape where it is built."""
     shape = typed("compas.datastructures/Mesh", mesh_data(*vertices_of(brick)))
     frame = compas_frame(brick_frame(brick))
     return {"block": brick.name, "mass": brick.mass, "frame": frame, "shape": shape}

@@ -267,7 +267,6 @@ def _nothing(part: Floats, parts: Sequence[Floats]) -> Floats:
 def _peak(
     stage: Stage, goal: _Target, claim: Claim, limited: Sequence[tuple[float, int, float]]
 ) -> float:
-    """Return what a peak is at least."""
     graph, column = stage.graph, goal.columns[0]
     if claim.cut is not None:
         return _left(graph, column, claim.cut)

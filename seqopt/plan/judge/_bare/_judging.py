@@ -279,7 +279,6 @@ def _arcs_of(instance: Instance, nodes: Ints) -> Ints:
 
 
 def _value(instance: Instance, goal: _Target, path: _Walk) -> float:
-    """Return what a goal is worth of a path."""
     own: Floats = instance.amounts[path.arcs][:, list(goal.columns)]
     worth = {
         SUM: lambda: float(own.sum()),
