@@ -313,8 +313,9 @@ def gantt_picture(
     for hold in holds(scene, steps):
         if hold.last >= first and hold.first <= last:
             _bar(axes, hold, forces, shade, begins)
-            _label(axes, scene, hold, inch)
-    _lanes(axes, scene, (first, last), ends)
+            _label(axes, scene, hold, (hold.first - 0.5, hold.last + 0.5, inch))
+    said = "step" if (first, last) == (1, ends) else f"step, {first} to {last} of {ends}"
+    _lanes(axes, scene, said, (first - 0.7, last + 0.7))
     _key(figure, axes, shade, is_open=any(getattr(step, "moves", ()) for step in steps))
     return figure
 
@@ -337,9 +338,13 @@ def _bar(
         axes.plot([hold.first - 0.5] * 2, [low, low + LANE], color=DARK, lw=3.2)
 
 
-def _label(axes: Axes, scene: Scene, hold: Hold, inch: float) -> None:
-    """Write brick and node, or the number of an open grip, into a bar as far as they fit."""
-    room = inch * (hold.last - hold.first + 1)
+def _label(axes: Axes, scene: Scene, hold: Hold, span: tuple[float, float, float]) -> None:
+    """Write brick and node, or the number of an open grip, into a bar as far as they fit.
+
+    ``span``: from where to where it is, and inches per unit.
+    """
+    begin, end, inch = span
+    room = inch * (end - begin)
     if room < 0.12:
         return
     words = f"?{(hold.move or 0) + 1}"
@@ -348,16 +353,13 @@ def _label(axes: Axes, scene: Scene, hold: Hold, inch: float) -> None:
     flat = room >= LETTER * len(words) + 0.06
     look: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": DARK, "clip_on": True}
     look["bbox"] = {"boxstyle": "square,pad=0.1", "fc": (1, 1, 1, 0.72), "lw": 0}
-    at = ((hold.first + hold.last) / 2, hold.robot)
-    axes.annotate(words, at, rotation=0 if flat else 90, **look)
+    axes.annotate(words, ((begin + end) / 2, hold.robot), rotation=0 if flat else 90, **look)
 
 
-def _lanes(axes: Axes, scene: Scene, shown: tuple[int, int], steps: int) -> None:
-    """Set lanes, limits and names."""
+def _lanes(axes: Axes, scene: Scene, said: str, shown: tuple[float, float]) -> None:
+    """Set a lane for every robot, limits and names."""
     count = len(scene.robots)
-    said = "step" if shown == (1, steps) else f"step, {shown[0]} to {shown[1]} of {steps}"
-    limits: Any = {"xlim": (shown[0] - 0.7, shown[1] + 0.7), "ylim": (count - 0.5, -0.5)}
-    axes.set(xlabel=said, **limits, axisbelow=True)
+    axes.set(xlabel=said, xlim=shown, ylim=(count - 0.5, -0.5), axisbelow=True)
     axes.set_yticks(range(count), [robot.name for robot in scene.robots])
     axes.tick_params(left=False)
     axes.grid(visible=True, axis="x", lw=0.3)

@@ -217,8 +217,8 @@ def _with_arms(scene: Scene, change: Callable[[Arm], Arm | None]) -> Scene:
     )
 
 
-class _Search:
-    """Looks at sets of bases, the most promising first, and keeps the best plan so far."""
+class Tried:
+    """The best plan so far of problems that are alike, and what became of each."""
 
     def __init__(self, problem: Problem, solved: Callable[[Problem], Plan], tell: Tell) -> None:
         self._problem, self._solved, self._tell = problem, solved, tell
@@ -227,6 +227,28 @@ class _Search:
         self._of: Problem | None = None
         self._rows: list[dict[str, object]] = []
         self._left: list[tuple[float, ...]] = []  # bounds of sets whose best plan is not proven
+
+    @property
+    def _proven(self) -> bool:
+        """Whether no set that was looked at allows a better plan."""
+        return not any(_is_below(bound, self._best) for bound in self._left)
+
+    def _kept(self, problem: Problem, plan: Plan) -> tuple[str, tuple[float, ...]]:
+        """Take a plan that is better than those before; return what to say of it."""
+        value, bound = _value(plan), _bound(plan)
+        if _is_below(bound, value):
+            self._left.append(bound)
+        if self._plan is None or _is_below(value, self._best):
+            self._plan, self._of, self._best = plan, problem, value
+        return "solved", value
+
+    def _named(self, bound: tuple[float, ...]) -> dict[str, float]:
+        pairs = zip(self._problem.goals, bound, strict=False)
+        return {str(goal): goal.shown(value) for goal, value in pairs}
+
+
+class _Search(Tried):
+    """Looks at sets of bases, the most promising first, and keeps the best plan so far."""
 
     def found(self, sets: Sequence[tuple[dict[str, Base], Scene]]) -> FoundBases:
         """Return the best plan of sets of bases."""
@@ -244,8 +266,7 @@ class _Search:
             raise InfeasibleError(
                 f"bases: none of {len(sets)} sets of bases allows a plan; give other places"
             )
-        proven = not any(_is_below(bound, self._best) for bound in self._left)
-        return FoundBases(self._plan, self._of, pd.DataFrame(self._rows), proven)
+        return FoundBases(self._plan, self._of, pd.DataFrame(self._rows), self._proven)
 
     def _by_promise(
         self, sets: Sequence[tuple[dict[str, Base], Scene]]
@@ -284,20 +305,10 @@ class _Search:
             return "no plan", (inf,)
         except SceneError as error:
             return f"no plan: {error}", (inf,)
-        bound = _bound(plan)
         if plan.arms is not None and plan.arms.postures.unreached:
-            self._left.append(bound)
+            self._left.append(bound := _bound(plan))
             return "no plan that keeps postures was found", bound
-        value = _value(plan)
-        if _is_below(bound, value):
-            self._left.append(bound)
-        if self._plan is None or _is_below(value, self._best):
-            self._plan, self._of, self._best = plan, problem, value
-        return "solved", value
-
-    def _named(self, bound: tuple[float, ...]) -> dict[str, float]:
-        pairs = zip(self._problem.goals, bound, strict=False)
-        return {str(goal): goal.shown(value) for goal, value in pairs}
+        return self._kept(problem, plan)
 
 
 def _lacking(scene: Scene) -> int | None:
