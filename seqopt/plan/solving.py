@@ -23,7 +23,7 @@ from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.scenarios import ScenarioLayers, engine_for, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
-from seqopt.plan._bare._instances import solve_instance
+from seqopt.plan._instances import solve_instance
 from seqopt.plan._layers import solve_layers, with_budgets
 from seqopt.plan._states import solve_orders, solve_states
 from seqopt.plan._status import KeptPostures

@@ -35,8 +35,8 @@ from seqopt.scene._checks import (
     whole,
     wholes,
 )
+from seqopt.scene._durations import Durations
 from seqopt.scene.arm import Arm
-from seqopt.scene.holders._durations import Durations
 from seqopt.scene.shape import Polyhedron
 
 

@@ -13,8 +13,8 @@ from seqopt._showing import Shown, display
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import check, not_negative, printable, short, vector, wholes
-from seqopt.scene.holders._durations import _durations_in_words
-from seqopt.scene.holders._props import Prop, centered, settled_props
+from seqopt.scene._durations import _durations_in_words
+from seqopt.scene._props import Prop, centered, settled_props
 from seqopt.scene.parts import (
     Brick,
     Ground,
@@ -368,7 +368,7 @@ class Scene(Shown):
     def with_durations(self, *words: str) -> Scene:
         """Return the same scene with robots that take as long as words say.
 
-        ``*words``: as of `seqopt.scene.holders._durations._durations_in_words`.
+        ``*words``: as of `seqopt.scene._durations._durations_in_words`.
 
         Examples
         --------

@@ -25,9 +25,9 @@ from seqopt._files import read_text, write_text
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import cut, reading_json, short, which_fit
+from seqopt.scene._durations import Durations
+from seqopt.scene._props import Prop
 from seqopt.scene.arm import Arm
-from seqopt.scene.holders._durations import Durations
-from seqopt.scene.holders._props import Prop
 from seqopt.scene.library.arch_form import (
     ArchForm,
     _barrel,

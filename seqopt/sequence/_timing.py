@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeVar
 
 from seqopt.errors import ProblemError, StepError
-from seqopt.scene.holders._durations import EXAMPLE, Durations
+from seqopt.scene._durations import EXAMPLE, Durations
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Hold, Schedule, holds

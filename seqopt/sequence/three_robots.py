@@ -10,11 +10,11 @@ from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.sequence._reach import says_reach
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, check_support
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.sequence.two_robots import (
     Method,
+    _says_reach,
     alternate,
     cast,
     find_robots,
@@ -57,7 +57,7 @@ def _move(network: Network, steps: Sequence[OpenStep], number: int) -> Move:
     return Move(robot.name, first.number, first.bricks, free)
 
 
-@says_reach
+@_says_reach
 def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the loop of two robots: the sequential method with every grip open.
 
@@ -81,7 +81,7 @@ def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sch
     return open_schedule("two-robot", network, steps)
 
 
-@says_reach
+@_says_reach
 def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Schedule:
     """Return the four-step loop of any number of robots whose roles rotate.
 
@@ -163,7 +163,7 @@ def _loop(network: Network, order: Sequence[int], turns: Sequence[_Turn]) -> lis
     return steps
 
 
-@says_reach
+@_says_reach
 def three_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the four-step loop of three robots whose roles rotate.
 
@@ -206,7 +206,7 @@ def three_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sc
     return robot_loop(network, robots or 3)
 
 
-@says_reach
+@_says_reach
 def modified_sequential(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the sequential method with a third support, chosen again after every brick.
 

@@ -18,7 +18,7 @@ from seqopt._files import write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report._scene_page import scene_page
-from seqopt.scene.holders._props import Prop
+from seqopt.scene._props import Prop
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, dump_scene, load_scene

@@ -8,7 +8,7 @@ from dataclasses import replace
 from seqopt._cli.values import number_word
 from seqopt.errors import SceneError, did_you_mean
 from seqopt.scene._checks import short
-from seqopt.scene.holders._props import Prop
+from seqopt.scene._props import Prop
 from seqopt.scene.scene import Scene
 
 _HOW = "give nodes, as 13,27, or every; then as 13:1e6 (N/m), and after a comma push, capacity=300"

@@ -21,7 +21,7 @@ from seqopt.plan.judge._proof import Proof
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _moved, states_of
 from seqopt.problem.problem import Measure, Problem
-from seqopt.scene.holders._props import Prop
+from seqopt.scene._props import Prop
 from seqopt.scene.scene import Scene
 from seqopt.work.progress import Tell
 

@@ -31,9 +31,9 @@ from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, length_text
 from seqopt.scene.arm import Arm
 from seqopt.scene.scene import Scene
-from seqopt.sequence._reach import enough_reach
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.two_robots import _enough_reach
 
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none
 
@@ -211,7 +211,7 @@ def _opening(problem: States, look: Look) -> Iterator[str]:
         alone = _with_arms(problem, lambda arm: arm and replace(arm, keeps_apart=False))
         yield APART if look(alone).whole else ARMS
     if recipe_of(problem.engine) and not (scene.has_arms or problem.scenarios):
-        yield from enough_reach(scene, lambda other: look(_in_scene(problem, other)).whole)
+        yield from _enough_reach(scene, lambda other: look(_in_scene(problem, other)).whole)
     for limit in problem.limits:
         rest = tuple(other for other in problem.limits if other is not limit)
         if look(replace(problem, limits=rest)).whole:

@@ -19,7 +19,7 @@ from seqopt.arms.reach import find_postures
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Engine, Want
 from seqopt.errors import SolverError, StepError
-from seqopt.scene.holders._props import Prop
+from seqopt.scene._props import Prop
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 
