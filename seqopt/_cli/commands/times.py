@@ -43,7 +43,7 @@ from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.network.build import build_network
 from seqopt.plan._times import SHARE, aged_table, busy_table
 from seqopt.plan.build import GivenSequence
-from seqopt.plan.judge._mortar.check import check_cured
+from seqopt.plan.judge._mortar_check import check_cured
 from seqopt.problem.standing import Standing
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene

@@ -21,7 +21,7 @@ from seqopt.graph.paths import FAILS, PASSES, _lazy_path, lexicographic, reached
 from seqopt.graph.states._visits import move_amounts
 from seqopt.graph.states.states import States
 from seqopt.plan.judge._answers import alike, ask, near, screens
-from seqopt.plan.judge._mortar.floors import cured_rows
+from seqopt.plan.judge._mortar_floors import cured_rows
 from seqopt.plan.judge._rule_moves import Follows, RuleTables, ScheduleTables
 from seqopt.plan.judge._standing_proof import StandingProof
 from seqopt.plan.judge._timed_goals import Claim, GoalProofs, TimedStates

@@ -20,7 +20,7 @@ from seqopt.errors import SolverError, StepError
 from seqopt.graph._counted import least_by_counts
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.judge._mortar.check import check_cured
+from seqopt.plan.judge._mortar_check import check_cured
 from seqopt.plan.judge._posture_rules import check_postures, check_props
 from seqopt.plan.judge._proof import BELOW, Hint, Proof
 from seqopt.plan.judge._standing_proof import proven_margins, require_margin
