@@ -366,16 +366,6 @@ def steps_over(problem: Layers, response: str, level: float, bound: float) -> Bu
     return Budget(f"steps with {response} over {level:g}", tuple(single), tuple(shared), bound)
 
 
-def robot_use(problem: Layers, robot: str, force: float, bound: float) -> Budget:
-    """Return a bound on the number of open steps in which a robot carries more than a force.
-
-    ``problem``: whose choices the budget is for; it evaluates the robot's force; ``robot``: name of
-    the robot; ``force``: n; ``bound``: how many steps there may be. Result: as of `steps_over`.
-    Raises `ProblemError` if the problem does not evaluate the force of this robot.
-    """
-    return steps_over(problem, robot_response(robot), force, bound)
-
-
 def travel(problem: Layers, bound: float) -> Budget:
     """Return a bound on the distance that robots travel to chosen grips and on to their next ones.
 
