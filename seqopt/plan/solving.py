@@ -23,9 +23,8 @@ from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.scenarios import ScenarioLayers, engine_for, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
-from seqopt.plan._instances import solve_instance
 from seqopt.plan._layers import solve_layers, with_budgets
-from seqopt.plan._states import solve_orders, solve_states
+from seqopt.plan._states import solve_instance, solve_orders, solve_states
 from seqopt.plan._status import KeptPostures
 from seqopt.plan.calling.formulation import Formulation, On, Run, as_formulation
 from seqopt.plan.plan import Plan

@@ -21,7 +21,7 @@ from seqopt._files import csv_text
 from seqopt.arms._model import ArmModel, idle_arm
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.plan._other.bases import without_arms
-from seqopt.report._films._film import Film
+from seqopt.report._film import Film
 from seqopt.report._pictures import VIEW, steps_picture
 from seqopt.report._robots import _known_arms
 from seqopt.report.page import Build, _tasks
