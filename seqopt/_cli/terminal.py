@@ -88,10 +88,7 @@ def harmless(text: str, kept: str = "") -> str:
 
 
 def show(text: str) -> None:
-    """Write a result to standard output, its last end of line too.
-
-    Raises `FileError` if standard output is closed.
-    """
+    """Write a result, its last end of line too; a `FileError` says that nobody reads it."""
     if sys.stdout is None:
         raise FileError("standard output is closed, and there is a result to write; open it")
     sys.stdout.write(harmless(text, "\n\t"))

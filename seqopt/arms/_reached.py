@@ -340,10 +340,7 @@ def _require_free(site: Site, robot: Robot, inside: Bools) -> None:
 
 
 def beside_others(site: Site, alone: Sequence[Reached]) -> list[Reached]:
-    """Return the postures of robots that touch no base of another one.
-
-    Raises `SceneError` if two bases touch.
-    """
+    """Return the postures of robots that touch no base of another one; bases stand apart."""
     bases = [fixed_bodies(each.model) for each in alone]
     out = []
     for i, own in enumerate(alone):

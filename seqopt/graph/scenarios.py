@@ -180,10 +180,7 @@ class ScenarioArcs(FrozenValue):
         return len(self.arcs[0])
 
     def totals(self, choice: Sequence[int]) -> Floats:
-        """Return the total of a choice in every scenario.
-
-        ``choice``: an allowed candidate for every move. Result (S,).
-        """
+        """Return the total (S,) of an allowed choice in every scenario."""
         before = (0, *choice[:-1])
         parts = [arc[:, i, j] for arc, i, j in zip(self.arcs, before, choice, strict=True)]
         return np.asarray(np.sum(parts, axis=0))
@@ -202,10 +199,7 @@ class ScenarioArcs(FrozenValue):
         return costs, _least_to_go(costs)
 
     def cheapest(self, weights: Floats) -> tuple[Choice, float]:
-        """Return the choice of least weighted total, and that total.
-
-        ``weights`` (S,). Result (tuple of int, float).
-        """
+        """Return the choice of least total by weights (S,), and that total."""
         costs, rest = self.to_go(weights)
         return _least_path(costs, rest), float(rest[0][0])
 
@@ -238,10 +232,7 @@ class ScenarioArcs(FrozenValue):
 
 
 def scenario_arcs(layers: Sequence[LayeredCosts], aim: RobustAim) -> ScenarioArcs:
-    """Return the costs of pairs in all scenarios.
-
-    ``layers``: one for every scenario, of the same moves.
-    """
+    """Return the costs of pairs in all scenarios, of the same moves in each."""
     arcs, shut = [], []
     for k in range(len(layers[0].single)):
         both = np.stack([each.single[k] + each.shared[k] for each in layers])
@@ -344,10 +335,7 @@ class ScenarioLayers(Shown):
         return self._kept(replace(self, aim=aim))
 
     def first(self, count: int) -> ScenarioLayers:
-        """Return the problem of the first scenarios alone; costs that are known stay known.
-
-        ``count``: how many, from 1.
-        """
+        """Return the problem of the first scenarios alone; what is known of costs stays known."""
         return self._kept(replace(self, scenes=self.scenes[: max(count, 1)]))
 
     def _kept(self, other: ScenarioLayers) -> ScenarioLayers:
@@ -365,17 +353,11 @@ class ScenarioLayers(Shown):
         return np.array([aim.value_of(costs, choice) for costs in self.layered(aim)])
 
     def layered(self, aim: Aim) -> tuple[LayeredCosts, ...]:
-        """Return the costs that an aim is about, scenario by scenario.
-
-        ``aim``: sums or peaks.
-        """
+        """Return the costs whose sums or peaks an aim is about, scenario by scenario."""
         return tuple(map(aim.costs, self.costs))
 
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
-        """Return the checked steps of the build; see `Layers.steps`.
-
-        ``choice``: a candidate for every move.
-        """
+        """Return the checked steps of the build; see `Layers.steps`."""
         return self.nominal.steps(choice)
 
 

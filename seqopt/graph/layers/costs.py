@@ -208,10 +208,7 @@ class Joined:
         self._least = np.inf
 
     def add(self, moves: tuple[int, ...], costs: Floats) -> None:
-        """Join the costs of a step.
-
-        ``moves``: open in it: one, or two neighboring ones; ``costs`` ((C,) or (C, D) float).
-        """
+        """Join the costs, (C,) or (C, D), of a step with one open move, or two neighboring ones."""
         finite = costs[np.isfinite(costs)]
         self._least = min(self._least, float(finite.min(initial=np.inf)))
         before = self._found.get(moves)
@@ -227,10 +224,7 @@ class Joined:
         return self._of((move,), (self._sizes[move],))
 
     def layered(self) -> LayeredCosts:
-        """Return the costs of single choices and of pairs.
-
-        Result: pairs of moves that share no step take no memory.
-        """
+        """Return the costs of choices and pairs; moves that share no step take no memory."""
         pairs = zip([1, *self._sizes[:-1]], self._sizes, strict=True)
         shared = tuple(self._of((k - 1, k), pair) for k, pair in enumerate(pairs))
         return LayeredCosts(tuple(map(self.single, range(len(self._sizes)))), shared)
@@ -269,10 +263,7 @@ def _least_to_go(arcs: Sequence[Floats]) -> list[Floats]:
 
 
 def _least_path(arcs: Sequence[Floats], rest: Sequence[Floats]) -> tuple[int, ...]:
-    """Return the choice whose arcs add up to least.
-
-    ``rest``: as of `_least_to_go`.
-    """
+    """Return the choice whose arcs add up to least; ``rest`` as of `_least_to_go`."""
     choice: list[int] = []
     for arc, ahead in zip(arcs, rest[1:], strict=True):
         choice.append(int(np.argmin(arc[choice[-1] if choice else 0] + ahead)))

@@ -297,17 +297,11 @@ class Layers(Shown):
             )
 
     def table(self) -> pd.DataFrame:
-        """Return what is to be chosen.
-
-        Result: a row per open grip; as of `seqopt.sequence.schedule.Schedule.table`.
-        """
+        """Return a row per open grip, as `seqopt.sequence.schedule.Schedule.table` does."""
         return self.schedule.table()
 
     def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
-        """Return the nodes that a choice stands for.
-
-        ``choice``: a candidate for every move.
-        """
+        """Return the nodes that a choice, a candidate for every move, stands for."""
         return tuple(m.candidates[c] for m, c in zip(self.schedule.moves, choice, strict=True))
 
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:

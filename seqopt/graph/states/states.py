@@ -301,10 +301,7 @@ class States(Shown):
         return out, within
 
     def stand(self, level: int, states: Ints) -> Bools:
-        """Return which states are proven to stand as is demanded.
-
-        ``states`` (n, c). Result (n,).
-        """
+        """Return which states (n, c) are proven to stand as is demanded, (n,)."""
         if self.each:
             return np.asarray(np.all([p.stand(level, states) for p in self.each], axis=0))
         bricks = self.space.bricks_at(level)

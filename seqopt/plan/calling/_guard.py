@@ -85,10 +85,7 @@ def unchanged(name: str, judged: Callable[[], object]) -> Iterator[None]:
 
 @contextmanager
 def readable(name: str) -> Iterator[None]:
-    """Say that a formulation failed where what it returned cannot be read.
-
-    ``name``: of the formulation.
-    """
+    """Say that a formulation, by name, failed where what it returned cannot be read."""
     try:
         yield
     except (TypeError, ValueError, AttributeError, OverflowError) as error:
@@ -260,10 +257,7 @@ def require_time(formulation: Formulation, time_limit: float) -> None:
 
 
 def require_proof(proof: object) -> None:
-    """Raise an error where a lazy search is to leave out the proof, which is all it is for.
-
-    Raises `ProblemError`.
-    """
+    """Raise a `ProblemError` where a lazy search is to leave out the proof, all it is for."""
     if not proof:
         raise ProblemError("a lazy search proves what it finds; leave out lazy, or ask for a proof")
 

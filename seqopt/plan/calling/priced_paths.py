@@ -271,10 +271,7 @@ class PricedPaths:
     names: tuple[str, ...]
 
     def path(self, choice: Sequence[int]) -> Path:
-        """Return a choice with what it costs and takes.
-
-        ``choice``: a candidate for every move.
-        """
+        """Return a choice, a candidate for every move, with what it costs and takes."""
         pairs = list(zip((0, *choice[:-1]), choice, strict=True))
         cost = sum(float(arc[pair]) for arc, pair in zip(self.arcs, pairs, strict=True))
         taken = sum(a[:, i, j] for a, (i, j) in zip(self.amounts, pairs, strict=True))
@@ -405,10 +402,7 @@ def best_prices(paths: PricedPaths, watch: Watch) -> Priced:
 
 
 def _highest(paths: Sequence[Path], reach: float) -> tuple[Floats, float]:
-    """Return the prices up to ``reach`` at which the lowest plane of the paths is highest.
-
-    And its height there.
-    """
+    """Return prices up to ``reach`` where the lowest plane of paths is highest, and how high."""
     planes = np.array([[1.0, *-path.over] for path in paths])
     heights = np.array([path.cost for path in paths])
     count = planes.shape[1] - 1

@@ -307,10 +307,7 @@ def _state_columns(
 
 
 def _travel_of(problem: States, steps: Sequence[Step]) -> float:
-    """Return how far robots go from one grip to the next.
-
-    Result: m; straight lines.
-    """
+    """Return how far robots go straight from one grip to the next, m."""
     scene, site, total = problem.network.scene, problem.rules.begin, 0.0
     before = () if site is None else (site.stays or site.holds(scene), site.holds(scene))
     for nodes in zip(*before, *(step.grips for step in steps), strict=True):  # robot by robot
