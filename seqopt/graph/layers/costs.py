@@ -79,11 +79,7 @@ class LayeredCosts(FrozenValue):
         return [shared + single for shared, single in zip(self.shared, self.single, strict=True)]
 
     def parts(self, choice: Sequence[int]) -> list[float]:
-        """Return the costs that a choice meets.
-
-        ``choice``: a candidate for every move. Result: move by move, the single cost and the one
-        shared with the move before.
-        """
+        """Return what a choice meets, by move: its cost, and that shared with the move before."""
         out, before = [], 0
         for single, shared, now in zip(self.single, self.shared, choice, strict=True):
             out += [float(single[now]), float(shared[before, now])]
@@ -91,17 +87,11 @@ class LayeredCosts(FrozenValue):
         return out
 
     def cost(self, choice: Sequence[int]) -> float:
-        """Return the total cost of a choice.
-
-        ``choice``: a candidate for every move. Result: infinite if the choice is not allowed.
-        """
+        """Return the total cost of a choice; infinite if it is not allowed."""
         return sum(self.parts(choice))
 
     def worst(self, choice: Sequence[int]) -> float:
-        """Return the largest cost that a choice meets.
-
-        ``choice``: a candidate for every move. Result: infinite if the choice is not allowed.
-        """
+        """Return the largest cost that a choice meets; infinite if it is not allowed."""
         return max(self.parts(choice))
 
     def continuable(self) -> tuple[Bools, ...]:
@@ -176,10 +166,7 @@ class Budget(FrozenValue):
         return LayeredCosts(self.single, self.shared)
 
     def spent(self, choice: Sequence[int]) -> float:
-        """Return what a choice takes of the budget.
-
-        ``choice``: a candidate for every move. Result: in the unit of the budget.
-        """
+        """Return what a choice takes of the budget, in its unit."""
         return self.amounts.cost(choice)
 
     def slack(self, choice: Sequence[int]) -> float:

@@ -221,10 +221,7 @@ class Layers(Shown):
         return replace(choices, moves=(move - 1, move), responses=responses)
 
     def seconds(self, aim: Aim) -> Mapping[str, float]:
-        """Return what computing the costs of an aim took.
-
-        ``aim``: sums or peaks. Result: ``respond`` (responses) and ``rank`` (costs), s.
-        """
+        """Return how long responses (``respond``) and costs (``rank``) of an aim took, s."""
         ranked = self._sums[1] if aim is Aim.SUM else self._peaks[1]
         return {"respond": self.evaluation.seconds, "rank": ranked}
 
@@ -305,10 +302,7 @@ class Layers(Shown):
         return tuple(m.candidates[c] for m, c in zip(self.schedule.moves, choice, strict=True))
 
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
-        """Return the checked steps of the schedule with a choice.
-
-        ``choice``: a candidate for every move. Raises `StepError` if a step is impossible.
-        """
+        """Return the checked steps of a choice; a `StepError` says which one is impossible."""
         return self.schedule.fill(self.nodes(choice))
 
 

@@ -88,10 +88,7 @@ class LayeredFlow(FrozenValue):
         return value - ACCURACY * max(abs(value), self.scale)
 
     def prices(self, duals: Sequence[float]) -> dict[str, float]:
-        """Return what one more unit of each budget would save.
-
-        ``duals``: of the scaled caps. Result: by budget: cost per unit of the budget.
-        """
+        """Return what one more unit of each budget would save, by duals of the scaled caps."""
         pairs = zip(self.names, self.units, duals, strict=True)
         return {name: float(self.scale / unit * dual) for name, unit, dual in pairs}
 

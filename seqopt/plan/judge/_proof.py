@@ -130,10 +130,7 @@ class Passable:
         )
 
     def valued(self, level: int, states: Ints, asked: Asked) -> tuple[Floats, Bools]:
-        """Return what goals take of states, and which ones a better plan could pass.
-
-        ``states`` (n, c). Results: ``values`` (n, g); ``ok`` (n,).
-        """
+        """Return what goals take of states (n, g), and which a better plan could pass (n,)."""
         goals = self.problem.goals
         if not self.tables.bricks_at(level):
             return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)

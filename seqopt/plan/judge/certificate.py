@@ -218,18 +218,12 @@ def _value(costs: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
 
 
 def least(costs: LayeredCosts, aim: Aim) -> float:
-    """Return the least value of any choice, ignoring budgets.
-
-    ``aim``: takes `least_sum` or `least_peak`. Result: infinite if no choice is allowed.
-    """
+    """Return the least value of any choice, budgets aside; infinite if none is allowed."""
     return least_sum(costs) if aim is Aim.SUM else least_peak(costs)
 
 
 def least_sum(costs: LayeredCosts) -> float:
-    """Return the least sum that any choice reaches, budgets aside: forward, move by move.
-
-    Result: infinite if no choice is allowed.
-    """
+    """Return the least sum of any choice, forward, budgets aside; infinite if none is allowed."""
     reached = np.zeros(1)
     for single, shared in zip(costs.single, costs.shared, strict=True):
         reached = (reached[:, None] + shared).min(axis=0) + single

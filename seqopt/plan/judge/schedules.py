@@ -288,10 +288,7 @@ def _margins(problem: States, steps: Sequence[Step]) -> Mapping[str, float]:
 def _state_columns(
     problem: States, steps: Sequence[Step], table: pd.DataFrame
 ) -> Mapping[str, np.ndarray]:
-    """Return the named responses of a table of steps, SI units.
-
-    ``table``: from `seqopt.analyze`. Result (dict of str to (n,) float).
-    """
+    """Return responses (n,) by name, SI units, of a table of `seqopt.analyze`."""
     forces = table[[force_column(robot) for robot in problem.network.scene.robots]].abs()
     out = {LARGEST: forces.max(axis=1).fillna(0.0).to_numpy(float)}
     for name in problem.named:
