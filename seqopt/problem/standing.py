@@ -145,6 +145,11 @@ class StandingSets:
         """Of how many grip sets it was asked whether they stand."""
         return self._known[""].count
 
+    @property
+    def programs(self) -> int:
+        """How many linear programs were solved."""
+        return self._screens[0].solved + self._margins.solved
+
     def stand(self, bricks: int, held: Ints, payload: Floats) -> Bools:
         """Return which grip sets are proven to stand.
 
