@@ -1,7 +1,7 @@
 """Claim: the documentation's pictures of built-in scenes are those of the scenes that ship.
 
 Method: draw `arch25` with its network; responses along all methods; printed against computed
-ones; `vault338` while it grows and from above; scenes of the library's generators; the Pareto sets
+ones; `vault338` while it grows and from above; scenes in words; the Pareto sets
 of the free schedule and of the loop.
 Every picture is held against the stored one before it takes its place: gray means over squares of
 16 pixels, so that fonts do not count, may differ by a fifth of what tells the stored picture from a
@@ -35,7 +35,6 @@ from seqopt.report.comparison import method_tables
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, force_key
 from seqopt.report.text import in_words
 from seqopt.scene.boxes import boxes
-from seqopt.scene.library import DomeShape, WallShape, chain, dome, wall
 from seqopt.study._yardstick import VALUES
 from seqopt.study.published import WORST_RATIO, as_printed, printed_steps
 
@@ -68,22 +67,6 @@ def vault(_: Engine) -> Figure:
     text = {"ha": "center", "va": "center"}
     plan.text((left + right) / 2, front - 0.25, f"{1e3 * (right - left):,.0f}", **text)
     plan.text(left - 0.25, (front + back) / 2, f"{1e3 * (back - front):,.0f}", **text, rotation=90)
-    return figure
-
-
-@styled
-def library(_: Engine) -> Figure:
-    figure, panels = subplots(5.6, 2, 2)
-    herringbone = DomeShape(courses=10, around=24, bond="herringbone", thickness=0.06)
-    scenes = {
-        "chain of 50 bricks": chain(50),
-        "wall in running bond, {} bricks": wall(WallShape(columns=6, courses=8, gap=0.01)),
-        "dome in running bond, {} bricks": load_scene("dome163"),
-        "dome in herringbone, {} bricks": dome(herringbone),
-    }
-    for panel, (name, scene) in zip(panels.ravel(), scenes.items(), strict=True):
-        draw_bricks(panel, build_network(scene), len(scene.bricks), VIEW)
-        panel.set_title(name.format(len(scene.bricks)), loc="center")
     return figure
 
 
@@ -219,7 +202,6 @@ PICTURES: dict[str, Callable[[Engine], Figure]] = {
     "responses.png": responses_along_the_build,
     "agreement.png": printed_against_computed,
     "vault338.png": vault,
-    "library.png": library,
     "words.png": scenes_in_words,
     SEARCHED: free_front,
 }

@@ -17,7 +17,7 @@ STEPS = 400  # weights that are tried at most
 CLOSE = 1e-9  # differences that are none, and of bound and roof, over the size of the values
 
 
-class Weighable(Protocol):
+class _Weighable(Protocol):
     """Choices with a total in every scenario."""
 
     @property
@@ -29,30 +29,10 @@ class Weighable(Protocol):
         """How many there are."""
 
     def cheapest(self, weights: Floats) -> tuple[tuple[int, ...], float]:
-        """Return the choice of least weighted total.
-
-        Parameters
-        ----------
-        weights : (S,) float
-
-        Returns
-        -------
-        choice : tuple of int
-        bound : float
-            What no choice stays below.
-        """
+        """Return the choice of least total by weights (S,), and what none stays below."""
 
     def totals(self, choice: tuple[int, ...]) -> Floats:
-        """Return the total of a choice in every scenario.
-
-        Parameters
-        ----------
-        choice : tuple of int
-
-        Returns
-        -------
-        (S,) float
-        """
+        """Return the total (S,) of a choice in every scenario."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +49,7 @@ class Weighed:
     met: tuple[tuple[int, ...], ...]
 
 
-def best_weights(choices: Weighable, watch: Watch) -> Weighed:
+def best_weights(choices: _Weighable, watch: Watch) -> Weighed:
     """Return the weights whose bound is highest, and the best choice met on the way.
 
     ``choices``: some choice is allowed. A `SolverError` says that no highest point was found.
@@ -95,7 +75,7 @@ def best_weights(choices: Weighable, watch: Watch) -> Weighed:
     return Weighed(best, bound, ranked[0], values[ranked[0]], tuple(ranked))
 
 
-def provers(choices: Weighable, weighed: Weighed) -> Floats:
+def provers(choices: _Weighable, weighed: Weighed) -> Floats:
     """Return weights that prove bounds of beginnings, (J, S): the best, and single scenarios."""
     if choices.aim.most(choices.scenarios) < 1:
         return weighed.weights[None]

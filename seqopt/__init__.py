@@ -25,7 +25,7 @@ from importlib import import_module
 _HOMES = {
     "scene.scene": ("Scene",),
     "scene.parts": ("Robot", "Sphere"),
-    "scene.holders._props": ("Prop",),
+    "scene._props": ("Prop",),
     "scene.scene_file": ("load_scene", "save_scene"),
     "scene.arch": ("ArchShape", "arch_scene"),
     "network.network": ("Network",),
@@ -50,7 +50,7 @@ _HOMES = {
     "scene.scenarios": ("scenarios",),
     "plan.plan": ("Plan",),
     "graph.instances._files": ("read_instance", "save_instance"),
-    "plan._bare._compiled": ("compile_instance",),
+    "plan._compiled": ("compile_instance",),
     "plan.judge._bare._judging": ("judge_instance",),
     "plan.build": ("GivenSequence",),
     "plan.judge.certificate": ("Certificate",),

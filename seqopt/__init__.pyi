@@ -11,7 +11,7 @@ from seqopt.graph.instances._files import read_instance as read_instance
 from seqopt.graph.instances._files import save_instance as save_instance
 from seqopt.network.build import build_network as build_network
 from seqopt.network.network import Network as Network
-from seqopt.plan._bare._compiled import compile_instance as compile_instance
+from seqopt.plan._compiled import compile_instance as compile_instance
 from seqopt.plan.build import GivenSequence as GivenSequence
 from seqopt.plan.calling.formulation import Formulation as Formulation
 from seqopt.plan.calling.formulation import formulations as formulations
@@ -24,9 +24,9 @@ from seqopt.problem.criteria import StepCost as StepCost
 from seqopt.problem.problem import Problem as Problem
 from seqopt.problem.requirements import Limit as Limit
 from seqopt.responses.table import analyze as analyze
+from seqopt.scene._props import Prop as Prop
 from seqopt.scene.arch import ArchShape as ArchShape
 from seqopt.scene.arch import arch_scene as arch_scene
-from seqopt.scene.holders._props import Prop as Prop
 from seqopt.scene.parts import Robot as Robot
 from seqopt.scene.parts import Sphere as Sphere
 from seqopt.scene.scenarios import scenarios as scenarios

@@ -18,10 +18,7 @@ AGAIN = 0.05  # s after which an interrupt that was lost is raised again
 
 
 def run() -> int:
-    """Run the command of the shell; an interrupt while it starts is one too.
-
-    Result: the exit status.
-    """
+    """Run the command of the shell and return its exit status; its start may be interrupted."""
     try:
         _open_streams()
         _answer_signals(_leave)  # libraries that are being loaded may lose what is raised in them

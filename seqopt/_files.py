@@ -21,8 +21,6 @@ _MARK = "'"
 def harmless(text: str) -> str:
     """Return a cell that spreadsheets show as it is, after an apostrophe if need be.
 
-    Examples
-    --------
     >>> harmless("=cmd_node"), harmless("rob1_node"), plain(harmless("'=x"))
     ("'=cmd_node", 'rob1_node', "'=x")
     """

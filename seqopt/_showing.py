@@ -27,7 +27,7 @@ DISPLAYS = {
     "tilt_picture": "seqopt.report._failure_chart",
     "gantt_picture": "seqopt.report._pictures",
     "seconds_picture": "seqopt.report.gantt._seconds",
-    "Film": "seqopt.report._films._film",
+    "Film": "seqopt.report._film",
     "build_page": "seqopt.report._pages",
     "failure_figure": "seqopt.report._failure_chart",
     "speed_chart": "seqopt.report._speed._chart",

@@ -25,8 +25,6 @@ _COMPRESSED = (sparse.csr_array, sparse.csc_array)
 def skew(vectors: Floats) -> Floats:
     """Return the matrices (..., 3, 3) that take the cross product with vectors (..., 3).
 
-    Examples
-    --------
     >>> skew(np.array([1.0, 2.0, 3.0])) @ np.array([0.0, 0.0, 1.0])
     array([ 2., -1.,  0.])
     """
@@ -65,8 +63,6 @@ class FrozenValue(Terse):
     if all their fields are, arrays element by element and NaN like NaN; equal values have equal
     hashes. Subclasses are decorated with ``@dataclass(frozen=True, eq=False, repr=False)``.
 
-    Examples
-    --------
     >>> from dataclasses import dataclass
     >>> @dataclass(frozen=True, eq=False, repr=False)
     ... class Load(FrozenValue):

@@ -15,8 +15,6 @@ _Places = tuple[tuple[str, int], ...]
 def plugins(group: str) -> dict[str, EntryPoint]:
     """Return the entry points of a group by name, also of packages installed since Python started.
 
-    Examples
-    --------
     >>> sorted(plugins("seqopt.limit_analysis"))
     ['lp', 'socp']
     """
@@ -122,8 +120,6 @@ class SceneWarning(UserWarning):
 def did_you_mean(given: object, known: Iterable[str]) -> str:
     """Return a hint at the word that was probably meant, or nothing where none or two are near.
 
-    Examples
-    --------
     >>> did_you_mean("overlap_pd", ["cascade", "overlap_dp"])
     ' (did you mean overlap_dp?)'
     >>> did_you_mean("t_max", ["T_max"]), did_you_mean("x", ["cascade", "overlap_dp"])

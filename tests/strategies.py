@@ -10,11 +10,10 @@ from hypothesis import strategies as st
 from experiments.harness.scenes import running_bond
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.scene._loads import Load
+from seqopt.scene._props import Prop
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import as_vectors, vertices_of
-from seqopt.scene.holders._props import Prop
-from seqopt.scene.parts import Anywhere, Robot, Side, Sphere
+from seqopt.scene.parts import Anywhere, Load, Robot, Side, Sphere
 from seqopt.scene.shape import Polyhedron
 from seqopt.sequence.rules import FreeRules
 from seqopt.study.published import ROBOTS

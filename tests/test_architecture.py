@@ -46,12 +46,8 @@ SHARED = {  # what formulations may import
     "formulations.whole_program",
     "formulations._weights",
     "formulations.states._search",
-    "formulations.states._bare",
-    "formulations.times._curing",
-    "formulations.times._instances",
-    "formulations.times._labels",
-    "formulations.times._prices",
     "formulations.times._search",
+    "formulations.times._labels",
     "formulations.times._stages",
     "formulations.states._totals",
 }

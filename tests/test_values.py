@@ -31,7 +31,7 @@ from seqopt.network._mechanics import build_statics
 from seqopt.network.build import build_network
 from seqopt.scene.boxes import boxes
 from seqopt.scene.imports.contacts import flat_face, touching_faces
-from seqopt.scene.library._joints import overlaps
+from seqopt.scene.library.common import _overlaps
 from seqopt.scene.shape import Surface
 from seqopt.sequence.two_robots import sequential
 from seqopt.stability._held_states import _HoldingForces, _Known, first_directions
@@ -58,7 +58,7 @@ def values(arch25):
     plane = _Plane(np.zeros(3), np.array([0.0, 1.0, 0.0]), np.eye(3)[[0, 2]])
     maps, operator = scene_maps(network), OperatorBuilder(network, tree).operator(2)
     shapes = boxes(arch25.bricks)
-    joined = overlaps(shapes, [(0, 1)])
+    joined = _overlaps(shapes, [(0, 1)])
     (touching,) = touching_faces([box((1, 1, 1)), box((1, 1, 1), at=(0, 0, 1))], 1e-3)
     every = (
         *(maps, ResponseMaps(maps, 2)),

@@ -43,7 +43,7 @@ from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.study._discrete_arches import STEPS, error, moved
+from seqopt.study._yardstick import STEPS, error, moved
 from seqopt.study.published import STUDY_PADS, printed
 
 SIDES = 1e-3 * np.arange(4.0, 51.0)  # m, of the scan

@@ -36,7 +36,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from experiments.harness.charts import note, subplots
+from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
 from experiments.harness.results import apart, drawn, exponents_by
 from experiments.harness.scenes import arch25, grip_sets
@@ -114,29 +114,6 @@ def growth(counts: list[int], rounds: int) -> pd.DataFrame:
         row = {"bricks": count, "operator_s": build, "set_s": batch, "set_once_s": once}
         rows.append(row | {"again": 1 - trusted.mean()})
     return pd.DataFrame(rows)
-
-
-@styled
-def chart(table: pd.DataFrame) -> Figure:
-    figure, axes = subplots(3.3)
-    bricks = table["bricks"].to_numpy(float)
-    lines = {
-        "operator_s": "preparing one number of bricks",
-        "set_s": "one set of three grips, all edges and nodes",
-        "set_once_s": "the same, if none had to be solved again",
-    }
-    for (column, label), style in zip(lines.items(), looks(lines).values(), strict=True):
-        axes.plot(bricks, table[column], label=label, **style.line())
-    guides = ((2, "operator_s", "∝ bricks²", 6), (1, "set_once_s", "∝ bricks", -12))
-    for power, column, word, shift in guides:
-        guide = table[column].iloc[-1] * (bricks / bricks[-1]) ** power
-        axes.plot(bricks, guide, color=GRAY, lw=0.8)
-        note(axes, word, (bricks[1], guide[1]), (-24, shift), color=GRAY)
-    axes.set(xscale="log", yscale="log", xlabel="bricks in the chain", ylabel="time [s]")
-    plain(axes.xaxis)
-    dress(axes)
-    axes.legend(loc="upper left")
-    return figure
 
 
 def speed(options: Options) -> Finding:
@@ -234,10 +211,7 @@ CLAIM = Claim(
     digits=4,
     quick="small sizes, nothing written",
     times=Times.JUDGED,
-    pictures={
-        "engine_growth.png": drawn(chart, "engine_growth"),
-        "growth.png": drawn(growth_chart, "engine_growth_runs"),
-    },
+    pictures={"growth.png": drawn(growth_chart, "engine_growth_runs")},
 )
 
 if __name__ == "__main__":

@@ -13,24 +13,19 @@ Inputs: the shipped scene. Command: ``python -m experiments.engines.frame_contra
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
-from experiments.harness.charts import note, subplots
 from experiments.harness.claim import Claim, Finding, Options
-from experiments.harness.results import drawn
 from experiments.harness.scenes import arch25
 from seqopt import Step
 from seqopt.engines.frame import CONTRAST, FrameEngine
 from seqopt.engines.interface import Engine, Fields, grip_columns
 from seqopt.engines.rigid._mixed import solve_dense
 from seqopt.errors import SolverError
-from seqopt.report._style import GRAY, dress, looks, styled
 from seqopt.responses.table import step_fields
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import published_plan
 
 FIELDS = ("edge_force", "displacement", "grip_force", "support")
-LABELS = {"displacement": "displacement of nodes", "support": "reaction of the support"}
 
 
 def published_steps(engine: Engine) -> list[Step]:
@@ -74,22 +69,6 @@ def direct_gap(step: Step, fast: Engine) -> float:
     return max(difference(direct, step_fields(fast, step)).values())
 
 
-@styled
-def chart(table: pd.DataFrame) -> Figure:
-    figure, axes = subplots(3.2)
-    for name, style in looks(FIELDS).items():
-        label = LABELS.get(name, name.replace("_", " "))
-        axes.plot(table["contrast"], table[name], label=label, **style.line())
-    axes.axvline(CONTRAST, color=GRAY, lw=0.8)
-    axes.set(xscale="log", yscale="log", ylabel="largest relative difference\nfrom rigid bricks")
-    axes.set_xlabel("stiffness of the bars over that of the joints")
-    note(axes, "the default", (CONTRAST, 0.05), (4, 0))
-    axes.locator_params(axis="y", numticks=6)
-    dress(axes)
-    axes.legend()
-    return figure
-
-
 def experiment(options: Options) -> Finding:
     fast = arch25()
     steps = published_steps(fast)[:: 25 if options.quick else 1]
@@ -109,12 +88,7 @@ def holds(table: pd.DataFrame, gap: float) -> bool:
     return bool(best <= min(5e-6, worst.min()) and bad.all() and gap <= 1e-9)
 
 
-CLAIM = Claim(
-    experiment,
-    digits=3,
-    quick="few states, nothing written",
-    pictures={"frame_contrast.png": drawn(chart, "frame_contrast")},
-)
+CLAIM = Claim(experiment, digits=3, quick="few states, nothing written")
 
 if __name__ == "__main__":
     CLAIM.main()

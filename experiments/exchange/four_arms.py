@@ -27,9 +27,9 @@ from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, ClaimError, Extra, Finding, Option, Options, none_of
 from experiments.harness.results import FIGURES
 from seqopt._cli.main import main
-from seqopt.arms._drawn import PosedArm, idle_arm
+from seqopt.arms._model import PosedArm, idle_arm
 from seqopt.errors import ExtraError, SceneError
-from seqopt.report._films._film import Film
+from seqopt.report._film import Film
 from seqopt.report._pictures import VIEW, _build_box, _mark_grips
 from seqopt.report._robots import Arms, Cell
 from seqopt.report._style import styled

@@ -265,7 +265,6 @@ CLAIM = Claim(
     | dict.fromkeys(("failing_steps", "failing_scale"), 5),
     pictures={
         "dry_map.png": drawn(charts.map_chart, "dry_map"),
-        "dry_grips.png": drawn(charts.grips_chart, "dry_grips"),
         "failing_steps.png": drawn(charts.failing_chart, "failing_steps", "failing_scale"),
     },
 )

@@ -46,7 +46,6 @@ from experiments.harness.claim import Claim, Extra, Finding, Option, Options, Ti
 from experiments.harness.lmgc90 import python_with_lmgc90
 from experiments.stability.parts import witness_cra
 from experiments.stability.parts.blocks import ring, stack
-from experiments.stability.parts.witness_chart import LARGEST, differing, picture, words
 from experiments.stability.parts.witness_cra import SAMPLES, force_only, sample_scene
 from experiments.stability.parts.witness_lmgc90 import moved_by
 from experiments.stability.parts.witness_scenes import Scene, arch, incline, scene_of
@@ -56,6 +55,7 @@ from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.limit_analysis import compile_equilibrium
 
 SOONER = 5.0
+LARGEST = "armadillo_cra"
 OPEN = Verdict.UNDECIDED.value
 TURNED = "incline, turned"
 KNOWN = {
@@ -76,6 +76,19 @@ STACKS = ((0, 0), (0.25, 0.48), (0, 0.49), (0, 0.51), (0.16, 0.24, 0.49), (0.17,
 INCLINES = (0.55, 0.57, 0.585, 0.65)
 ARCHES = (0.09, 0.1, 0.105, 0.107, 0.108, 0.11, 0.13)
 DENSITIES = (1e-3, 1e-2, 0.1, 1.0, 10.0, 1000.0, 2420.0)
+
+
+def words(table: pd.DataFrame, witness: str) -> pd.Series:
+    """Return a witness's verdicts; RBE's open ones as its constraints without tension have it."""
+    if witness != "rbe":
+        return table[witness].replace("", OPEN)
+    return table["rbe"].where(table["rbe"] != OPEN, table["no_tension"])
+
+
+def differing(table: pd.DataFrame, witness: str) -> set[tuple[str, str]]:
+    """Return where a witness decides otherwise than we."""
+    word = words(table, witness)
+    return {(case, witness) for case in table.loc[(word != OPEN) & (word != table["ours"]), "case"]}
 
 
 @dataclass(frozen=True)
@@ -233,7 +246,6 @@ CLAIM = Claim(
     times=Times.SHOWN,
     options=(Option("--lmgc90", "a Python with compas_lmgc90", sys.executable),),
     needs=(Extra("compas_cra", 'pip install "seqopt[witness]"'),),
-    pictures={"witnesses.png": picture},
 )
 
 if __name__ == "__main__":

@@ -21,9 +21,8 @@ from matplotlib.figure import Figure
 from experiments.harness.claim import Claim, Finding, Options, none_of
 from experiments.harness.results import FIGURES, save_table, stored
 from experiments.study.parts.counterpart_page import page
-from seqopt._paper.agreement import DISAGREES, TITLES, statement, verdict
 from seqopt._paper.charts import drawn
-from seqopt._paper.items import ITEMS, Item
+from seqopt._paper.items import DISAGREES, ITEMS, TITLES, Item, statement, verdict
 from seqopt._paper.rows import Ours, ours, tabulate
 
 KNOWN = {"fig:secant_stiff", "table:model_results", "table:validation_results"}

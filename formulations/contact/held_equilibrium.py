@@ -213,7 +213,6 @@ class _HeldEquilibrium:
         return Answer(claim, np.nan, *forces, motion.reshape(-1, 6))
 
     def _better(self, motion: Floats) -> Directions:
-        """Return the directions that a motion asks for."""
         size = np.abs(motion).max(initial=0.0) or 1.0
         along = -(self._map.T @ (motion.ravel() / size)).reshape(-1, 3)
         corner = along[: self._corners]

@@ -38,7 +38,6 @@ def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection
 
 
 def _least_peak(costs: LayeredCosts) -> float:
-    """Return the smallest worst cost."""
     reached = np.full(1, -np.inf)
     for single, shared in zip(costs.single, costs.shared, strict=True):
         reached = np.maximum(single, np.maximum(reached[:, None], shared).min(axis=0))
@@ -46,7 +45,6 @@ def _least_peak(costs: LayeredCosts) -> float:
 
 
 def _least_sum(costs: LayeredCosts) -> tuple[int, ...]:
-    """Return the choice of least sum."""
     total = np.zeros(1)
     back = []
     for single, shared in zip(costs.single, costs.shared, strict=True):

@@ -33,7 +33,6 @@ from seqopt.problem.problem import Aim
 
 
 def _written(flow: LayeredFlow, arcs: cp.Variable) -> tuple[cp.Problem, list[cp.Constraint]]:
-    """Return the program of a flow over arcs, and its budgets."""
     conserve = cp.Zero(flow.balance @ arcs - flow.source)
     caps = [cp.NonNeg(cap - a @ arcs) for cap, a in zip(flow.caps, flow.amounts, strict=True)]
     return cp.Problem(cp.Minimize(flow.cost @ arcs), [conserve, *caps]), caps

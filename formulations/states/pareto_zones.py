@@ -21,12 +21,12 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
-from seqopt.plan.front import FrontProblem, FrontSelection
+from seqopt.plan.front import FrontSelection, _FrontProblem
 from seqopt.work.progress import Tell
 
 
 def solve(
-    problem: FrontProblem, *, seconds: float = np.inf, progress: Tell = lambda _: None
+    problem: _FrontProblem, *, seconds: float = np.inf, progress: Tell = lambda _: None
 ) -> FrontSelection:
     """Return all vectors that no plan dominates, and a plan for each.
 

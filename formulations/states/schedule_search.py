@@ -41,7 +41,6 @@ from operator import itemgetter, le
 
 import numpy as np
 
-from formulations.states._bare import path_of_instance
 from formulations.states._search import (
     WIDTH,
     StopError,
@@ -54,6 +53,7 @@ from formulations.states._search import (
     shortest,
     watched,
 )
+from formulations.states.on_graph import _path_of_instance
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph._budgets import is_beyond
 from seqopt.graph._explore import Explorer
@@ -94,7 +94,7 @@ def solve(
             "number above 1"
         )
     if isinstance(problem, Instance):
-        return path_of_instance(problem, lambda g, _: (*lexicographic(g), False), Watch(seconds))
+        return _path_of_instance(problem, lambda g, _: (*lexicographic(g), False), Watch(seconds))
     tell = watched(problem, Watch(seconds), max_memory, progress)
     if problem.totals:
         return best_total(problem, shortest, Watch(seconds), tell)

@@ -1,9 +1,15 @@
-"""Plans of formulations of time: states that stand, goals in turn, and waits for mortar."""
+"""Plans of formulations of time: states that stand, goals in turn, and waits for mortar.
+
+Labels wait no longer than motions prove that they must. The plan that they find is looked at as it
+is, with proven verdicts; where it has to wait longer, motions in which its states fall say why, and
+labels are set again.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,21 +22,130 @@ from formulations.states._search import (
     plan_by_then,
     watched,
 )
-from formulations.times._curing import Waits, require_cured
-from formulations.times._instances import of_instance
 from formulations.times._stages import ALMOST, Choose, StageFound, Stages
 from seqopt.arrays import Terse
-from seqopt.errors import InfeasibleError, TimeUpError
+from seqopt.errors import InfeasibleError, ProblemError, StepError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph._timed import timed_graph
-from seqopt.graph.instances.instance import Instance
+from seqopt.graph.instances.instance import PEAK, TIME, Instance
 from seqopt.graph.paths import tied
-from seqopt.graph.states._visits import FreeStates
+from seqopt.graph.states._visits import FreeStates, steps_of
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
-from seqopt.problem.problem import Measure
+from seqopt.problem.problem import Goal, Measure
+from seqopt.sequence._robot_kinds import node_numbers
+from seqopt.sequence._rule_space import FreeSpace
+from seqopt.sequence._timing import StepTime, reassigned_steps, step_times
+from seqopt.stability._aging.builds import CuringBuilds
+from seqopt.stability._aging.cuts import FallCuts
 from seqopt.work.progress import Tell
+
+
+class Soonest(NamedTuple):
+    """Who acts in a plan so that it takes least, and when.
+
+    ``grips``: places held by robots after every step; ``makespan``: s; ``starts``: of steps, s,
+    where mortar cures.
+    """
+
+    grips: tuple[tuple[int, ...], ...]
+    makespan: float
+    starts: tuple[float, ...]
+
+
+class Waits:
+    """How long plans of a problem wait for mortar, and motions that say how long at least.
+
+    ``cuts``: None where no mortar cures.
+    """
+
+    def __init__(self, problem: States) -> None:
+        standing = problem.standing
+        self._builds: CuringBuilds | None = None
+        self.cuts: FallCuts | None = None
+        if standing is not None and standing.curing is not None:
+            network, mortar = problem.network, standing.mortar
+            self._builds = CuringBuilds(network, mortar, standing.curing)
+            self.cuts = FallCuts(network, mortar, self._builds.joints)
+
+    def learn(self) -> bool:
+        """Keep the motions of all states that were looked at; return whether some are new."""
+        if self._builds is None or self.cuts is None:
+            return False
+        return sum(map(self.cuts.add, self._builds.motions)) > 0
+
+    def soonest(self, problem: States, states: Sequence[Sequence[int]]) -> Soonest:
+        """Return who of a kind acts so that a plan takes least, and when.
+
+        Raises `StepError` if no wait is enough for a step.
+        """
+        space, scene = problem.space, problem.network.scene
+        waits = None if self._builds is None else self._builds.waits
+        steps, grips = steps_of(space, states), tuple[tuple[int, ...], ...]()
+        if isinstance(space, FreeSpace):
+            kind = {robot: k for k, each in enumerate(space.kinds) for robot in each.robots}
+            steps = reassigned_steps(
+                *(scene, steps, lambda r, hold: kind[r] == kind[hold.robot], [*kind], waits),
+                begin=problem.rules.begin,
+            )
+            place = {node: i for i, node in enumerate(node_numbers(space.network), start=1)}
+            grips = tuple(tuple(0 if n is None else place[n] for n in step.grips) for step in steps)
+        times: tuple[StepTime, ...] = step_times(scene, steps, waits, problem.rules.begin)
+        starts = () if waits is None else tuple(time.start for time in times)
+        return Soonest(grips, times[-1].end, starts)
+
+    def try_soonest(self, problem: States, states: Sequence[Sequence[int]]) -> Soonest | None:
+        """Return the same; None where no wait is enough."""
+        try:
+            return self.soonest(problem, states)
+        except StepError:
+            if self.cuts is None:
+                raise
+            return None
+
+
+def require_cured(problem: States, name: str, *, cures: bool) -> None:
+    """Raise a `ProblemError` if mortar cures and a formulation does not know of it."""
+    standing = problem.standing
+    if standing is not None and standing.curing is not None and not cures:
+        raise ProblemError(f"{name}: it does not know mortar that cures; take makespan_labels")
+
+
+class _Asking(NamedTuple):
+    goals: tuple[Goal, ...]
+    aims: tuple[Goal, ...]
+    budgets: tuple[float, ...]
+
+
+def of_instance(instance: Instance, choose: Choose, watch: Watch) -> StatePath:
+    """Return the best path through an instance, its states the numbers of nodes."""
+    timed = instance.timed
+    if timed is None:
+        raise ProblemError(f"instance {instance.name}: no times are asked; take path_dp")
+    own = {PEAK: Measure.PEAK, TIME: Measure.MAKESPAN}
+    aims = tuple(Goal(own.get(goal.kind, Measure.SUM)) for goal in instance.goals)
+    caps = [Measure.MAKESPAN if c.column is None else Measure.SUM for c in instance.caps]
+    asked = _Asking((*aims, *map(Goal, caps)), aims, tuple(cap.most for cap in instance.caps))
+    stages = Stages(
+        asked,
+        Visited(timed.graph, ((0, 0, np.arange(instance.nodes)[:, None]),)),
+        choose,
+        watch,
+        timed,
+    )
+    try:
+        found = stages.run()
+    except StopError as stop:
+        return plan_by_then(None, stop)
+    makespan = stages.least(found.path)
+    pairs = zip(aims, stages.values(found.path), strict=False)
+    values = [makespan if goal.measure is Measure.MAKESPAN else v for goal, v in pairs]
+    bounds = [min(b, v) for b, v in zip(found.bounds, values, strict=False)]
+    bounds += values[len(bounds) :]
+    states, late = tuple((node,) for node in found.path), "time" * found.late
+    proofs = tuple(found.proofs)
+    return StatePath(states, tuple(values), tuple(bounds), stopped=late, proofs=proofs)
 
 
 @dataclass(frozen=True, repr=False)

@@ -15,8 +15,16 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from formulations.states._search import StopError
-from formulations.times._labels import STEPS, Caps, Labels, LateError, Sweep, Swept
-from formulations.times._prices import Prices, best_prices
+from formulations.times._labels import (
+    STEPS,
+    Caps,
+    Labels,
+    LateError,
+    Prices,
+    Sweep,
+    Swept,
+    best_prices,
+)
 from seqopt.arrays import Bools
 from seqopt.errors import InfeasibleError
 from seqopt.graph._explore import Visited
@@ -300,7 +308,6 @@ class Stages:
         return [self._taken(path, k) for k in range(len(self._problem.goals))]
 
     def _proof(self, labels: Sequence[Labels], prices: Prices) -> LabelProof:
-        """Return labels with the states that they are of."""
         columns = self._timed.free.shape[1]
         kinds = self._timed.kinds
         each = np.column_stack([prices.each[:, :1], prices.each[:, 1:][:, kinds]])

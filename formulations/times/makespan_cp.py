@@ -274,7 +274,6 @@ class _Program:
 
 
 def _least(asked: Asked) -> Chosen:
-    """Return the path of least makespan."""
     cp, first = _solver(), asked.first
     most = min(first.value, asked.caps.time)
     if not np.isfinite(most):

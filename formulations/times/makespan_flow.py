@@ -22,7 +22,7 @@ import numpy as np
 from scipy import sparse
 
 from formulations.solvers import STOPS, minimize_rows
-from formulations.times._prices import useful
+from formulations.times._labels import useful
 from formulations.times._search import in_time
 from formulations.times._stages import Asked, Chosen
 from seqopt.plan.calling.formulation import FormulationKind

@@ -115,8 +115,6 @@ def plain(value: object) -> Any:
     What is not known (NaN) is null, what is infinite the text ``inf`` or ``-inf``; a table is a
     list of rows.
 
-    Examples
-    --------
     >>> plain({"gap": float("nan"), "bond": float("inf"), "nodes": (1, 20)})
     {'gap': None, 'bond': 'inf', 'nodes': [1, 20]}
     """

@@ -36,8 +36,6 @@ MISSING = "the following arguments are required"
 def _nearest(message: str, options: Iterable[str]) -> str:
     """Return a hint at the word that a message of the parser is about, or nothing.
 
-    Examples
-    --------
     >>> _nearest("unrecognized arguments: --formulaton=beam", ["--formulation", "--out"])
     ' (did you mean --formulation?)'
     >>> _nearest("invalid choice: 'optimise' (choose from 'optimize', 'scene')", [])
@@ -57,8 +55,6 @@ def _nearest(message: str, options: Iterable[str]) -> str:
 def _first_wrong(message: str, given: Sequence[str], options: Sequence[str]) -> str:
     """Return a message about a missing argument, or one about a mistyped option that explains it.
 
-    Examples
-    --------
     >>> given = ["arch25", "--ot", "best"]
     >>> _first_wrong("the following arguments are required: --out", given, ["--out"])
     'unrecognized arguments: --ot'

@@ -161,8 +161,7 @@ def time_files(build: ShownBuild) -> dict[str, bytes | str]:
 
 def _task_files(plan: Plan) -> dict[str, str]:
     """Return what robots do, for those who program them, by file name."""
-    from seqopt.sequence.exports._arm_tasks import _in_postures  # noqa: PLC0415
-    from seqopt.sequence.exports._tasks import plan_tasks, tasks_csv, tasks_json  # noqa: PLC0415  # only where files are written
+    from seqopt.sequence.exports._tasks import _in_postures, plan_tasks, tasks_csv, tasks_json  # noqa: PLC0415  # only where files are written
 
     scene = plan.engine.network.scene
     tasks = [*plan_tasks(scene, plan.steps)]
@@ -223,7 +222,6 @@ def keep_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
 
 
 def _inputs(options: argparse.Namespace) -> list[Path]:
-    """Return the files that a command reads."""
     asked = (options.scene, getattr(options, "plan", None), getattr(options, "schedule", None))
     named = [Path(name) for name in asked if isinstance(name, str | Path)]
     folders = [path for path in named if is_folder(path)]

@@ -36,7 +36,7 @@ from seqopt.problem.problem import (
     parse_robust,
 )
 from seqopt.problem.requirements import Criterion
-from seqopt.scene.holders._props import Prop
+from seqopt.scene._props import Prop
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence._timing import step_times

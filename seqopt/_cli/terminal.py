@@ -38,8 +38,6 @@ def wrapped(text: str, width: int | None = None, first: str = "", rest: str | No
     ``first`` and ``rest`` are what the first line and all others begin with; the latter by default
     blanks as wide as the former.
 
-    Examples
-    --------
     >>> print(wrapped("one two three four", 12, "- "))
     - one two
       three four
@@ -79,8 +77,6 @@ def painted(text: str, style: str, stream: TextIO | None) -> str:
 def harmless(text: str, kept: str = "") -> str:
     r"""Return text in which what steers a terminal, save what is kept, is replaced by its code.
 
-    Examples
-    --------
     >>> harmless("rob" + chr(27) + "[2J")
     'rob\\x1b[2J'
     """
@@ -92,10 +88,7 @@ def harmless(text: str, kept: str = "") -> str:
 
 
 def show(text: str) -> None:
-    """Write a result to standard output, its last end of line too.
-
-    Raises `FileError` if standard output is closed.
-    """
+    """Write a result, its last end of line too; a `FileError` says that nobody reads it."""
     if sys.stdout is None:
         raise FileError("standard output is closed, and there is a result to write; open it")
     sys.stdout.write(harmless(text, "\n\t"))

@@ -273,7 +273,6 @@ def asked_standing(options: argparse.Namespace) -> Standing | None:
 
 
 def _curing_words(words: Sequence[str]) -> Curing:
-    """Return how mortar cures by its words."""
     try:
         return _find_curing(" ".join(words))
     except SceneError as error:
@@ -340,8 +339,6 @@ def asked_resources(options: argparse.Namespace, progress: Tell | None = None) -
 def parse_size(text: str) -> float:
     """Return a number of bytes from words as ``2GB``, ``500 MB`` or ``1.5GiB``.
 
-    Examples
-    --------
     >>> parse_size("1.5GB")
     1500000000.0
     """

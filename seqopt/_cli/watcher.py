@@ -26,8 +26,6 @@ class Watcher:
     far is shown. Nothing is shown unless standard error is a terminal or that of a notebook, nor in
     the first second.
 
-    Examples
-    --------
     >>> with Watcher() as tell:  # of a test standard error is no terminal
     ...     tell("looking")
     """

@@ -8,8 +8,7 @@ from importlib.util import find_spec
 import pandas as pd
 
 from seqopt._files import csv_text
-from seqopt._paper.agreement import TITLES, stated, verdict
-from seqopt._paper.items import ITEMS, Item
+from seqopt._paper.items import ITEMS, TITLES, Item, stated, verdict
 from seqopt._paper.rows import Ours, ours, tabulate
 from seqopt.study.published import SOURCE
 from seqopt.work.progress import Tell, with_progress

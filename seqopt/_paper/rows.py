@@ -31,8 +31,7 @@ from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study._barrel_vaults import BED, chain, fit, laws, vaults
-from seqopt.study._discrete_arches import STEPS, error, inner_nodes, moved
-from seqopt.study._yardstick import ROUNDING, VALUES
+from seqopt.study._yardstick import ROUNDING, STEPS, VALUES, error, inner_nodes, moved
 from seqopt.study.published import (
     EQUATIONS,
     STUDY_BED,

@@ -17,7 +17,6 @@ Where no robot has an arm there is no table:
 True
 """
 
-from seqopt.arms.reach import find_postures
-from seqopt.arms.table import PostureTable
+from seqopt.arms.reach import PostureTable, find_postures
 
 __all__ = ["PostureTable", "find_postures"]

@@ -12,11 +12,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from seqopt.arms._choice import choose
 from seqopt.arms._model import ArmModel
-from seqopt.arms._reached import Site
-from seqopt.arms.reach import find_postures
-from seqopt.arms.table import PostureTable
+from seqopt.arms._reached import Site, choose
+from seqopt.arms.reach import PostureTable, find_postures
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.scene.arm import Arm
 from seqopt.scene.scene import Scene

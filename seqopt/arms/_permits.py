@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+import pandas as pd
 
-from seqopt.arms._choice import choose
 from seqopt.arms._held import held_postures
-from seqopt.arms.reach import find_postures
-from seqopt.arms.table import PostureTable
+from seqopt.arms._reached import choose
+from seqopt.arms.reach import PostureTable, find_postures
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
+from seqopt.errors import SceneError
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 
@@ -29,19 +30,11 @@ class Permits(FrozenValue):
     """What the postures of a table allow in the build order of a scene.
 
     Robots are those of the scene; nodes are places in build order from 1, brick by brick, and 0 is
-    that of a robot that holds nothing, or has no arm.
-
-    Attributes
-    ----------
-    rows : (R, 2B + 1, K) int
-        The postures with which plans are made, as rows of the table, the best first; -1 for none.
-    ends : (P + 1,) float
-        By row, from which brick count on something stands that is hit in it; infinite for never,
-        and zero, as the last one, for no posture.
-    collide : (P + 1, P + 1) bool
-        Which rows are in each other's way; no posture is in no one's.
-    armed : tuple of int
-        The robots that have arms.
+    that of a robot that holds nothing, or has no arm. ``rows`` (R, 2B + 1, K): the postures with
+    which plans are made, as rows of the table, the best first; -1 for none. ``ends`` (P + 1,): by
+    row, from which brick count on something stands that is hit in it; infinite for never, and zero,
+    as the last one, for no posture. ``collide`` (P + 1, P + 1): which rows are in each other's way;
+    no posture is in no one's. ``armed``: the robots that have arms.
     """
 
     rows: Ints
@@ -170,3 +163,43 @@ def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
     until = found.until[scene.robots.index(robot)]
     place = {node: i for i, node in enumerate(_placed_nodes(scene), start=1)}
     return tuple(node for node in nodes if until[place[node]] > bricks)
+
+
+def reach_table(scene: Scene) -> pd.DataFrame:
+    """Return which robot reaches which node, with how many postures, and how long.
+
+    A row for every robot with an arm and every node, in build order: ``robot``, ``brick``,
+    ``node``; ``postures``, how many were found that touch neither ground, bases, the arm itself nor
+    the brick that it grips; ``from_bricks``, with how many bricks that of the node is placed;
+    ``to_bricks``, up to how many a posture hits none of them, zero if there is none; ``clear``, how
+    many of the kept postures hit no brick of the finished structure. Raises `SceneError` if no
+    robot has an arm.
+    """
+    table, allowed = find_table(scene), permits(scene)
+    assert allowed is not None
+    rows = []
+    for r, name in enumerate(table.robots):
+        own = next(i for i, robot in enumerate(scene.robots) if robot.name == name)
+        for place, node in enumerate(n for brick in scene.placed for n in brick.nodes):
+            mine = table.rows(name, node)
+            last = min(len(scene.bricks), allowed.until[own, place + 1] - 1)
+            rows.append(
+                {
+                    "robot": name,
+                    "brick": scene.brick_of_node[node].name,
+                    "node": node,
+                    "postures": int(table.found[r, table.nodes.index(node)]),
+                    "from_bricks": place // 2 + 1,
+                    "to_bricks": int(last) if last > place // 2 else 0,
+                    "clear": int((~table.hits[mine].any(axis=1)).sum()),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def find_table(scene: Scene) -> PostureTable:
+    """Return the posture table of a scene in which a robot has an arm."""
+    found = find_postures(scene)
+    if found is None:
+        raise SceneError(f"scene {scene.name}: no robot has an arm; give one in its scene file")
+    return found

@@ -1,16 +1,253 @@
-"""The posture table of a scene, computed once, or taken from a folder."""
+"""The posture table: which postures reach which node, and what they hit; kept in a folder.
+
+It depends on bricks, robots and the direction of gravity, and on no build order: a posture that
+hits a brick is usable as long as that brick does not stand.
+"""
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+import hashlib
+import io
+import re
+import zipfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
+from typing import Any
 
-from seqopt.arms._reached import Site
-from seqopt.arms._stored import stored_table
-from seqopt.arms.table import PostureTable, _compute_table, _with_compliance
-from seqopt.scene.arm import Arm
+import numpy as np
+import pandas as pd
+
+from seqopt._files import make_folder, read_bytes, write_bytes
+from seqopt.arms._collisions import collide_pairs
+from seqopt.arms._model import UP, ArmModel, model_path
+from seqopt.arms._reached import Reached, Site, beside_others, reached_alone
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.errors import SceneError
+from seqopt.scene.arm import MOST, Arm
 from seqopt.scene.scene import Scene
 from seqopt.work.progress import Tell
+
+_MOST_ROWS = 6000  # postures that are kept in all, where that leaves one for every node
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PostureTable(FrozenValue):
+    """The postures of all arms of a scene, one a row, those of a robot at a node side by side.
+
+    Attributes
+    ----------
+    robots : tuple of str
+        Names of the robots that have arms.
+    nodes : tuple of int
+    bricks : tuple of int
+        Names of the bricks, ascending.
+    robot, node : (P,) int
+        Whose posture it is, and at which node: places in ``robots`` and ``nodes``.
+    joints : (P, J) float
+        Joint by joint, rad or m; NaN for joints that an arm does not have.
+    axes : (P, 3, 3) float
+        Directions of the flange as columns; the third one is that from which the tool comes.
+    place : (P, 3) float
+        Where the flange is, m.
+    tools : (P,) float
+        How long the body of the tool is that may hit something, from the flange, m.
+    hits : (P, B) bool
+        Which bricks an arm hits in it: it is usable while none of these stands.
+    collide : (P, P) bool
+        Which pairs of postures, of different robots, are in each other's way.
+    compliance : (P, 6, 6) float
+        How a grip gives way in it by the joints of the arm, m/N and rad/(N m); NaN if not known.
+    found : (R, N) int
+        How many postures were found, of which at most `MOST` are kept.
+    """
+
+    robots: tuple[str, ...]
+    nodes: tuple[int, ...]
+    bricks: tuple[int, ...]
+    robot: Ints
+    node: Ints
+    joints: Floats
+    axes: Floats
+    place: Floats
+    tools: Floats
+    hits: Bools
+    collide: Bools
+    compliance: Floats
+    found: Ints
+
+    def rows(self, robot: str, node: int) -> Ints:
+        """Return the postures of a robot at a node."""
+        return self._rows.get((robot, node), np.zeros(0, dtype=np.int64))
+
+    def table(self) -> pd.DataFrame:
+        """Return every posture: joints, flange, and the bricks that the arm hits in it.
+
+        Result: a row for every posture: ``robot``, ``node``; ``joint_1`` and so on, rad or m;
+        ``flange_x`` and so on, where the flange is, m; ``toward_x`` and so on, where the tool
+        points; ``hits``, names of bricks with semicolons between.
+        """
+        columns: dict[str, object] = {
+            "robot": [self.robots[r] for r in self.robot],
+            "node": [self.nodes[n] for n in self.node],
+        }
+        columns |= {f"joint_{k}": joint for k, joint in enumerate(self.joints.T, start=1)}
+        columns |= {f"flange_{name}": self.place[:, i] for i, name in enumerate("xyz")}
+        columns |= {f"toward_{name}": self.axes[:, i, 2] for i, name in enumerate("xyz")}
+        names = np.array(self.bricks)
+        columns["hits"] = [";".join(map(str, names[hit].tolist())) for hit in self.hits]
+        return pd.DataFrame(columns)
+
+    @cached_property
+    def _rows(self) -> dict[tuple[str, int], Ints]:
+        keys = [(self.robots[r], self.nodes[n]) for r, n in zip(self.robot, self.node, strict=True)]
+        out: dict[tuple[str, int], list[int]] = {}
+        for row, key in enumerate(keys):
+            out.setdefault(key, []).append(row)
+        return {key: np.array(rows) for key, rows in out.items()}
+
+
+def _compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
+    """Return the posture table of a site, if its models can be read and bases stand clear."""
+    kept = max(1, min(MOST, _MOST_ROWS // max(1, len(site.robots) * len(site.nodes))))
+    alone = []
+    for number, robot in enumerate(site.robots):
+        tell(f"postures of {robot.name}")
+        try:
+            alone.append(reached_alone(site.alone(number), kept))
+        except SceneError as error:
+            why = str(error).removeprefix("robot alone: ").removeprefix("arm: ")
+            raise SceneError(f"robot {robot.name}: {why}") from error
+    reached = beside_others(site, alone)
+    tell("postures that are in each other's way")
+    robot_of = np.repeat(np.arange(len(reached)), [len(each.node) for each in reached])
+    node = np.concatenate([each.node for each in reached])
+    found = np.array([each.found for each in reached])
+    return PostureTable(
+        robots=tuple(robot.name for robot in site.robots),
+        nodes=site.nodes,
+        bricks=tuple(brick.name for brick in site.bricks),
+        robot=robot_of,
+        node=node,
+        joints=_padded([each.joints for each in reached]),
+        axes=np.concatenate([each.axes for each in reached]),
+        place=np.concatenate([each.place for each in reached]),
+        tools=np.concatenate([each.placed.tools for each in reached]),
+        hits=np.concatenate([each.hits for each in reached]),
+        collide=_collisions(site, reached, robot_of),
+        compliance=np.full((len(node), 6, 6), np.nan),
+        found=found,
+    )
+
+
+def _padded(joints: list[Floats]) -> Floats:
+    """Return the joints of several arms below each other, NaN where an arm has fewer."""
+    most = max(each.shape[1] for each in joints)
+    wide = [(0, 0), (0, 0)]
+    out = []
+    for each in joints:
+        wide[1] = (0, most - each.shape[1])
+        out.append(np.pad(each, wide, constant_values=np.nan))
+    return np.concatenate(out)
+
+
+def _collisions(site: Site, reached: list[Reached], robot: Ints) -> Bools:
+    """Return which pairs of postures of different robots collide, (P, P)."""
+    out = np.zeros((len(robot), len(robot)), dtype=bool)
+    for i, one in enumerate(reached):
+        for j, two in ((j, reached[j]) for j in range(i) if site.together(i, j)):
+            rows, columns = np.flatnonzero(robot == i), np.flatnonzero(robot == j)
+            grid = np.meshgrid(np.arange(len(rows)), np.arange(len(columns)), indexing="ij")
+            pairs = grid[0].ravel(), grid[1].ravel()
+            found = collide_pairs((one.model, two.model), one.placed, two.placed, pairs)
+            block = found.reshape(len(rows), len(columns))
+            out[np.ix_(rows, columns)] = block
+            out[np.ix_(columns, rows)] = block.T
+    return out
+
+
+def _with_compliance(table: PostureTable, arms: Sequence[tuple[str, Arm]]) -> PostureTable:
+    """Return a table with how grips give way by the joints of the arms, as far as it is known.
+
+    Raises `SceneError` if an arm does not give a stiffness for every joint.
+    """
+    found = table.compliance.copy()
+    for name, arm in arms:
+        if arm.joint_stiffness:
+            rows = np.flatnonzero(table.robot == table.robots.index(name))
+            try:
+                model = ArmModel(arm)
+            except SceneError as error:
+                raise SceneError(f"robot {name}: {str(error).removeprefix('arm: ')}") from error
+            for row in rows.tolist():
+                found[row] = model.grip_compliance(table.joints[row, : model.joints])
+    return replace(table, compliance=found)
+
+
+_VERSION = 1  # of what is computed: tables of another one are not taken
+_NAMES = ("robots", "nodes", "bricks")
+_MESH = re.compile(rb'filename="(?:package://|file://)?([^"]+)"')
+
+
+def _stored_table(folder: Path, site: Site, compute: Callable[[], PostureTable]) -> PostureTable:
+    """Return the table of a site from a folder, or compute it and keep it there."""
+    make_folder(folder)
+    path = folder / f"postures-{_key(site)}.npz"
+    if path.exists() and (found := _read(path)) is not None:
+        return found
+    table = compute()
+    write_bytes(path, _content(table))
+    return table
+
+
+def _key(site: Site) -> str:
+    """Return the content that postures depend on, condensed: robots, bricks, models, meshes."""
+    found = hashlib.sha256(repr((_VERSION, site.up, site.blocked)).encode())
+    for brick in site.bricks:
+        shape = None if brick.shape is None else brick.shape.vertices
+        own = (brick.name, brick.position, brick.length_axis, brick.width_axis, brick.dimensions)
+        found.update(repr((*own, brick.nodes, brick.node_offsets, shape)).encode())
+    for robot in site.robots:
+        arm = robot.arm
+        assert arm is not None
+        own = tuple(getattr(arm, each.name) for each in fields(arm) if each.name != "urdf")
+        found.update(repr((robot.name, robot.reach, own)).encode())
+        for content in _model(model_path(arm)):
+            found.update(hashlib.sha256(content).digest())
+    return found.hexdigest()[:32]
+
+
+def _model(path: Path) -> Iterator[bytes]:
+    """Yield the content of a URDF and of the meshes that it names, as far as they are found."""
+    text = read_bytes(path)
+    yield text
+    folders = [*path.resolve().parents][:UP]
+    for name in sorted({*_MESH.findall(text)}):
+        for each in folders:
+            mesh = each / name.decode("utf-8", "replace")
+            if mesh.is_file():
+                yield read_bytes(mesh)
+                break
+
+
+def _content(table: PostureTable) -> bytes:
+    """Return a table as the bytes of a NumPy archive."""
+    out = io.BytesIO()
+    arrays = {each.name: np.asarray(getattr(table, each.name)) for each in fields(table)}
+    np.savez_compressed(out, **arrays)  # type: ignore[arg-type]
+    return out.getvalue()
+
+
+def _read(path: Path) -> PostureTable | None:
+    """Return the table of a file; None if it is none, or damaged."""
+    try:
+        with np.load(io.BytesIO(read_bytes(path)), allow_pickle=False) as archive:
+            content: dict[str, Any] = {n.name: archive[n.name] for n in fields(PostureTable)}
+    except (KeyError, ValueError, OSError, EOFError, zipfile.BadZipFile):
+        return None
+    return PostureTable(**content | {name: tuple(content[name].tolist()) for name in _NAMES})
+
 
 _SITES = 16  # of which tables are kept, the last ones that were asked for
 
@@ -48,7 +285,7 @@ def find_postures(
     known = _known(site)
     compute = partial(_compute_table, site, progress or (lambda _: None))
     if cache is not None and Path(cache) not in known:
-        known[Path(cache)] = stored_table(Path(cache), site, lambda: known.get(None) or compute())
+        known[Path(cache)] = _stored_table(Path(cache), site, lambda: known.get(None) or compute())
         known.setdefault(None, known[Path(cache)])
     if None not in known:
         known[None] = compute()

@@ -13,7 +13,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.network.network import Network
-from seqopt.scene.holders._props import Prop
+from seqopt.scene._props import Prop
 
 
 class PropGrips(NamedTuple):

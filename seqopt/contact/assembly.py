@@ -12,7 +12,7 @@ from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frozen, skew
 from seqopt.errors import SceneError
 from seqopt.network._mechanics import spread
 from seqopt.network.network import GROUND
-from seqopt.scene._axes import frames, units
+from seqopt.scene._checks import frames, units
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

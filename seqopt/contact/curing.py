@@ -121,8 +121,6 @@ def _find_curing(given: Curing | str | Iterable[str]) -> Curing:
     from below at `SHARES`; ``5min=0.4,15min=1`` what is reached when; ``never``; before any of
     these the name of a joint and a colon, as ``5-6:30min``.
 
-    Examples
-    --------
     >>> _find_curing("never").share(1e9)
     0.0
     >>> _find_curing("5min=0.4,15min=1 1-2:1h").points_of("1-2")[-1]
@@ -148,7 +146,6 @@ def _find_curing(given: Curing | str | Iterable[str]) -> Curing:
 
 
 def _in_words(word: str, text: str) -> Points:
-    """Return points by the words of one law."""
     if text == "never":
         return ()
     if "=" not in text:

@@ -65,8 +65,6 @@ MORTARS = {"epoxy": EPOXY, "dry": DRY}
 def bond_mortar(strength: float, friction: float = _FRICTION) -> Mortar:
     """Return the mortar of a bond with the same strength in tension and in shear, Pa.
 
-    Examples
-    --------
     >>> bond_mortar(3e3, friction=0.5)
     Mortar(friction=0.5, tensile_strength=3000.0, cohesion=4500.0)
     """

@@ -56,7 +56,6 @@ class FrameEngine(SerialEngine):
 def _solve_one(
     network: Network, bricks: int, columns: Ints, hands: Hands | None, contrast: float
 ) -> Fields:
-    """Return the fields of one model."""
     edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
     split, deformation, stiffness = _frame(network, bricks, contrast)
     grips = _hold(network, columns, hands, deformation.shape[1])

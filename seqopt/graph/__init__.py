@@ -15,8 +15,8 @@ arrays that no path is better.
 Best(path=(2, 3), values=(2.5, 2.0))
 """
 
-from seqopt.graph._explore import Explorer, Space, Visited
+from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import Best, lexicographic
 
-__all__ = ["Best", "Explorer", "Graph", "Space", "Visited", "lexicographic"]
+__all__ = ["Best", "Explorer", "Graph", "Visited", "lexicographic"]

@@ -86,7 +86,6 @@ def _path(graph: Graph, moves: Ints | None) -> _Path | None:
 
 
 def _taken(graph: Graph, path: _Path) -> tuple[float, ...]:
-    """Return what every column takes of a path."""
     worst, total = path.amounts.max(axis=0, initial=0.0), path.amounts.sum(axis=0)
     return tuple(np.where(graph.peaks, worst, total).tolist())
 

@@ -113,7 +113,7 @@ class Moves(NamedTuple):
     taken: Floats
 
 
-class Space(Protocol):
+class _Space(Protocol):
     """States and moves that an `Explorer` visits.
 
     States stand in parts, rows of integers (n, c), and parts on levels; moves stay within a part or
@@ -133,104 +133,33 @@ class Space(Protocol):
         """By goal, whether the largest amount on a path counts."""
 
     def start(self) -> tuple[Key, Ints]:
-        """Return the first part and its only state.
-
-        Returns
-        -------
-        part : hashable
-        states : (1, c) int
-        """
+        """Return the first part and its only state (1, c)."""
 
     def codes(self, part: Key, states: Ints) -> Ints:
-        """Return a number for every state that no other one of its part has.
-
-        Parameters
-        ----------
-        part : hashable
-        states : (n, c) int
-
-        Returns
-        -------
-        (n,) int
-        """
+        """Return a number (n,) for every state (n, c) that no other one of its part has."""
 
     def within(self, part: Key, states: Ints) -> Moves:
-        """Return the moves that stay within the part.
-
-        Parameters
-        ----------
-        part : hashable
-        states : (n, c) int
-
-        Returns
-        -------
-        Moves
-        """
+        """Return the moves of states (n, c) that stay within their part."""
 
     def onward(self, part: Key, states: Ints) -> Iterator[tuple[Key, Moves]]:
-        """Yield the moves that lead to the next level, by part.
-
-        Parameters
-        ----------
-        part : hashable
-        states : (n, c) int
-
-        Yields
-        ------
-        part : hashable
-        moves : Moves
-        """
+        """Yield the moves of states (n, c) that lead to the next level, by part."""
 
     @property
     def floors(self) -> bool:
         """Whether values above those that count may be less than they are."""
 
     def values(self, part: Key, states: Ints, *, rough: bool, most: float) -> tuple[Floats, Bools]:
-        """Return what goals take of states, and which of them are allowed.
+        """Return what goals take of states (n, c), (n, g), and which of them are allowed (n,).
 
-        Parameters
-        ----------
-        part : hashable
-        states : (n, c) int
-        rough : bool
-            Whether six digits are enough.
-        most : float
-            Where there are floors: a state of which the first goal takes more need not have values
-            that are larger than this.
-
-        Returns
-        -------
-        values : (n, g) float
-        allowed : (n,) bool
+        ``rough``: whether six digits are enough. ``most``: where there are floors, a state of which
+        the first goal takes more need not have values that are larger than this.
         """
 
     def amounts(self, values: Floats, taken: Floats) -> Floats:
-        """Return what goals take of moves.
-
-        Parameters
-        ----------
-        values : (m, g) float
-            What they take of the states that the moves lead to.
-        taken : (m, k) float
-            As of `Moves`.
-
-        Returns
-        -------
-        (m, g) float
-        """
+        """Return what goals take of moves (m, g): of the states they lead to, and as of `Moves`."""
 
     def ended(self, part: Key, states: Ints) -> Bools:
-        """Return in which states of the last level a build may end.
-
-        Parameters
-        ----------
-        part : hashable
-        states : (n, c) int
-
-        Returns
-        -------
-        (n,) bool
-        """
+        """Return in which states (n, c) of the last level a build may end, (n,)."""
 
 
 class Explorer:
@@ -238,7 +167,7 @@ class Explorer:
 
     Parameters
     ----------
-    space : Space
+    space : _Space
     width : int, optional
         From how many new states of a level, those of least value, the search goes on, within parts
         only by moves that take nothing; from all by default.
@@ -263,7 +192,7 @@ class Explorer:
 
     def __init__(
         self,
-        space: Space,
+        space: _Space,
         width: int | None = None,
         tell: Callable[[Explorer], object] = lambda _: None,
         enough: float = -np.inf,

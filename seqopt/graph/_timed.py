@@ -59,32 +59,14 @@ class CuringStates(FrozenValue):
 class TimedGraph(FrozenValue):
     """States, moves and acts of a build in time.
 
-    Attributes
-    ----------
-    graph : Graph
-        The states and moves; sums and peaks as they are.
-    levels : (n,) int
-        Of states: no move leads to a lower one.
-    free : (n, c) bool
-        Of which columns the robots are free.
-    alike : (n, c - 1) bool
-        Which columns could change places with the next one.
-    kinds : (c,) int
-        The kind of the robot of every column.
-    move, column : (a,) int
-        Of acts: the move, and the column of the state before whose robot takes a grip; -1 where
-        robots let go.
-    origin : (a, c) int
-        From which column of the state before the one after has its readiness; or `HELD`, `NOW`.
-    prepares, acts : (m,) float
-        How long moves take to be prepared, and to be done, s.
-    work : (m, 1 + k) float
-        How long moves take of the time of all, and of the robots of every kind, s: preparing,
-        acting, and holding while others act.
-    longest : (c,) float
-        How long robots of columns take at most to be prepared, s.
-    curing : CuringStates or None
-        What mortar that cures asks for; None where none does.
+    Of states: ``levels`` (n,), of which no move leads to a lower one; ``free`` (n, c), of which
+    columns the robots are; ``alike`` (n, c - 1), which columns could change places with the next
+    one. ``kinds`` (c,): of the robot of every column; ``longest`` (c,): how long they take at most
+    to be prepared, s. Of acts (a,): ``move``; ``column`` of the state before whose robot takes a
+    grip, -1 where robots let go; ``origin`` (a, c): from which column of the state before the one
+    after has its readiness, or `HELD`, `NOW`. Of moves: ``prepares``, ``acts`` (m,), s; ``work``
+    (m, 1 + k): how long they take of the time of all, and of the robots of every kind, s:
+    preparing, acting, and holding while others act. ``curing``: what mortar that cures asks for.
     """
 
     graph: Graph

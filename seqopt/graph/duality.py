@@ -14,7 +14,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import distances, least_or_none, reached, tied
+from seqopt.graph.paths import _least_or_none, distances, reached, tied
 
 ROUNDING = 1e-12  # by how much sums may be off, over the largest potential
 
@@ -35,7 +35,7 @@ def lexicographic_bounds(graph: Graph, values: Sequence[float]) -> tuple[float, 
 def cut(graph: Graph, goal: int, value: float) -> tuple[float, Bools]:
     """Return the bound of a worst amount, and the moves that take no more than a value."""
     amounts = graph.amounts[:, goal]
-    least = least_or_none(graph, goal)
+    least = _least_or_none(graph, goal)
     inside = reached(graph, amounts < (np.inf if least is None else least))
     leaving = inside[graph.source] & ~inside[graph.target]
     bound = float(amounts[leaving].min(initial=np.inf))

@@ -83,10 +83,7 @@ class AllOrders(Shown):
         return {name: frozenset(others) for name, others in out.items()}
 
     def next_bricks(self, placed: frozenset[int]) -> tuple[int, ...]:
-        """Return the bricks that may be placed next.
-
-        ``placed``: names of those that stand.
-        """
+        """Return the bricks that may be placed next; ``placed``: names of those that stand."""
         left = [name for name in self.scene.build_order if name not in placed]
         if self.among is Orders.ANY:
             return tuple(left)
@@ -97,10 +94,7 @@ class AllOrders(Shown):
         return any(g.closes_with is None or g.closes_with in {*placed, brick} for g in grounds)
 
     def allows(self, order: Sequence[int]) -> bool:
-        """Return whether an order is one of those among which the best is sought.
-
-        ``order``: names of all bricks.
-        """
+        """Return whether an order of all bricks' names is one of those that are sought in."""
         first = len(self.stands)
         pairs = [*enumerate(order)][first:]
         follow = all(b in self.next_bricks(frozenset(order[:k])) for k, b in pairs)
@@ -312,7 +306,6 @@ class OrderStates:
 
     @cached_property
     def _asked(self) -> States:
-        """What counts: the first goal, or all."""
         states = self.problem.states
         return states if self._all_count else replace(states, goals=states.goals[:1])
 
@@ -381,10 +374,7 @@ class Trial:
 
 
 def order_value(problem: AllOrders, trial: Trial) -> float:
-    """Return the first goal of the best plan of an order.
-
-    Result: infinite where no plan of it stays below the ceiling.
-    """
+    """Return the first goal of the best plan of an order; infinite if none is below the ceiling."""
     judged, ceiling, found = problem.judging(trial.order), trial.ceiling, np.inf
     for width in (NARROW, None):
         visited = explore(judged, ceiling, width)

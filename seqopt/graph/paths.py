@@ -1,14 +1,23 @@
-"""Best paths through a graph, for one goal after the other, by scipy.sparse.csgraph."""
+"""Best paths of a graph, goal after goal, by scipy.sparse.csgraph; the best move of every state.
+
+Where it is dear to ask whether a state passes, only states on a path are asked, that on which the
+fewest are not known (Dellin and Srinivasa, A unifying formalism for shortest path problems with
+expensive edge evaluations, 2016). Where a part of the graph turned paths down before, it is asked
+first, and more of it each time: what is left without a path there is a cut.
+"""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Callable
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse.csgraph import breadth_first_order, dijkstra
 
-from seqopt.arrays import Bools, Floats
-from seqopt.errors import InfeasibleError
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.graph import Graph
 
 TIED = 1e-9  # of the least: by how much a path may exceed it and still be one of the best
@@ -74,13 +83,13 @@ def tied(value: float) -> float:
 
 def least_peak(graph: Graph, goal: int) -> float:
     """Return the least worst amount of any path; an `InfeasibleError` says that there is none."""
-    least = least_or_none(graph, goal)
+    least = _least_or_none(graph, goal)
     if least is None:
         raise InfeasibleError("no path leads to an end")
     return least
 
 
-def least_or_none(graph: Graph, goal: int) -> float | None:
+def _least_or_none(graph: Graph, goal: int) -> float | None:
     """Return the least worst amount of any path, by bisection over all amounts that occur."""
     amounts = graph.amounts[:, goal]
     levels = np.unique(amounts)
@@ -127,3 +136,211 @@ def fewest_moves(graph: Graph) -> tuple[int, ...]:
         state = int(tight.target[np.searchsorted(tight.source, state)])
         path.append(state)
     return tuple(path)
+
+
+class _ToGo(NamedTuple):
+    """What is left from every state.
+
+    ``values`` (n, g): the least that every goal takes, one goal after the other; infinite where no
+    end is reached; ``move`` (n,): the number of the best move; -1 where none leads on.
+    """
+
+    values: Floats
+    move: Ints
+
+
+def _to_go(graph: Graph) -> _ToGo:
+    """Return what is left from every state, best in the first goal, among these in the second, ...
+
+    Totals are followed by at most one worst amount, and this by totals; else a `ProblemError` says
+    so. Of equal moves that is taken from which the fewest follow.
+    """
+    peaks = [k for k, peak in enumerate(graph.peaks) if peak]
+    if len(peaks) > 1:
+        raise ProblemError("a policy has one aim that is a worst step; make the others totals")
+    values = np.full((graph.states, len(graph.peaks)), np.inf)
+    first = peaks[0] if peaks else len(graph.peaks)
+    kept = np.ones(len(graph.source), dtype=bool)
+    if first or not peaks:
+        least = _Sums(graph, [*range(first)])
+        least.add(np.flatnonzero(kept))
+        values[:, :first] = least.totals[:, :-1]
+        kept = least.tight()
+        if not peaks:
+            return _ToGo(values, least.best(np.arange(graph.states)))
+    worst = _worst_to_go(graph, first, kept)
+    values[:, first] = worst
+    move = np.full(graph.states, -1, dtype=np.int64)
+    amounts, rest = graph.amounts[:, first], _Sums(graph, [*range(first + 1, len(graph.peaks))])
+    moves = np.flatnonzero(kept & np.isfinite(worst[graph.source]))
+    moves = moves[np.argsort(amounts[moves], kind="stable")]
+    states, done = np.argsort(worst, kind="stable"), 0
+    ordered = worst[states]  # dead ends are infinite: no differences are taken
+    cuts = [0, *(np.flatnonzero(ordered[1:] != ordered[:-1]) + 1).tolist(), graph.states]
+    for start, end in pairwise(cuts):
+        group = states[start:end]
+        if not np.isfinite(level := max(0.0, worst[group[0]])):
+            break
+        upto = int(np.searchsorted(amounts[moves], tied(level), side="right"))
+        rest.add(moves[done:upto])
+        done = upto
+        values[group, first + 1 :] = rest.totals[group, :-1]
+        move[group] = rest.best(group)
+    return _ToGo(np.where(values == -np.inf, 0.0, values), move)
+
+
+def _worst_to_go(graph: Graph, goal: int, kept: Bools) -> Floats:
+    """Return the least worst amount on the way from every state, by some of the moves, (n,)."""
+    source, target = graph.source[kept], graph.target[kept]
+    amounts = graph.amounts[kept, goal]
+    out = np.where(graph.ends, -np.inf, np.inf)
+    while True:
+        new = out.copy()
+        np.minimum.at(new, source, np.maximum(amounts, out[target]))
+        if (new == out).all():
+            return out
+        out = new
+
+
+class _Sums:
+    """The least totals from states to an end by the moves that were added so far.
+
+    ``totals`` (n, k + 1): of goals, and last how many moves.
+    """
+
+    def __init__(self, graph: Graph, goals: list[int]) -> None:
+        self._graph = graph
+        ones = np.ones((len(graph.source), 1))
+        self._costs = np.column_stack([graph.amounts[:, goals], ones])
+        self.totals = np.full((graph.states, len(goals) + 1), np.inf)
+        self.totals[graph.ends] = 0.0
+        self._used = np.zeros(len(graph.source), dtype=bool)
+        self._by_target = np.argsort(graph.target, kind="stable")
+        counts = np.bincount(graph.target, minlength=graph.states)
+        self._starts = np.concatenate([[0], np.cumsum(counts)])
+
+    def add(self, moves: Ints) -> None:
+        """Let moves (m,) be used too."""
+        self._used[moves] = True
+        while len(moves):
+            moves = self._into(self._relaxed(moves))
+
+    def _relaxed(self, moves: Ints) -> Ints:
+        """Return the states from which some moves lead on with less than was known."""
+        source = self._graph.source[moves]
+        found = self._costs[moves] + self.totals[self._graph.target[moves]]
+        order = np.lexsort((*found.T[::-1], source))
+        first = np.ones(len(order), dtype=bool)
+        first[1:] = source[order][1:] != source[order][:-1]
+        states, least = source[order][first], found[order][first]
+        less = _less(least, self.totals[states])
+        self.totals[states[less]] = least[less]
+        return np.asarray(states[less])
+
+    def _into(self, states: Ints) -> Ints:
+        """Return the moves that are used and lead to some states."""
+        counts = self._starts[states + 1] - self._starts[states]
+        first = np.repeat(self._starts[states] - np.cumsum(counts) + counts, counts)
+        moves = self._by_target[first + np.arange(counts.sum())]
+        return np.asarray(moves[self._used[moves]])
+
+    def tight(self) -> Bools:
+        """Return which moves are on best ways, the count of moves aside, (m,)."""
+        found = self._costs + self.totals[self._graph.target]
+        own = self.totals[self._graph.source]
+        near = found[:, :-1] <= own[:, :-1] + 1e-9 * np.abs(own[:, :-1])
+        return np.asarray(near.all(axis=1) & np.isfinite(own[:, -1]))
+
+    def best(self, states: Ints) -> Ints:
+        """Return the best move from every one of some states; -1 where there is none, (n,)."""
+        source, out = self._graph.source, np.full(len(states), -1, dtype=np.int64)
+        ends = np.searchsorted(source, states, side="right")
+        counts = ends - np.searchsorted(source, states)
+        moves = np.repeat(ends - np.cumsum(counts), counts) + np.arange(counts.sum())
+        row = np.repeat(np.arange(len(states)), counts)
+        found = self._costs[moves] + self.totals[self._graph.target[moves]]
+        able = self._used[moves] & np.isfinite(found[:, -1])
+        moves, row, found = moves[able], row[able], found[able]
+        order = np.lexsort((*found.T[::-1], row))[::-1]
+        out[row[order]] = moves[order]  # the least is written last
+        out[self._graph.ends[states]] = -1
+        return out
+
+
+def _less(values: Floats, others: Floats) -> Bools:
+    """Return which rows come before others, the first column counting most."""
+    out = np.zeros(len(values), dtype=bool)
+    open_ = np.ones(len(values), dtype=bool)
+    for value, other in zip(values.T, others.T, strict=True):
+        slack = 1e-12 * np.where(np.isfinite(other), np.abs(other), 0.0)
+        out |= open_ & (value < other - slack)
+        open_ &= (value <= other + slack) & (value >= other - slack)
+    return out
+
+
+PASSES, FAILS = 1, -1
+OPEN = 2.0  # moves that a path may be longer for a state less to be asked
+MOST = 64  # states of a part that are asked at once
+Ask = Callable[[int, Ints], Ints]
+"""Returns of states (n,) of a part, given by its number, which pass: 1, -1, or 0: not known."""
+
+
+def _lazy_path(
+    graph: Graph,
+    parts: Ints,
+    known: Ints,
+    ask: Ask,
+    recall: Ask,
+    tell: Callable[[], object] = lambda: None,
+) -> tuple[int, ...] | None:
+    """Return a path of states that pass, the start left out; None if there is none.
+
+    ``parts`` (n,): of every state, from 0; those of one are asked together; ``known`` (n,): 1 where
+    a state passes, -1 where it does not, else 0; what is found is added; ``ask``: says which do,
+    and what it does not know does not; ``recall``: what can be said without asking; ``tell``:
+    called before every path.
+    """
+    failed = Counter[int]()
+    while True:
+        tell()
+        path, after = _fewest_open(graph, known)
+        open_ = path[known[path] == 0]
+        if not len(path):
+            return None
+        if not len(open_):
+            return tuple(path.tolist())
+        for part in sorted(set(parts[open_].tolist()), key=lambda p: (-failed[p], p)):
+            if not _all_pass(part, open_[parts[open_] == part], known, ask):
+                failed[part] += 1
+                others = np.flatnonzero((parts == part) & (known == 0))
+                known[others] = recall(part, others)
+                others = others[(known[others] == 0) & np.isfinite(after[others])]
+                others = others[np.argsort(after[others], kind="stable")]
+                _all_pass(part, others[: min(2 ** failed[part], MOST) // 2], known, ask)
+                break
+
+
+def _all_pass(part: int, rows: Ints, known: Ints, ask: Ask) -> bool:
+    """Ask states of a part, and say whether all pass."""
+    if len(rows):
+        known[rows] = np.where(ask(part, rows) == PASSES, PASSES, FAILS)
+    return bool((known[rows] == PASSES).all())
+
+
+def _fewest_open(graph: Graph, known: Ints) -> tuple[Ints, Floats]:
+    """Return the path on which the fewest states are open, of these one of the fewest moves.
+
+    A state that is open counts as much as `OPEN` moves. Empty if there is none. Beside it, what is
+    left from every state to an end, (n,).
+    """
+    part = graph.only((known[graph.target] != FAILS) & (known[graph.source] != FAILS))
+    costs = np.where(known[part.target] == PASSES, 1.0, 1.0 + OPEN)
+    after = distances(part, costs, back=True)
+    if not np.isfinite(after[0]):
+        return np.zeros(0, dtype=np.int64), after
+    tight = after[part.target] + costs == after[part.source]  # whole numbers
+    part, state, path = part.only(tight), 0, list[int]()
+    while not graph.ends[state]:
+        state = int(part.target[np.searchsorted(part.source, state)])
+        path.append(state)
+    return np.array(path, dtype=np.int64), after

@@ -17,8 +17,13 @@ from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError
-from seqopt.graph.layers._arcs import array_by_array, least_path, least_to_go
-from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.costs import (
+    Budget,
+    LayeredCosts,
+    _array_by_array,
+    _least_path,
+    _least_to_go,
+)
 from seqopt.graph.layers.layers import Layers
 from seqopt.problem.problem import Aim, RobustAim
 from seqopt.problem.requirements import ResponsesAsked
@@ -175,10 +180,7 @@ class ScenarioArcs(FrozenValue):
         return len(self.arcs[0])
 
     def totals(self, choice: Sequence[int]) -> Floats:
-        """Return the total of a choice in every scenario.
-
-        ``choice``: an allowed candidate for every move. Result (S,).
-        """
+        """Return the total (S,) of an allowed choice in every scenario."""
         before = (0, *choice[:-1])
         parts = [arc[:, i, j] for arc, i, j in zip(self.arcs, before, choice, strict=True)]
         return np.asarray(np.sum(parts, axis=0))
@@ -194,15 +196,12 @@ class ScenarioArcs(FrozenValue):
             np.where(shut, np.inf, np.tensordot(weights, arc, 1))
             for arc, shut in zip(self.arcs, self.shut, strict=True)
         ]
-        return costs, least_to_go(costs)
+        return costs, _least_to_go(costs)
 
     def cheapest(self, weights: Floats) -> tuple[Choice, float]:
-        """Return the choice of least weighted total, and that total.
-
-        ``weights`` (S,). Result (tuple of int, float).
-        """
+        """Return the choice of least total by weights (S,), and that total."""
         costs, rest = self.to_go(weights)
-        return least_path(costs, rest), float(rest[0][0])
+        return _least_path(costs, rest), float(rest[0][0])
 
     def improved(self, choice: Choice) -> tuple[Choice, float]:
         """Return what a choice becomes by changing the one move that helps most, again and again.
@@ -233,10 +232,7 @@ class ScenarioArcs(FrozenValue):
 
 
 def scenario_arcs(layers: Sequence[LayeredCosts], aim: RobustAim) -> ScenarioArcs:
-    """Return the costs of pairs in all scenarios.
-
-    ``layers``: one for every scenario, of the same moves.
-    """
+    """Return the costs of pairs in all scenarios, of the same moves in each."""
     arcs, shut = [], []
     for k in range(len(layers[0].single)):
         both = np.stack([each.single[k] + each.shared[k] for each in layers])
@@ -339,10 +335,7 @@ class ScenarioLayers(Shown):
         return self._kept(replace(self, aim=aim))
 
     def first(self, count: int) -> ScenarioLayers:
-        """Return the problem of the first scenarios alone; costs that are known stay known.
-
-        ``count``: how many, from 1.
-        """
+        """Return the problem of the first scenarios alone; what is known of costs stays known."""
         return self._kept(replace(self, scenes=self.scenes[: max(count, 1)]))
 
     def _kept(self, other: ScenarioLayers) -> ScenarioLayers:
@@ -360,17 +353,11 @@ class ScenarioLayers(Shown):
         return np.array([aim.value_of(costs, choice) for costs in self.layered(aim)])
 
     def layered(self, aim: Aim) -> tuple[LayeredCosts, ...]:
-        """Return the costs that an aim is about, scenario by scenario.
-
-        ``aim``: sums or peaks.
-        """
+        """Return the costs whose sums or peaks an aim is about, scenario by scenario."""
         return tuple(map(aim.costs, self.costs))
 
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
-        """Return the checked steps of the build; see `Layers.steps`.
-
-        ``choice``: a candidate for every move.
-        """
+        """Return the checked steps of the build; see `Layers.steps`."""
         return self.nominal.steps(choice)
 
 
@@ -395,7 +382,7 @@ def largest_of(layers: Sequence[LayeredCosts]) -> LayeredCosts:
 
     ``layers``: of the same moves. Raises `InfeasibleError` if no choice is allowed in all of them.
     """
-    out = array_by_array(_largest, *layers)
+    out = _array_by_array(_largest, *layers)
     try:
         out.continuable()
     except InfeasibleError as error:

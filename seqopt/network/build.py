@@ -11,7 +11,7 @@ import numpy as np
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network, PartKind, Springs
-from seqopt.scene._axes import frames
+from seqopt.scene._checks import frames
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene, in_order
 
@@ -91,7 +91,6 @@ def build_network(scene: Scene, order: Sequence[int] | str | None = None) -> Net
 
 
 def _of_bricks(scene: Scene) -> tuple[list[_Node], list[_Edge]]:
-    """Return the inner nodes and edges."""
     nodes, edges = [], []
     for i, brick in enumerate(scene.placed):
         for number in brick.nodes:
@@ -115,7 +114,6 @@ def _since(spring: Joint | Ground, index_of: dict[int, int]) -> int:
 
 
 def _joint_names(springs: _Springs) -> list[tuple[object, ...]]:
-    """Return a name for the joint node of every spring."""
     names: list[tuple[object, ...]] = []
     alike = Counter[tuple[object, ...]]()
     for spring, _ in springs:

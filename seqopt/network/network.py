@@ -17,7 +17,7 @@ import numpy as np
 from seqopt._showing import Shown, display
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError
-from seqopt.scene._axes import units
+from seqopt.scene._checks import units
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
 

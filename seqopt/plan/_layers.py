@@ -27,8 +27,7 @@ from seqopt.plan.calling.formulation import (
 from seqopt.plan.judge._posture_rules import check_postures
 from seqopt.plan.judge.certificate import _require_anew, certify_partial, judge
 from seqopt.plan.plan import Plan
-from seqopt.plan.search._pair_search import search_pairs
-from seqopt.plan.search._window_search import search_windows
+from seqopt.plan.search._window_search import search_pairs, search_windows
 from seqopt.problem.criteria import Among
 from seqopt.problem.problem import Aim, AskedBudget
 from seqopt.sequence.steps import Step

@@ -108,19 +108,10 @@ class FoundOrder:
 class KeptPostures(Terse):
     """The postures of a plan, and what is known of plans with others.
 
-    Attributes
-    ----------
-    postures : PlanPostures
-        By step, and the steps that arms cannot be in.
-    asked, most : int
-        How many postures at each node were looked at, and with how many the plan was made.
-    floor : dict of str to float
-        What no plan stays below with any of those that were looked at, by goal; empty where that
-        is not known, as without proof.
-    bounds : tuple of float
-        The same in the units of goals.
-    best : bool
-        Whether it is proven that none is better.
+    ``asked``, ``most``: how many postures at each node were looked at, and with how many the plan
+    was made. ``floor``: what no plan stays below with any of those that were looked at, by goal;
+    empty where that is not known, as without proof. ``bounds``: the same in the units of goals.
+    ``best``: whether it is proven that none is better.
     """
 
     postures: PlanPostures

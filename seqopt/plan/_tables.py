@@ -93,11 +93,7 @@ def moves_table(problem: Layers, choice: Sequence[int], grips: pd.DataFrame) -> 
 
 
 def choice_table(problem: Layers, choices: StepChoices) -> pd.DataFrame:
-    """Return raw responses and cost of every choice in a step.
-
-    ``choices``: one of ``problem.evaluation.steps``. Result: a row per choice, labeled by its
-    nodes; SI units.
-    """
+    """Return responses and cost of every choice of a step, by its nodes, SI units."""
     axes = next(iter(choices.responses.values())).ndim
     moves = [problem.schedule.moves[m] for m in choices.moves[-axes:]]
     names = [f"{move.robot}_node" for move in moves]

@@ -56,10 +56,7 @@ class Trial(Terse):
         return self.layers.scenes
 
     def summary(self) -> dict[str, dict[str, float]]:
-        """Return what the aim makes of every set of scenarios, ready for JSON.
-
-        Result: by set and plan; infinite numbers are left to the caller.
-        """
+        """Return what the aim makes of every set of scenarios, by plan; some may be infinite."""
         aim = self.layers.aim
         column = "peak" if aim.aim is Aim.PEAK else "total"
         return {
@@ -95,10 +92,7 @@ def judge_unseen(plan: Plan, scenes: ScenarioLayers | Scenarios | Sequence[Scene
 
 
 def worst_values(plan: Plan, unseen: Scenarios) -> dict[str, float]:
-    """Return the worst values of a plan of states in scenarios that it was not chosen by.
-
-    Result: by goal; margins are left out.
-    """
+    """Return the worst values of a plan, margins aside, in scenarios it was not chosen by."""
     graph = plan.states
     goals = tuple(goal for goal in graph.goals if not goal.of_margins)
     if not goals:

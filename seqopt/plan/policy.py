@@ -18,7 +18,7 @@ from seqopt._files import read_bytes, write_bytes
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import FileError, ProblemError, StepError
 from seqopt.graph._explore import Visited
-from seqopt.graph._to_go import to_go
+from seqopt.graph.paths import _to_go
 from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import States
 from seqopt.plan.judge._policy import check_policy
@@ -34,20 +34,10 @@ FILE = "policy.npz"
 class Advice(NamedTuple):
     """The best next move from a state.
 
-    Attributes
-    ----------
-    kind : StepKind or None
-        What it does; None where the build has ended.
-    robots : tuple of str
-        Who moves; several where all let go at once.
-    nodes : tuple of int
-        The nodes that they take or let go.
-    site : Site
-        Where the build stands then.
-    values : mapping of str to float
-        The least that every goal takes of the rest of the build, this move included.
-    brick : int
-        The brick that is placed, or removed; zero where none is.
+    ``kind``: what it does; None where the build has ended. ``robots``, ``nodes``: who moves,
+    several where all let go at once, and what they take or let go. ``site``: where the build stands
+    then. ``values``: the least that every goal takes of the rest of the build, this move included.
+    ``brick``: the brick that is placed, or removed; zero where none is.
     """
 
     kind: StepKind | None
@@ -134,7 +124,6 @@ class Policy(FrozenValue):
         return self._move(site, row, after, values)
 
     def _move(self, site: Site, row: int, after: int, values: Mapping[str, float]) -> Advice:
-        """Return the move from a site to the state of a row."""
         grips = list(site.grips or (None,) * len(self.robots))
         stays = list(site.stays or (None,) * len(self.robots))
         moved: list[tuple[int, int]] = []
@@ -195,7 +184,6 @@ class Policy(FrozenValue):
         return bool((self.held < 0).any())
 
     def _row_of(self, site: Site) -> int:
-        """Return the row of a site."""
         grips = site.grips or (None,) * len(self.robots)
         stays = site.stays or (None,) * len(self.robots)
         key = [site.bricks]
@@ -260,28 +248,11 @@ def find_policy(
 ) -> Policy:
     """Return what is best from every state that the builds of a free schedule reach.
 
-    Parameters
-    ----------
-    problem : Problem
-        Of rules; its aims have at most one worst step, which totals may precede and follow.
-    tell : callable, optional
-        Told what is being done.
-    proof : bool, optional
-        Whether a second version of the rules and responses computed anew check every move.
+    The aims of ``problem`` have at most one worst step, which totals may precede and follow. With
+    ``proof`` a second version of the rules and responses computed anew check every move. Raises
+    `ProblemError` if aims are margins or totals over scenarios, or there are budgets; `SolverError`
+    if the check finds a move that leads to less than the table says.
 
-    Returns
-    -------
-    Policy
-
-    Raises
-    ------
-    ProblemError
-        If aims are margins or totals over scenarios, or there are budgets.
-    SolverError
-        If the check finds a move that leads to less than the table says.
-
-    Examples
-    --------
     >>> import seqopt
     >>> from seqopt.plan.policy import find_policy
     >>> scene = seqopt.load_scene("wall:columns=2,courses=2")
@@ -322,9 +293,8 @@ def _states_with_policy(problem: Problem) -> States:
 
 
 def _of_graph(states: States, visited: Visited) -> Policy:
-    """Return the policy of all states of a graph."""
     graph, space = visited.graph, states.space
-    left = to_go(graph)
+    left = _to_go(graph)
     after = np.where(left.move < 0, -1, graph.target[left.move])
     bricks = [np.full(len(rows), space.bricks_at(level)) for level, _, rows in visited.states]
     return Policy(

@@ -1,4 +1,10 @@
-"""Solve a problem by any formulation; the answer is checked and becomes a plan."""
+"""Solve a problem by any formulation; the answer is checked and becomes a plan.
+
+A graph of choices asks of every state whether there are postures of arms that go together, and does
+not remember them. So those of its plan are searched afterwards: if there are some that are kept
+while robots hold, no plan is better. If not, plans are made with fewer postures at each node, down
+to one, with which every plan keeps them.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +15,17 @@ from typing import Any
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
+from seqopt.engines.registry import recipe_of
 from seqopt.errors import ProblemError
 from seqopt.graph.instances.instance import Instance
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.orders import AllOrders
-from seqopt.graph.scenarios import ScenarioLayers, in_scenarios
+from seqopt.graph.scenarios import ScenarioLayers, engine_for, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
-from seqopt.plan._bare._instances import solve_instance
-from seqopt.plan._kept import with_postures
 from seqopt.plan._layers import solve_layers, with_budgets
-from seqopt.plan._states import solve_orders, solve_states
+from seqopt.plan._states import solve_instance, solve_orders, solve_states
+from seqopt.plan._status import KeptPostures
 from seqopt.plan.calling.formulation import Formulation, On, Run, as_formulation
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import (
@@ -38,10 +44,93 @@ from seqopt.problem.standing import Standing
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
+from seqopt.sequence._postures import PlanPostures, plan_postures
 from seqopt.sequence._rule_space import FreeSpace
 from seqopt.sequence._schedule_space import ScheduleSpace
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
+
+_FEWER = (4, 2, 1)  # postures at each node, where plans with more of them do not keep theirs
+_SAME = 1e-9  # over the size of a value
+
+
+def _with_postures(problem: Problem, plan: Plan, solved: Callable[[Problem], Plan]) -> Plan:
+    """Return a plan with its postures, or one that keeps them, where robots have arms."""
+    scene = problem.scene
+    if not scene.has_arms:
+        return plan
+    first = _found(plan)
+    most = max(robot.arm.choices for robot in scene.robots if robot.arm is not None)
+    floor, bounds = _floor(plan)
+    if not first.unreached or recipe_of(problem.engine) is None:
+        proven = bool(floor) and not first.unreached
+        return replace(plan, arms=KeptPostures(first, most, most, floor, bounds, proven))
+    for fewer in (count for count in _FEWER if count < most):
+        try:
+            other = solved(_narrowed(problem, plan, fewer))
+        except ProblemError:
+            continue
+        found = _found(other)
+        if not found.unreached:
+            best = bool(floor) and _no_worse(other, floor)
+            return replace(other, arms=KeptPostures(found, most, fewer, floor, bounds, best))
+    return replace(plan, arms=KeptPostures(first, most, most, floor, bounds, best=False))
+
+
+def _found(plan: Plan) -> PlanPostures:
+    found = plan_postures(plan.engine.network.scene, plan.steps)
+    assert found is not None
+    return found
+
+
+def _floor(plan: Plan) -> tuple[dict[str, float], tuple[float, ...]]:
+    """Return what no plan stays below, where that is proven, as people read it and as it is."""
+    proof = plan.certificate
+    if proof is None or plan.gap is None:
+        return {}, ()
+    return plan._by_goal(proof.bounds[: len(plan.goals)]), proof.bounds
+
+
+def _no_worse(plan: Plan, floor: dict[str, float]) -> bool:
+    pairs = [(value, floor[name]) for name, value in plan.objective.items() if name in floor]
+    return all(value <= low + _SAME * max(abs(value), abs(low)) for value, low in pairs)
+
+
+def _narrowed(problem: Problem, plan: Plan, postures: int) -> Problem:
+    """Return a problem with fewer postures at each node, and the criterion of its plan."""
+
+    def fewer(scene: Scene) -> Scene:
+        return scene.with_robots(
+            *(
+                robot
+                if robot.arm is None
+                else replace(
+                    robot, arm=replace(robot.arm, postures=min(postures, robot.arm.postures))
+                )
+                for robot in scene.robots
+            )
+        )
+
+    return _moved(problem, fewer(problem.scene), plan, [fewer(each) for each in problem.scenarios])
+
+
+def _moved(
+    problem: Problem, scene: Scene, plan: Plan | None = None, scenarios: Sequence[Scene] = ()
+) -> Problem:
+    """Return a problem with other robots, otherwise the same; with the criterion of a plan."""
+    engine, moves = engine_for(problem.engine, scene), problem.moves
+    if isinstance(moves, Schedule):
+        moves = replace(moves, scene=scene)
+    criterion = problem.criterion if plan is None else _criterion(plan)
+    return replace(
+        problem, engine=engine, moves=moves, criterion=criterion, scenarios=tuple(scenarios)
+    )
+
+
+def _criterion(plan: Plan) -> Criterion:
+    """Return the criterion of a plan, with all numbers that it takes from the scene."""
+    return plan._of_scene.criterion
+
 
 Graph = Layers | ScenarioLayers | States | AllOrders
 GRAPHS = {States: On.STATES, AllOrders: On.ORDERS, ScenarioLayers: On.SCENARIOS}
@@ -354,7 +443,7 @@ def _solved(problem: Any, formulation: Formulation | str | None, run: Run) -> Pl
     def solved(asked: Problem) -> Plan:
         return SOLVE[on](graph_of(asked, on), found, run)
 
-    plan = with_postures(problem, solved(problem), solved)
+    plan = _with_postures(problem, solved(problem), solved)
     return replace(plan, problem=problem)
 
 

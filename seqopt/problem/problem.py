@@ -38,37 +38,17 @@ from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 
 
-class Costs(Protocol):
+class _Costs(Protocol):
     """Costs of choices, of which an aim takes the sum or the largest."""
 
     def cost(self, choice: Sequence[int]) -> float:
-        """Return the sum of the costs that a choice meets.
-
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
-
-        Returns
-        -------
-        float
-        """
+        """Return the sum of the costs that a choice, a candidate for every move, meets."""
 
     def worst(self, choice: Sequence[int]) -> float:
-        """Return the largest cost that a choice meets.
-
-        Parameters
-        ----------
-        choice : sequence of int
-            A candidate for every move.
-
-        Returns
-        -------
-        float
-        """
+        """Return the largest cost that a choice meets."""
 
 
-Found_co = TypeVar("Found_co", bound=Costs, covariant=True)
+Found_co = TypeVar("Found_co", bound=_Costs, covariant=True)
 
 
 class _Costed(Protocol[Found_co]):
@@ -89,7 +69,7 @@ class Aim(Enum):
     SUM = "sum"
     PEAK = "peak"
 
-    def value_of(self, costs: Costs, choice: Sequence[int]) -> float:
+    def value_of(self, costs: _Costs, choice: Sequence[int]) -> float:
         """Return the value of a choice: its total, or its largest cost."""
         return costs.cost(choice) if self is Aim.SUM else costs.worst(choice)
 
@@ -114,8 +94,6 @@ class RobustAim:
     scenario, or the mean total of the worst scenarios (conditional value at risk), where ``level``
     is the share of scenarios that is left out, from 0 (the mean over all) to below 1.
 
-    Examples
-    --------
     >>> aim = RobustAim(RobustKind.CVAR, 0.5)
     >>> aim, aim.value(np.array([1.0, 4.0, 2.0, 3.0]))
     (RobustAim(cvar=0.5), 3.5)
@@ -267,8 +245,6 @@ def parse_goals(text: str) -> tuple[Goal, ...]:
     every state stands), ``tilt`` (the largest that every state survives) and ``tolerance`` (how far
     grips may be off in every state).
 
-    Examples
-    --------
     >>> [str(goal) for goal in parse_goals("minmax,steps,sum(T_max)")]
     ['minmax', 'steps', 'sum(T_max)']
     """
@@ -532,3 +508,27 @@ READ: dict[str, Callable[[Any], Any]] = {
     "orders": lambda given: None if given is None else Orders.of(given),
     "also": tuple,
 }
+
+
+class _Asked(Protocol):
+    """What is asked of a build."""
+
+    @property
+    def standing(self) -> Standing | None: ...
+    @property
+    def goals(self) -> Sequence[Goal]: ...
+    @property
+    def scenarios(self) -> Sequence[Engine]: ...
+    @property
+    def network(self) -> Network: ...
+
+
+def _require_for_curing(problem: _Asked) -> None:
+    """Raise a `ProblemError` where mortar cures and what is asked beside it is not modeled."""
+    if problem.standing is None or problem.standing.curing is None:
+        return
+    wrong = [str(goal) for goal in problem.goals if goal.of_margins]
+    wrong += ["props"] if problem.network.scene.props else []
+    wrong += ["scenarios"] if problem.scenarios else []
+    if wrong:
+        raise ProblemError(f"curing: {wrong[0]} beside it is not modeled; leave one of them out")

@@ -38,8 +38,6 @@ class Standing:
     direction, rad; ``curing``: which share of its bond mortar has at an age, or its words, by
     default all at once. Where nobody asks for time, all wait until it has cured.
 
-    Examples
-    --------
     >>> Standing("dry").described()["tilt_deg"]
     0.0
     """
@@ -90,7 +88,6 @@ class Standing:
 
 
 def _without_implied(demands: Sequence[Standing]) -> tuple[Standing, ...]:
-    """Return demands without those that another one implies."""
     out = dict.fromkeys(demands)
     return tuple(one for one in out if not any(o._implies(one) for o in out if o != one))
 
@@ -240,7 +237,6 @@ class StandingSets:
         return self._known[name].of(bricks, self._codes(*grips), compute)
 
     def _codes(self, held: Ints, payload: Floats) -> Ints:
-        """Return a number (S,) for every grip set."""
         kinds = np.where(held > 0, np.searchsorted(self._payloads, payload), 0)
         codes = np.zeros(len(held), dtype=np.int64)
         for nodes, kind in zip(held.T, kinds.T, strict=True):

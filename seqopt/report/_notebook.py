@@ -210,7 +210,6 @@ def _build(value: ShownBuild) -> _Card:
 
 
 def _standing(value: ShownBuild) -> Rows:
-    """Return which steps stand, dry and with epoxy."""
     prover = BuildProver(value.engine.network)
     found = prover.of_builds({"": value.steps}).get("", ())
     said = {f"stability, {each.how}": str(each).partition(": ")[2] for each in found}

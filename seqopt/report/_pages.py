@@ -20,12 +20,11 @@ from seqopt.plan.front import Front
 from seqopt.plan.plan import Plan
 from seqopt.problem._arms import arm_faults
 from seqopt.problem.requirements import overloads
-from seqopt.report._opening._says import worst_along
 from seqopt.report._robots import _known_arms
 from seqopt.report._speed._table import SpeedTable
 from seqopt.report.comparison import CLOSED, Comparison, fixed_methods, largest, shown_table
 from seqopt.report.page import Build, Scatter, _Drawn, _grips_off, report_page
-from seqopt.report.text import in_words
+from seqopt.report.text import _worst_along, in_words
 from seqopt.responses.table import OUTSIDE, REMEDY, Departure, LinearRange, analyze, builds_in_words
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
@@ -167,7 +166,7 @@ def _along(plan: ShownBuild, table: pd.DataFrame) -> Floats | None:
         return None
     criterion = getattr(plan.graph, "criterion", None) or plan.layers.criterion
     with suppress(SeqoptError):  # what no table has
-        return worst_along(plan.engine.network.scene, table, plan.goals[0], criterion)
+        return _worst_along(plan.engine.network.scene, table, plan.goals[0], criterion)
     return None
 
 

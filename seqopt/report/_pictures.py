@@ -22,7 +22,7 @@ from seqopt.errors import StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report._robots import Arms, Cell, _known_arms, _require_arms
-from seqopt.report._style import SMALL, WIDTH, new_picture, styled
+from seqopt.report._style import SMALL, WIDTH, new_figure, new_picture, styled
 from seqopt.report.draw import (
     PROP_MARK,
     View,
@@ -40,6 +40,36 @@ from seqopt.scene.boxes import boxes
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
+
+
+@styled
+def reach_picture(table: pd.DataFrame) -> Figure:
+    """Return a picture of a table of `seqopt.arms.reach_table`: a row a robot, a column a node.
+
+    Shades say how many postures there are; a cross marks a node that is never reached.
+    """
+    robots = [*dict.fromkeys(table["robot"])]
+    nodes = [*dict.fromkeys(table["node"])]
+    counts = table.pivot_table(index="robot", columns="node", values="postures", sort=False)
+    possible = table.pivot_table(index="robot", columns="node", values="to_bricks", sort=False) > 0
+    grid = np.where(possible, counts, 0)
+    figure = new_figure(1.1 + 0.3 * len(robots))
+    axes = figure.subplots()
+    shown = axes.imshow(np.sqrt(grid), aspect="auto", cmap="Blues", vmin=0, interpolation="nearest")
+    rows, columns = np.nonzero(grid == 0)
+    axes.plot(columns, rows, "x", color="black", ms=4)
+    step = max(1, len(nodes) // 25)
+    axes.set_xticks(range(0, len(nodes), step), [str(node) for node in nodes[::step]])
+    axes.set_yticks(range(len(robots)), robots)
+    axes.set_xlabel("node, in build order")
+    axes.spines[:].set_visible(False)
+    most = int(grid.max(initial=0))
+    ticks = sorted({0, 1, most // 4, most})
+    bar = figure.colorbar(shown, ax=axes, ticks=np.sqrt(ticks), pad=0.01)
+    bar.ax.set_yticklabels([str(tick) for tick in ticks])
+    bar.set_label("postures")
+    return figure
+
 
 VIEW = View(azimuth=25, elevation=18)
 NUMBERED = 30  # bricks up to which the nodes of a network are numbered
@@ -283,8 +313,9 @@ def gantt_picture(
     for hold in holds(scene, steps):
         if hold.last >= first and hold.first <= last:
             _bar(axes, hold, forces, shade, begins)
-            _label(axes, scene, hold, inch)
-    _lanes(axes, scene, (first, last), ends)
+            _label(axes, scene, hold, (hold.first - 0.5, hold.last + 0.5, inch))
+    said = "step" if (first, last) == (1, ends) else f"step, {first} to {last} of {ends}"
+    _lanes(axes, scene, said, (first - 0.7, last + 0.7))
     _key(figure, axes, shade, is_open=any(getattr(step, "moves", ()) for step in steps))
     return figure
 
@@ -307,9 +338,13 @@ def _bar(
         axes.plot([hold.first - 0.5] * 2, [low, low + LANE], color=DARK, lw=3.2)
 
 
-def _label(axes: Axes, scene: Scene, hold: Hold, inch: float) -> None:
-    """Write brick and node, or the number of an open grip, into a bar as far as they fit."""
-    room = inch * (hold.last - hold.first + 1)
+def _label(axes: Axes, scene: Scene, hold: Hold, span: tuple[float, float, float]) -> None:
+    """Write brick and node, or the number of an open grip, into a bar as far as they fit.
+
+    ``span``: from where to where it is, and inches per unit.
+    """
+    begin, end, inch = span
+    room = inch * (end - begin)
     if room < 0.12:
         return
     words = f"?{(hold.move or 0) + 1}"
@@ -318,16 +353,13 @@ def _label(axes: Axes, scene: Scene, hold: Hold, inch: float) -> None:
     flat = room >= LETTER * len(words) + 0.06
     look: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": DARK, "clip_on": True}
     look["bbox"] = {"boxstyle": "square,pad=0.1", "fc": (1, 1, 1, 0.72), "lw": 0}
-    at = ((hold.first + hold.last) / 2, hold.robot)
-    axes.annotate(words, at, rotation=0 if flat else 90, **look)
+    axes.annotate(words, ((begin + end) / 2, hold.robot), rotation=0 if flat else 90, **look)
 
 
-def _lanes(axes: Axes, scene: Scene, shown: tuple[int, int], steps: int) -> None:
-    """Set lanes, limits and names."""
+def _lanes(axes: Axes, scene: Scene, said: str, shown: tuple[float, float]) -> None:
+    """Set a lane for every robot, limits and names."""
     count = len(scene.robots)
-    said = "step" if shown == (1, steps) else f"step, {shown[0]} to {shown[1]} of {steps}"
-    limits: Any = {"xlim": (shown[0] - 0.7, shown[1] + 0.7), "ylim": (count - 0.5, -0.5)}
-    axes.set(xlabel=said, **limits, axisbelow=True)
+    axes.set(xlabel=said, xlim=shown, ylim=(count - 0.5, -0.5), axisbelow=True)
     axes.set_yticks(range(count), [robot.name for robot in scene.robots])
     axes.tick_params(left=False)
     axes.grid(visible=True, axis="x", lw=0.3)

@@ -11,11 +11,11 @@ from functools import cached_property
 
 import numpy as np
 
-from seqopt.arms._drawn import PosedArm, idle_arm
+from seqopt.arms._model import PosedArm, idle_arm
 from seqopt.arrays import Floats
 from seqopt.errors import ExtraError, ProblemError, SceneError
+from seqopt.scene._props import Prop
 from seqopt.scene.boxes import vertices_of
-from seqopt.scene.holders._props import Prop
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.sequence._postures import plan_postures

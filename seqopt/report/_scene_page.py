@@ -10,7 +10,7 @@ from itertools import cycle
 import numpy as np
 import pandas as pd
 
-from seqopt.arms._listing import reach_table
+from seqopt.arms._permits import reach_table
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ExtraError, SceneError
 from seqopt.network.build import build_network

@@ -56,7 +56,6 @@ class _Picture(Figure):
     """A figure that pyplot does not manage: it is shown once, where it is returned."""
 
     def _repr_png_(self) -> bytes:
-        """Return the figure as a PNG."""
         buffer = io.BytesIO()
         self.savefig(buffer, format="png", dpi=NOTEBOOK_DPI)
         return buffer.getvalue()

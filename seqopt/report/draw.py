@@ -23,7 +23,7 @@ from matplotlib.patches import PathPatch, Polygon
 from matplotlib.path import Path
 from matplotlib.patheffects import withStroke
 
-from seqopt.arms._drawn import PosedArm
+from seqopt.arms._model import PosedArm
 from seqopt.arrays import Floats, Ints
 from seqopt.network.network import Network, PartKind
 from seqopt.report._robots import ROBOT_COLORS, Cell
@@ -116,8 +116,6 @@ def _drawing_order(corners: Floats, toward: Floats) -> list[int]:
     ``toward`` has unit vectors to the right, up and toward the viewer (3, 3). Boxes that hide each
     other in a circle, or share room, stand in the order of their middles.
 
-    Examples
-    --------
     >>> low, high = np.zeros((8, 3)), np.zeros((8, 3))
     >>> low[4:, 0] = low[[2, 3, 6, 7], 1] = low[1::2, 2] = 1.0
     >>> high = low + [0.0, 0.0, 1.0]

@@ -27,9 +27,8 @@ from seqopt.engines.interface import Engine, Want
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, _prop_faults, overloads
-from seqopt.report._opening._says import deciding_step, far_off, in_a_sentence, robot_words
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
-from seqopt.report.text import in_words
+from seqopt.report.text import _deciding_step, _far_off, _in_a_sentence, _robot_words, in_words
 from seqopt.responses._tolerance import each_tolerance, held_in_steps, is_linear
 from seqopt.responses.quantities import _number_text
 from seqopt.responses.table import OUTSIDE, Departure, force_column, step_fields
@@ -37,8 +36,7 @@ from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Order, Scene
 from seqopt.scene.shape import normal_of
-from seqopt.sequence.exports._arm_tasks import _known_tasks
-from seqopt.sequence.exports._tasks import plan_tasks, tasks_csv, tasks_json
+from seqopt.sequence.exports._tasks import _known_tasks, plan_tasks, tasks_csv, tasks_json
 from seqopt.sequence.steps import Step
 from seqopt.stability._builds import WORDS, BuildVerdicts
 
@@ -91,7 +89,7 @@ class Build:
     def sentence(self, scene: Scene, off: Floats | None = None) -> str:
         """Return what it is, as one sentence; ``off``: how far grips may be off in steps, m."""
         known = self.verdicts, self.departures
-        return in_a_sentence(scene, self.table, *known, off, self.faults)
+        return _in_a_sentence(scene, self.table, *known, off, self.faults)
 
     def overloads(self, scene: Scene) -> tuple[Excess, ...]:
         """Return the payloads that steps exceed."""
@@ -157,7 +155,7 @@ def _structure_data(network: Network) -> dict[str, object]:
         "robots": [
             {
                 "name": robot.name,
-                "words": robot_words(robot.name),
+                "words": _robot_words(robot.name),
                 "payload": robot.payload,
                 "color": color,
                 "reach": cell.reach(robot),
@@ -220,7 +218,7 @@ def _build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[st
             {"how": each.how, "of": [WORDS[verdict] for verdict in each.verdicts]}
             for each in build.verdicts
         ],
-        "decides": deciding_step(scene, build.table, build.verdicts, build.along),
+        "decides": _deciding_step(scene, build.table, build.verdicts, build.along),
         "sentence": build.sentence(scene, off),
         "words": in_words(build.name),
         "off": [] if off is None else [_off_said(far) for far in off.tolist()],
@@ -251,7 +249,7 @@ def _grips_off(engine: Engine, build: Build) -> Floats | None:
 
 def _off_said(far: float) -> str:
     """Return how far grips of a step may be off, in words; none where nobody holds."""
-    return f"Grips {far_off(far)}." if far < np.inf else ""
+    return f"Grips {_far_off(far)}." if far < np.inf else ""
 
 
 def _marks(scene: Scene, build: Build) -> list[str]:
@@ -259,7 +257,7 @@ def _marks(scene: Scene, build: Build) -> list[str]:
     over, props, out = build.overloads(scene), _prop_faults(scene, build.table), []
     for step in build.steps:
         said = [
-            f"{robot_words(each.robot)} exceeds its payload"
+            f"{_robot_words(each.robot)} exceeds its payload"
             for each in over
             if step.number in each.steps
         ]

@@ -41,8 +41,6 @@ WORDS = {
 def _grip_range(softest: float, stiffest: float) -> tuple[float, ...]:
     """Return stiffnesses of grips from the softest to the stiffest, evenly spaced, then rigid, N/m.
 
-    Examples
-    --------
     >>> [f"{stiffness:.3g}" for stiffness in _grip_range(1e6, 1e7)]
     ['1e+06', '1.78e+06', '3.16e+06', '5.62e+06', '1e+07', 'inf']
     """
@@ -63,27 +61,13 @@ def held_softly(
 ) -> pd.DataFrame:
     """Return the largest responses of builds for grips of several stiffnesses.
 
-    Parameters
-    ----------
-    engine : Engine
-        Made by name; engines of its kind compute the scene with other grips.
-    tables : mapping of str to pandas.DataFrame
-        The builds, as `seqopt.analyze` tells of them, by name.
-    stiffness : sequence of float
-        Of the grips of all robots, N/m, infinite if rigid, instead of that of hands and joints of
-        arms; how they resist turning stays.
-    progress : callable, optional
-        Told how far it is.
+    ``engine``: made by name; engines of its kind compute the scene with other grips. ``tables``:
+    the builds, as `seqopt.analyze` tells of them. ``stiffness``: of the grips of all robots, N/m,
+    infinite if rigid, instead of that of hands and joints of arms; how they resist turning stays. A
+    row for every ``build`` and ``stiffness``: largest ``F_rob`` [N], ``M_sup`` [N m], ``T_max`` [N]
+    and ``D_max`` [1e-3 mm] of any step, and ``payload_share``: the largest force of a grip over its
+    robot's payload.
 
-    Returns
-    -------
-    pandas.DataFrame
-        A row for every ``build`` and ``stiffness``: largest ``F_rob`` [N], ``M_sup`` [N m],
-        ``T_max`` [N] and ``D_max`` [1e-3 mm] of any step, and ``payload_share``: the largest force
-        of a grip over its robot's payload.
-
-    Examples
-    --------
     >>> import seqopt
     >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
     >>> tables = {"cantilever": seqopt.analyze(engine, seqopt.cantilever(engine.network))}
@@ -153,8 +137,6 @@ def turning_points(table: pd.DataFrame, fixed: Sequence[str] = ()) -> tuple[str,
 
     ``table``: of `held_softly`.
 
-    Examples
-    --------
     >>> import pandas as pd
     >>> rows = [("a", 1e6, 8.0), ("b", 1e6, 9.0), ("a", 1e7, 2.0), ("b", 1e7, 9.0)]
     >>> table = pd.DataFrame(rows, columns=["build", "stiffness", "D_max"])

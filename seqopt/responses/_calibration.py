@@ -25,7 +25,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.scene._loads import Load
+from seqopt.scene.parts import Load
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 

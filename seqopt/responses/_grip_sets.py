@@ -35,8 +35,6 @@ from seqopt.work._workers import hire, map_ordered
 class KnownRows:
     """Rows of values by a key and a code, each computed once; ``count``: how many were.
 
-    Examples
-    --------
     >>> rows = KnownRows()
     >>> codes = np.array([3, 1, 3])
     >>> rows.of("squares", codes, lambda places: codes[places, None] ** 2.0).ravel()
@@ -90,8 +88,6 @@ class GripSets:
     that are wanted; ``resources``: who solves them, and where answers are kept; ``screen``: whether
     six digits are enough, to choose by.
 
-    Examples
-    --------
     >>> import numpy as np
     >>> import seqopt
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))

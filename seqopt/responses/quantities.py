@@ -23,8 +23,6 @@ _LISTED = 12  # steps that are named one by one
 def _number_text(value: float) -> str:
     """Return a number with at least four digits, and no power of ten where it can be read.
 
-    Examples
-    --------
     >>> _number_text(27.88), _number_text(116312.4)
     ('27.88', '116,312')
     """
@@ -34,8 +32,6 @@ def _number_text(value: float) -> str:
 def length_text(length: float) -> str:
     """Return a length in words, in the unit that suits it.
 
-    Examples
-    --------
     >>> length_text(2.79e-5), length_text(0.1163), length_text(3e-7), length_text(0.0)
     ('27.9 µm', '116.3 mm', '300 nm', '0 mm')
     """
@@ -48,8 +44,6 @@ def length_text(length: float) -> str:
 def _plain(value: float, digits: int) -> str:
     """Return a number to so many digits, never with a power of ten.
 
-    Examples
-    --------
     >>> _plain(168.2, 2), _plain(504_820.0, 3), _plain(0.2312, 2)
     ('170', '505,000', '0.23')
     """
@@ -59,8 +53,6 @@ def _plain(value: float, digits: int) -> str:
 def _steps_in_words(steps: Sequence[int]) -> str:
     """Return which steps these are, by their numbers; of many the first.
 
-    Examples
-    --------
     >>> _steps_in_words([3]), _steps_in_words(range(1, 20))
     ('step 3', 'steps 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 and 7 more')
     """
@@ -123,8 +115,6 @@ def robot_response(robot: str) -> str:
     It is ``F_`` and the robot's name; where that means something else already, or cannot be read
     back from a list, the name stands in brackets.
 
-    Examples
-    --------
     >>> robot_response("rob1"), robot_response("sup"), robot_response("a,b")
     ('F_rob1', 'F_[sup]', 'F_[a,b]')
     """

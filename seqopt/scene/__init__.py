@@ -18,10 +18,9 @@ than its weight loads it; `seqopt.save_scene` writes it to a file. `Durations` s
 takes.
 """
 
-from seqopt.scene._loads import Load
+from seqopt.scene._durations import Durations
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.holders._durations import Durations
-from seqopt.scene.parts import Brick, Ground, Joint, Robot
+from seqopt.scene.parts import Brick, Ground, Joint, Load, Robot
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 

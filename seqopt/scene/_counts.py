@@ -22,8 +22,6 @@ def scene_of_bricks(words: str, bricks: int) -> Scene:
     Raises `SceneError` if words say no scene whose bricks can be counted otherwise, or that of so
     many is none.
 
-    Examples
-    --------
     >>> scene_of_bricks("arch:span=2,rise=0.8,pattern=VLR", 30)
     <Scene circular arch 2 x 0.8: 30 bricks, 29 joints, 2 ground ends, 3 robots>
     """

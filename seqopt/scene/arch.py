@@ -268,7 +268,6 @@ def _spring(shape: ArchShape, position: Floats, direction: Floats, along: Floats
 
 
 def _joint(shape: ArchShape, brick: int, position: Floats, direction: Floats) -> Joint:
-    """Return the joint between a brick and the next one."""
     along = direction / np.linalg.norm(direction)
     return Joint(bricks=(brick, brick + 1), **_spring(shape, position, direction, along))
 

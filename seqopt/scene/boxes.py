@@ -15,8 +15,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, Vector
 from seqopt.errors import SceneError
-from seqopt.scene._axes import frames
-from seqopt.scene._checks import rows, short, vector, whole
+from seqopt.scene._checks import frames, rows, short, vector, whole
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron
 
@@ -54,7 +53,6 @@ def block_brick(
 
 
 def _from(center: Floats, name: int, grips: _Places) -> tuple[Vector, Vector]:
-    """Return where grips are from a center."""
     where = f"brick {name}: grips"
     found = [vector(where, row) for row in rows(where, grips or ())]
     if len(found) != 2:

@@ -1,4 +1,4 @@
-"""The parts of a scene: bricks, joints, ground ends and robots.
+"""The parts of a scene: bricks, joints, ground ends, and robots with the kinds of their grips.
 
 Every value is frozen and checked when it is made. Positions and lengths are in m, densities in
 kg/m³, forces in N, stiffnesses in N/m and N m/rad.
@@ -7,19 +7,19 @@ kg/m³, forces in N, stiffnesses in N/m and N m/rad.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from numbers import Real
 
 import numpy as np
 
-from seqopt.arrays import Floats, Terse, Vector
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse, Vector
 from seqopt.errors import SceneError
-from seqopt.scene._axes import frames
 from seqopt.scene._checks import (
     check,
     density,
+    frames,
     kind_of,
     length,
     positive,
@@ -35,9 +35,71 @@ from seqopt.scene._checks import (
     whole,
     wholes,
 )
+from seqopt.scene._durations import Durations
 from seqopt.scene.arm import Arm
-from seqopt.scene.holders._durations import Durations
 from seqopt.scene.shape import Polyhedron
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Load(Terse):
+    """A force on a brick.
+
+    Parameters
+    ----------
+    brick : int
+        Name of the brick.
+    force : Vector
+        N, in the scene's axes.
+    position : Vector, optional
+        Where it acts, m; the brick's centroid by default.
+    since : int, optional
+        Name of the brick with whose placing it begins to act, if that is placed later than
+        ``brick``; by default it acts as soon as its own brick is placed.
+
+    Raises
+    ------
+    SceneError
+        If a value is not finite.
+
+    Examples
+    --------
+    >>> Load(brick=13, force=(0.0, 0.0, -800.0), since=25)
+    Load(brick=13, force=(0, 0, -800), since=25)
+    """
+
+    brick: int
+    force: Vector
+    position: Vector | None = None
+    since: int | None = None
+
+    def __post_init__(self) -> None:
+        settle(self, brick=whole("load: brick", self.brick))
+        since, position = unless_none(whole), unless_none(vector)
+        check(self, self.label, force=vector, position=position, since=since)
+
+    @property
+    def label(self) -> str:
+        """What messages call it."""
+        return f"load on brick {self.brick}"
+
+    @property
+    def starts_with(self) -> int:
+        """Name of the brick with whose placing it acts, unless its own is placed later."""
+        return self.brick if self.since is None else self.since
+
+
+def _from_both_sides(names: Sequence[int], places: Sequence[Vector], up: Vector) -> tuple[int, ...]:
+    """Return names of bricks, at some places, in that order."""
+    where, high = np.array(places), np.array(up)
+    level = where - np.outer(where @ high, high)
+    axis = np.linalg.svd(level - level.mean(axis=0))[2][0]  # along which it is longest
+    along = np.round(level @ axis * np.sign(axis[np.abs(axis).argmax()]), 6)
+    courses, course = np.unique(np.round(where @ high, 6), return_inverse=True)
+    ends = [along[course == k] for k in range(len(courses))]
+    middle = np.array([0.5 * (each.min() + each.max()) for each in ends])[course]
+    rank = np.lexsort((along, np.round(-np.abs(along - middle), 6), course))
+    return tuple(names[k] for k in rank)
+
 
 _UNIT = 1e-9  # how far a direction may be from unit length, or a pair from a right angle
 _STRAIGHT = 1e-9  # by how much a convex polygon may turn back, over the square of its longest edge
@@ -470,3 +532,75 @@ class Robot(Terse):
         check(self, where, rotational_stiffness=unless_none(turning))
         check(self, where, arm=unless_none(partial(kind_of, kind=Arm)))
         check(self, where, durations=unless_none(partial(kind_of, kind=Durations)))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _GripKinds(FrozenValue):
+    """The K kinds of a scene's robots, in the order of their first ones.
+
+    Robots that give way alike and carry as much are one kind; one with an arm whose joints give way
+    is a kind by itself. Engines are asked about grips by number: that of the node, and for a robot
+    of kind k more by k times the span of all node numbers.
+
+    ``compliance`` (K, 6, 6): how a node shifts and turns, m and rad, against the hand that holds
+    it for a force and a moment on it, N and N m; zero where the hand is rigid. ``arms`` (K,):
+    whether the joints of an arm give way beside it, as `seqopt.arms` knows of every node.
+    ``turns`` (K,): whether hands of a kind bear moments; others let their nodes turn. ``payload``
+    (K,): N. ``of_robot`` (R,): the kind of every robot. ``first``, ``span``: the least node number,
+    and how far apart kinds are.
+    """
+
+    compliance: Floats
+    arms: Bools
+    turns: Bools
+    payload: Floats
+    of_robot: Ints
+    first: int
+    span: int
+
+    @cached_property
+    def rigid(self) -> bool:
+        """Whether all hands are rigid and let their nodes turn."""
+        return not (self.compliance.any() or self.turns.any() or self.arms.any())
+
+    @property
+    def gives(self) -> Bools:
+        """Which kinds (K,) give way to forces."""
+        return np.asarray(self.compliance[:, :3, :3].any(axis=(1, 2)) | self.arms)
+
+    def numbers(self, nodes: Ints, robots: Sequence[int]) -> Ints:
+        """Return the numbers (..., r) of grips of r robots, by index, on nodes (..., r)."""
+        if len(self.turns) == 1:
+            return nodes
+        return np.asarray(nodes + self.span * self.of_robot[np.asarray(robots, dtype=np.int64)])
+
+    def split(self, numbers: Ints) -> tuple[Ints, Ints]:
+        """Return the nodes and the kinds of grips; kinds that there are not, of wrong numbers."""
+        if len(self.turns) == 1:
+            return numbers, np.zeros(numbers.shape, dtype=np.int64)
+        kind = (numbers - self.first) // self.span
+        known = (kind >= 0) & (kind < len(self.turns))
+        kind = np.where(known, kind, 0)
+        return numbers - self.span * kind, kind
+
+
+def _grip_kinds(robots: Sequence[Robot], nodes: Sequence[int]) -> _GripKinds:
+    """Return the kinds of robots; one that is rigid where there is none. ``nodes``: all numbers."""
+    ways = [(r.stiffness, r.rotational_stiffness, r.payload, _soft_arm(r)) for r in robots]
+    kinds = list(dict.fromkeys(ways)) or [(None, None, np.inf, "")]
+    compliance = np.zeros((len(kinds), 6, 6))
+    for own, (shift, turn, *_) in zip(compliance, kinds, strict=True):
+        for at, given in ((0, shift), (3, turn)):
+            if given is not None:
+                own[range(at, at + 3), range(at, at + 3)] = 1 / np.array(given)
+    arms = np.array([bool(arm) for *_, arm in kinds])
+    turns = np.array([turn is not None for _, turn, *_ in kinds])
+    payload = np.array([most for *_, most, _ in kinds])
+    of_robot = np.array([kinds.index(way) for way in ways], dtype=np.int64)
+    first, span = min(nodes), max(nodes) - min(nodes) + 1
+    return _GripKinds(compliance, arms, turns, payload, of_robot, first, span)
+
+
+def _soft_arm(robot: Robot) -> str:
+    """Return the name of a robot with an arm whose joints give way; empty for others."""
+    return robot.name if robot.arm is not None and robot.arm.joint_stiffness else ""

@@ -18,9 +18,8 @@ import numpy as np
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene._checks import short, whole_between
-from seqopt.scene._loads import Load
 from seqopt.scene.boxes import as_vector
-from seqopt.scene.parts import Brick, Ground, Joint, Robot
+from seqopt.scene.parts import Brick, Ground, Joint, Load, Robot
 from seqopt.scene.scene import Scene
 
 _End = TypeVar("_End", Joint, Ground)
@@ -183,8 +182,6 @@ class Scenarios:
         same for all robots that give way alike, joints of arms with them; log-uniform. Rigid grips
         stay rigid.
 
-        Examples
-        --------
         >>> import seqopt
         >>> drawn = seqopt.scenarios(seqopt.load_scene("arch25").with_grips(1e6), count=2)
         >>> [f"{each.robots[0].stiffness[0]:.3g}" for each in drawn.with_grips((0.5, 2)).scenes]
@@ -279,7 +276,6 @@ def _held(scene: Scene, factors: tuple[float, float], stream: tuple[int, int]) -
 
 
 def _factors(name: str, given: Sequence[float]) -> tuple[float, float]:
-    """Return the least and the largest factor."""
     try:
         low, high = (float(value) for value in given)
     except (TypeError, ValueError):

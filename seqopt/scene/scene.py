@@ -13,12 +13,19 @@ from seqopt._showing import Shown, display
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import check, not_negative, printable, short, vector, wholes
-from seqopt.scene._grip_kinds import GripKinds, grip_kinds
-from seqopt.scene._loads import Load
-from seqopt.scene._sides import from_both_sides
-from seqopt.scene.holders._durations import _durations_in_words
-from seqopt.scene.holders._props import Prop, centered, settled_props
-from seqopt.scene.parts import Brick, Ground, Joint, Reach, Robot
+from seqopt.scene._durations import _durations_in_words
+from seqopt.scene._props import Prop, centered, settled_props
+from seqopt.scene.parts import (
+    Brick,
+    Ground,
+    Joint,
+    Load,
+    Reach,
+    Robot,
+    _from_both_sides,
+    _grip_kinds,
+    _GripKinds,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -361,7 +368,7 @@ class Scene(Shown):
     def with_durations(self, *words: str) -> Scene:
         """Return the same scene with robots that take as long as words say.
 
-        ``*words``: as of `seqopt.scene.holders._durations._durations_in_words`.
+        ``*words``: as of `seqopt.scene._durations._durations_in_words`.
 
         Examples
         --------
@@ -377,10 +384,10 @@ class Scene(Shown):
         return replace(self, robots=tuple(replace(r, durations=each) for r, each in pairs))
 
     @cached_property
-    def grip_kinds(self) -> GripKinds:
+    def grip_kinds(self) -> _GripKinds:
         """How its robots give way where they hold, and after them its props."""
         holders = [*self.robots, *(prop.as_robot for prop in self.props)]
-        return grip_kinds(holders, [*self.brick_of_node])
+        return _grip_kinds(holders, [*self.brick_of_node])
 
     @cached_property
     def prop_of_number(self) -> dict[int, Prop]:
@@ -438,7 +445,6 @@ class Scene(Shown):
 
 
 def _parts(where: str, values: Iterable[_Part], kind: type[_Part]) -> tuple[_Part, ...]:
-    """Return parts of a scene if all are of one kind."""
     found = tuple(values) if isinstance(values, Iterable) else (values,)
     for value in found:
         if not isinstance(value, kind):
@@ -479,7 +485,7 @@ def _from_all_ends(scene: Scene) -> Order:
 ORDERS: dict[str, Callable[[Scene], Order]] = {
     "reversed": lambda scene: scene.build_order[::-1],
     "ends": _from_all_ends,
-    "sides": lambda s: from_both_sides(s.build_order, [b.position for b in s.placed], s.up),
+    "sides": lambda s: _from_both_sides(s.build_order, [b.position for b in s.placed], s.up),
 }
 """Orders by name.
 

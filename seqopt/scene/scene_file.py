@@ -24,18 +24,22 @@ import numpy as np
 from seqopt._files import read_text, write_text
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
-from seqopt.scene._checks import cut, reading_json, short
-from seqopt.scene._fitting import which_fit
-from seqopt.scene._loads import Load
+from seqopt.scene._checks import cut, reading_json, short, which_fit
+from seqopt.scene._durations import Durations
+from seqopt.scene._props import Prop
 from seqopt.scene.arm import Arm
-from seqopt.scene.holders._durations import Durations
-from seqopt.scene.holders._props import Prop
-from seqopt.scene.library._barrel import BarrelShape, barrel
-from seqopt.scene.library.arch_form import ArchForm, arch, barrel_vault, chain
+from seqopt.scene.library.arch_form import (
+    ArchForm,
+    _barrel,
+    _BarrelShape,
+    arch,
+    barrel_vault,
+    chain,
+)
 from seqopt.scene.library.dome import DomeShape, dome
 from seqopt.scene.library.vault import VaultShape, herringbone_vault
 from seqopt.scene.library.wall import WallShape, wall
-from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Reach, Robot, Side, Sphere
+from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Load, Reach, Robot, Side, Sphere
 from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.shape import Polyhedron
 
@@ -193,7 +197,7 @@ KINDS = {
         VaultShape,
     ),
     "vault": _Kind(
-        "a barrel vault in running bond: vault:span=2,rise=0.8,columns=3", barrel, BarrelShape
+        "a barrel vault in running bond: vault:span=2,rise=0.8,columns=3", _barrel, _BarrelShape
     ),
     "wall": _Kind(
         "a wall in running bond: wall:columns=6,courses=4,corbel=0.02, or wall:length=2,height=0.6",
@@ -273,12 +277,10 @@ def builtin_scenes() -> tuple[str, ...]:
 
 
 def _stored() -> tuple[str, ...]:
-    """Return the names of the scenes that ship as files."""
     return tuple(item.name.removesuffix(".json") for item in _DATA.joinpath("scenes").iterdir())
 
 
 def _load_stored(name: str) -> Scene:
-    """Return a scene that ships as a file."""
     text = _DATA.joinpath("scenes", f"{name}.json").read_text("utf-8")
     return _scene_from_dict(json.loads(text))  # ours obey the schema: a test asks
 
@@ -483,7 +485,6 @@ def save_scene(scene: Scene, path: Path) -> None:
 
 
 def _from(folder: Path, model: str) -> Path:
-    """Return where a model is, from a folder if it is in it."""
     place = Path(os.path.abspath(model))  # noqa: PTH100
     return place.relative_to(folder) if place.is_relative_to(folder) else place
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints, Vector, frozen
 from seqopt.errors import SceneError
-from seqopt.scene._axes import frames
-from seqopt.scene._checks import rows, settle, short, vector, wholes
+from seqopt.scene._checks import frames, rows, settle, short, vector, wholes
 
 FLAT = 1e-4  # by how much a face may leave its plane, over the size of the block
 _EVEN = 1e-12  # share of the second moments by which axes of equal length are told apart

@@ -170,7 +170,6 @@ def _apart(move: Move, held: Collection[object]) -> Move:
 
 
 def _require_done(schedule: Schedule, done: Sequence[Step]) -> None:
-    """Require that steps are the first ones of a schedule."""
     for step, planned in zip(done, schedule.steps, strict=False):
         same = (step.number, step.kind, step.bricks) == (
             planned.number,

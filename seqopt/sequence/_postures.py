@@ -13,8 +13,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from seqopt.arms._held import held_postures
-from seqopt.arms.reach import find_postures
-from seqopt.arms.table import PostureTable
+from seqopt.arms.reach import PostureTable, find_postures
 from seqopt.arrays import Terse
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
@@ -36,15 +35,9 @@ class Unreached:
 class PlanPostures(Terse):
     """The postures of a plan.
 
-    Attributes
-    ----------
-    table : PostureTable
-        Of the scene.
-    steps : tuple of tuple of (int or None)
-        By step, which row of the table each robot of the scene is in; None for a robot that holds
-        nothing or has no arm, and for all where there is no way.
-    unreached : tuple of Unreached
-        The steps that arms cannot be in, or not without changing a posture while they hold.
+    ``steps``: by step, which row of ``table`` each robot of the scene is in; None for a robot that
+    holds nothing or has no arm, and for all where there is no way. ``unreached``: the steps that
+    arms cannot be in, or not without changing a posture while they hold.
     """
 
     table: PostureTable
@@ -53,24 +46,7 @@ class PlanPostures(Terse):
 
 
 def plan_postures(scene: Scene, steps: Sequence[Step]) -> PlanPostures | None:
-    """Return the postures of a plan, one after the other, or the steps that have none.
-
-    Parameters
-    ----------
-    scene : Scene
-    steps : sequence of Step
-        Of a plan for it.
-
-    Returns
-    -------
-    PlanPostures or None
-        None if no robot has an arm.
-
-    Raises
-    ------
-    ExtraError
-        If pinocchio and coal are not installed.
-    """
+    """Return the postures of a plan, or the steps that have none; None if no robot has an arm."""
     table = find_postures(scene)
     return None if table is None else _Search(scene, table, steps).found()
 

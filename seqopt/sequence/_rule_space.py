@@ -412,8 +412,6 @@ def free_space(
     free robots stay where they were, for their travel; ``timed``: whether it counts how long robots
     take.
 
-    Examples
-    --------
     >>> import seqopt
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
     >>> space = free_space(network, FreeRules())

@@ -64,7 +64,6 @@ class ScheduleSpace(StateRows):
 
     @cached_property
     def _begin(self) -> Step:
-        """What is before the first step."""
         return _begin_step(self.network.scene, self.schedule.begin)
 
     def may_place(self, level: int, states: Ints) -> Bools:
@@ -134,7 +133,6 @@ class ScheduleSpace(StateRows):
 
     @cached_property
     def _places(self) -> list[Ints]:
-        """Candidates of every move, as places."""
         return [np.array([self._place[n] for n in m.candidates]) for m in self.schedule.moves]
 
     def ended(self, states: Ints) -> Bools:

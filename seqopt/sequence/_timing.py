@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeVar
 
 from seqopt.errors import ProblemError, StepError
-from seqopt.scene.holders._durations import EXAMPLE, Durations
+from seqopt.scene._durations import EXAMPLE, Durations
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Hold, Schedule, holds
@@ -82,8 +82,6 @@ def step_times(
     since nothing is gained by acting later, every step is done as soon as it may. A `StepError`
     names robots that act of which it is not known how long they take.
 
-    Examples
-    --------
     >>> import seqopt
     >>> words = "fetch=30,place=10,approach=10,grip=5,release=5"
     >>> scene = seqopt.load_scene("arch25").with_durations(words)
@@ -308,7 +306,6 @@ def _nowhere_above(first: _Label, second: _Label) -> bool:
 def _with_robots(
     scene: Scene, steps: Sequence[Step], every: Sequence[Hold], chosen: dict[int, int]
 ) -> list[Step]:
-    """Return steps with the grips of chosen robots."""
     out = []
     for step in steps:
         grips: list[int | None] = [None] * len(scene.robots)

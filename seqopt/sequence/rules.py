@@ -256,8 +256,6 @@ def with_robots(scene: Scene, count: int) -> Scene:
     Further robots reach every node, have the largest payload of the scene's own, and give way as
     the first of them does, and take as long.
 
-    Examples
-    --------
     >>> import seqopt
     >>> [robot.name for robot in with_robots(seqopt.load_scene("arch25"), 4).robots]
     ['rob1', 'rob2', 'rob3', 'rob4']

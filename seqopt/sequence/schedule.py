@@ -102,8 +102,6 @@ class Hold:
 def holds(scene: Scene, steps: Sequence[AnyStep]) -> tuple[Hold, ...]:
     """Return every grip of a sequence or schedule for as long as it lasts, by robot, then by step.
 
-    Examples
-    --------
     >>> import seqopt
     >>> scene = seqopt.load_scene("arch25")
     >>> holds(scene, seqopt.sequential(seqopt.build_network(scene)))[0]
@@ -315,8 +313,6 @@ def acting_bodies(network: Network, bricks: int) -> Ints:
 def islands(network: Network, bricks: int) -> tuple[_Island, ...]:
     """Return the bricks of every part of a partial structure that no joint ties to a ground end.
 
-    Examples
-    --------
     >>> from dataclasses import replace
     >>> import seqopt
     >>> scene = seqopt.arch_scene(seqopt.ArchShape(pitch=(1.2, 0.4, -0.4, -1.2), pattern="V"))

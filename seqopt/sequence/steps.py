@@ -224,8 +224,6 @@ def _turned_round(scene: Scene, steps: Sequence[Step]) -> tuple[Step, ...]:
 
     It begins where the build ends; robots that let go together take hold one after the other.
 
-    Examples
-    --------
     >>> import seqopt
     >>> scene = seqopt.load_scene("arch25")
     >>> steps = _turned_round(scene, seqopt.sequential(seqopt.build_network(scene)))

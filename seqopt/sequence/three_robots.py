@@ -10,11 +10,11 @@ from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.sequence._reach import says_reach
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, check_support
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.sequence.two_robots import (
     Method,
+    _says_reach,
     alternate,
     cast,
     find_robots,
@@ -39,7 +39,6 @@ def open_schedule(method: str, network: Network, steps: Sequence[OpenStep]) -> S
 
 
 def _move(network: Network, steps: Sequence[OpenStep], number: int) -> Move:
-    """Return a move with its candidates."""
     scene = network.scene
     present = [step for step in steps if number in step.moves]
     first = present[0]
@@ -58,7 +57,7 @@ def _move(network: Network, steps: Sequence[OpenStep], number: int) -> Move:
     return Move(robot.name, first.number, first.bricks, free)
 
 
-@says_reach
+@_says_reach
 def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the loop of two robots: the sequential method with every grip open.
 
@@ -68,8 +67,6 @@ def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sch
     shares that placing with the move after it. At least one robot grips, and the newest brick is
     held, at every step before the last. Robots are those of `seqopt.sequential`.
 
-    Examples
-    --------
     >>> import seqopt
     >>> schedule = _two_robot_loop(seqopt.build_network(seqopt.load_scene("arch25")))
     >>> [(step.kind.value, step.moves) for step in schedule.steps[1:4]]
@@ -84,7 +81,7 @@ def _two_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sch
     return open_schedule("two-robot", network, steps)
 
 
-@says_reach
+@_says_reach
 def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Schedule:
     """Return the four-step loop of any number of robots whose roles rotate.
 
@@ -98,8 +95,6 @@ def robot_loop(network: Network | Scene, robots: int | Sequence[str] = ()) -> Sc
     ``robots``: how many take part, or their names in the order in which they place the first
     bricks; by default all robots of the scene. Which of them takes which role follows from reach.
 
-    Examples
-    --------
     >>> import seqopt
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
     >>> robot_loop(network, 3).steps == seqopt.three_robot_loop(network).steps
@@ -144,7 +139,6 @@ def _rotation(count: int, turns: int) -> list[_Turn]:
 
 
 def _loop(network: Network, order: Sequence[int], turns: Sequence[_Turn]) -> list[OpenStep]:
-    """Return the steps of the loop; `order` says which robot has which role."""
     scene = network.scene
     grips: list[int | OpenGrip | None] = [None] * len(scene.robots)
     steps: list[OpenStep] = []
@@ -169,7 +163,7 @@ def _loop(network: Network, order: Sequence[int], turns: Sequence[_Turn]) -> lis
     return steps
 
 
-@says_reach
+@_says_reach
 def three_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the four-step loop of three robots whose roles rotate.
 
@@ -212,7 +206,7 @@ def three_robot_loop(network: Network | Scene, robots: Sequence[str] = ()) -> Sc
     return robot_loop(network, robots or 3)
 
 
-@says_reach
+@_says_reach
 def modified_sequential(network: Network | Scene, robots: Sequence[str] = ()) -> Schedule:
     """Return the sequential method with a third support, chosen again after every brick.
 

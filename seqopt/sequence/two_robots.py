@@ -5,9 +5,13 @@ Roles (which robot places and which holds) are filled by reach or by name.
 
 from __future__ import annotations
 
+import math
+import typing
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from dataclasses import replace
+from functools import wraps
 from itertools import permutations
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -16,13 +20,112 @@ from scipy.sparse.csgraph import maximum_bipartite_matching
 from seqopt.arms._permits import within_reach
 from seqopt.arrays import Bools
 from seqopt.errors import StepError, did_you_mean
-from seqopt.network.build import network_of
+from seqopt.network.build import build_network, network_of
 from seqopt.network.network import Network, PartKind
-from seqopt.scene.parts import Brick, Robot, Side
+from seqopt.scene.parts import Brick, Reach, Robot, Side, Sphere
 from seqopt.scene.scene import Scene
-from seqopt.sequence._reach import says_reach
 from seqopt.sequence.schedule import acting_bodies, check_support
 from seqopt.sequence.steps import Step, StepKind, check_sequence
+
+_Make = TypeVar("_Make", bound=Callable[..., Any])
+ASKS = "extend a reach"  # of errors: what says so is answered by the reach that is enough
+_MM = 1000.0
+
+
+def _enough_reach(scene: Scene, exists: Callable[[Scene], bool]) -> Iterator[str]:
+    """Yield the least reach of one robot with which something exists, else of all; in words.
+
+    ``exists``: whether it does in a scene, which is the same save for what robots reach.
+    """
+    limited = [r for r in scene.robots if r.arm is None and isinstance(r.reach, Side | Sphere)]
+    alone = 0
+    for some in ([robot] for robot in limited):
+        if more := _least(scene, some, exists):
+            alone += 1
+            yield _said(some[0], more)
+    if not alone and len(limited) > 1 and (more := _least(scene, limited, exists)):
+        yield f"a reach that is {more:.6g} m longer of every robot that does not reach everything"
+
+
+def _said(robot: Robot, more: float) -> str:
+    """Return the reach of a robot that is enough, in words."""
+    if isinstance(robot.reach, Sphere):
+        radius = math.ceil(_MM * (robot.reach.radius + more) - 1e-6) / _MM
+        return f"a reach of {radius:.6g} m of {robot.name} ({robot.reach.radius:.6g} m now)"
+    return f"a reach of {robot.name} that is {more:.6g} m longer"
+
+
+def _least(scene: Scene, some: Sequence[Robot], exists: Callable[[Scene], bool]) -> float:
+    """Return how much longer some robots have to reach at least, in whole mm; zero if it is vain.
+
+    Only lengths at which one more node is reached make a difference.
+    """
+    lacks = {
+        math.ceil(_MM * lack - 1e-6) / _MM
+        for robot in some
+        for brick in scene.placed
+        for node in brick.nodes
+        if (lack := _lack(robot.reach, brick.node_position(node))) > 0
+    }
+    steps = sorted(lacks)
+    if not steps or not exists(_longer(scene, some, steps[-1])):
+        return 0.0
+    low, high = -1, len(steps) - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if exists(_longer(scene, some, steps[middle])) else (middle, high)
+    return steps[high]
+
+
+def _lack(reach: Reach, point: Sequence[float]) -> float:
+    """Return how far a point is out of reach, m."""
+    if isinstance(reach, Sphere):
+        return math.dist(reach.center, point) - reach.radius
+    if isinstance(reach, Side):
+        return float(np.dot(reach.toward, np.subtract(reach.point, point)))
+    return 0.0
+
+
+def _longer(scene: Scene, some: Sequence[Robot], more: float) -> Scene:
+
+    def changed(robot: Robot) -> Robot:
+        reach = robot.reach
+        if robot not in some:
+            return robot
+        if isinstance(reach, Sphere):
+            return replace(robot, reach=replace(reach, radius=reach.radius + more))
+        assert isinstance(reach, Side)
+        x, y, z = (p - more * t for p, t in zip(reach.point, reach.toward, strict=True))
+        return replace(robot, reach=replace(reach, point=(x, y, z)))
+
+    return scene.with_robots(*map(changed, scene.robots))
+
+
+def _says_reach(make: _Make) -> _Make:
+    """Return a method whose error that asks for a longer reach says which one is enough."""
+
+    @wraps(make)
+    def made(network: Network | Scene, robots: int | Sequence[str] = ()) -> object:
+        try:
+            return make(network, robots)
+        except StepError as error:
+            said = str(error)
+            if ASKS not in said:
+                raise
+            scene = network if isinstance(network, Scene) else network.scene
+
+        def exists(other: Scene) -> bool:
+            try:
+                make(build_network(other), robots)
+            except StepError:
+                return False
+            return True
+
+        ways = " or ".join(_enough_reach(scene, exists))
+        raise StepError(said.replace(ASKS, f"give {ways}") if ways else said)
+
+    return typing.cast(_Make, made)
+
 
 _Pair = tuple[int, int]  # who places, who holds meanwhile: indices of the scene's robots
 _Ways = dict[_Pair, tuple[int, tuple[_Pair, ...]]]  # by pair: changes so far, pairs so far
@@ -239,7 +342,7 @@ def placing_node(network: Network, robot: Robot, brick: Brick) -> int:
     return brick.placing_node if brick.placing_node in free else free[0]
 
 
-@says_reach
+@_says_reach
 def sequential(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[Step, ...]:
     """Two robots take turns: one places the next brick while the other holds the last one.
 
@@ -278,7 +381,7 @@ def sequential(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[St
     return _two_robots(network, "sequential", every, robots)
 
 
-@says_reach
+@_says_reach
 def cantilever(network: Network | Scene, robots: Sequence[str] = ()) -> tuple[Step, ...]:
     """One robot holds, the other places bricks up to one that lies along; then they swap.
 

@@ -9,11 +9,9 @@ import pytest
 
 import seqopt
 from seqopt.arms import find_postures
-from seqopt.arms._listing import reach_table
-from seqopt.arms._permits import permits, reachable, within_reach
+from seqopt.arms._permits import permits, reach_table, reachable, within_reach
 from seqopt.arms._reached import Site, reached_alone
-from seqopt.arms._stored import stored_table
-from seqopt.arms.table import _compute_table
+from seqopt.arms.reach import _compute_table, _stored_table
 from seqopt.errors import InfeasibleError, SceneError, StepError
 from seqopt.plan.judge._posture_rules import PostureRules, check_postures
 from seqopt.scene.scene import in_order
@@ -124,10 +122,10 @@ def test_a_table_is_the_same_each_time_in_any_order_and_from_a_folder(scene, tab
     assert _compute_table(site) == table
     assert find_postures(scene, tmp_path) is table
     (file,) = tmp_path.iterdir()
-    assert stored_table(tmp_path, site, lambda: pytest.fail("computed again")) == table
+    assert _stored_table(tmp_path, site, lambda: pytest.fail("computed again")) == table
     assert find_postures(in_order(scene, "reversed")) is table
     file.write_bytes(file.read_bytes()[:-50])  # damaged
-    assert stored_table(tmp_path, site, lambda: table) is table
+    assert _stored_table(tmp_path, site, lambda: table) is table
 
 
 def test_search_and_judge_ask_the_table_in_two_ways(tight):

@@ -12,8 +12,8 @@ import pytest
 import seqopt
 from seqopt.arms import _held, find_postures
 from seqopt.arms._held import held_postures
+from seqopt.arms._model import ArmModel
 from seqopt.arms._permits import permits
-from seqopt.arms._stiffness import grip_compliance
 from seqopt.engines.registry import make_engine
 from seqopt.errors import GripError, StepError
 from seqopt.plan.judge._posture_rules import check_postures
@@ -61,7 +61,7 @@ def by_joints(scene, grips):
             out.append(np.eye(3) / CRANE)
         elif node is not None:
             joints = table.joints[held.row(i, node)]
-            out.append(grip_compliance(robot.arm, joints)[:3, :3])
+            out.append(ArmModel(robot.arm).grip_compliance(joints)[:3, :3])
     return out
 
 
@@ -118,7 +118,7 @@ def arm_of(tmp_path, lengths, stiffness):
 
 def test_one_joint_gives_way_across_its_lever(tmp_path):
     """L² / k along the tangent and nothing else; 1 / k in turning, L / k between them."""
-    found = grip_compliance(arm_of(tmp_path, [1.5], (2e5,)), np.array([0.6]))
+    found = ArmModel(arm_of(tmp_path, [1.5], (2e5,))).grip_compliance(np.array([0.6]))
     tangent = np.array([-np.sin(0.6), np.cos(0.6), 0.0])
     assert found[:3, :3] == pytest.approx(1.5**2 / 2e5 * np.outer(tangent, tangent), abs=1e-18)
     assert found[:3, 5] == pytest.approx(1.5 / 2e5 * tangent, abs=1e-18)
@@ -127,7 +127,8 @@ def test_one_joint_gives_way_across_its_lever(tmp_path):
 
 def test_two_joints_add_what_each_does(tmp_path):
     first, second, (a, b) = 2e5, 5e4, (0.4, -1.1)
-    found = grip_compliance(arm_of(tmp_path, [1.0, 0.7], (first, second)), np.array([a, b]))
+    model = ArmModel(arm_of(tmp_path, [1.0, 0.7], (first, second)))
+    found = model.grip_compliance(np.array([a, b]))
     elbow = np.array([np.cos(a), np.sin(a)])
     tip = elbow + 0.7 * np.array([np.cos(a + b), np.sin(a + b)])
     turned = [np.array([-r[1], r[0]]) for r in (tip, tip - elbow)]

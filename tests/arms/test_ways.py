@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.arms._inverse import WAY, targets, way
 from seqopt.arms._model import ArmModel
-from seqopt.arms._reached import Site, reached_alone
-from seqopt.arms._stored import stored_table
-from seqopt.arms.reach import find_postures
+from seqopt.arms._reached import WAY, Site, reached_alone, targets, way
+from seqopt.arms.reach import _stored_table, find_postures
 from seqopt.errors import SceneError
 from seqopt.scene.arm import MOST, Arm
 from tests.arms.scenes import TOOL, two_arms
@@ -121,7 +119,7 @@ def test_two_arms_keep_apart_on_their_ways(scenes):
 @pytest.mark.slow
 def test_tables_with_ways_have_a_key_of_their_own(scenes, tables, tmp_path):
     for scene, table in zip(scenes, tables, strict=True):
-        kept = stored_table(tmp_path, Site.of(scene), lambda table=table: table)
+        kept = _stored_table(tmp_path, Site.of(scene), lambda table=table: table)
         assert (kept.joints == table.joints).all()
     assert len([*tmp_path.iterdir()]) == 2
 

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from seqopt._cli.commands.assess import Rows
 from seqopt._cli.main import main
-from seqopt._cli.rows import Rows
 from seqopt.errors import FileError
 from seqopt.scene.scene_file import load_scene, save_scene
 

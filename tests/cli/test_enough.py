@@ -10,7 +10,7 @@ import pytest
 import seqopt
 from seqopt.errors import InfeasibleError, StepError
 from seqopt.scene.parts import Side
-from seqopt.sequence._reach import enough_reach
+from seqopt.sequence.two_robots import _enough_reach
 
 ARCH = "arch:span=1.2,rise=0.5"
 CENTERS = ((0.2, -0.5, 0.4), (1.0, -0.5, 0.4), (0.6, 0.5, 0.4))
@@ -82,7 +82,7 @@ def test_a_reach_to_one_side_moves_by_as_much_as_is_enough():
     def exists(other):
         return all(other.within_reach(other.robots[0]))
 
-    (text,) = enough_reach(one, exists)
+    (text,) = _enough_reach(one, exists)
     (more,) = map(float, said(text, r"rob1 that is ([\d.]+) m longer"))
     for off, holds in ((0.0, True), (-0.001, False)):
         near = replace(far, point=(0.0, 0.5 - more - off, 0.0))
@@ -91,4 +91,4 @@ def test_a_reach_to_one_side_moves_by_as_much_as_is_enough():
 
 
 def test_where_no_reach_helps_none_is_named():
-    assert [*enough_reach(reaching(0.7, 0.7, 0.7), lambda _: False)] == []
+    assert [*_enough_reach(reaching(0.7, 0.7, 0.7), lambda _: False)] == []

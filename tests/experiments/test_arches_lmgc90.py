@@ -35,7 +35,7 @@ from seqopt.engines.discrete._system import BedStiffness
 from seqopt.engines.discrete.engine import Across, Pinch
 from seqopt.network.network import GROUND
 from seqopt.sequence.two_robots import sequential
-from seqopt.study._discrete_arches import error, moved
+from seqopt.study._yardstick import error, moved
 from seqopt.study.published import STUDY_BED, STUDY_PADS
 
 PYTHON = python_with_lmgc90(os.environ.get("SEQOPT_LMGC90", sys.executable))

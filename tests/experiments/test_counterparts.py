@@ -10,8 +10,7 @@ import pytest
 
 from experiments.study.paper_counterparts import KNOWN, faults
 from experiments.study.parts.counterpart_page import page
-from seqopt._paper.agreement import AGREES, DISAGREES, PARTLY, TITLES, verdict
-from seqopt._paper.items import ITEMS
+from seqopt._paper.items import AGREES, DISAGREES, ITEMS, PARTLY, TITLES, verdict
 from seqopt._paper.rows import COUNTERPARTS, cell, ours, tabulate
 from tests.builders import ROOT
 

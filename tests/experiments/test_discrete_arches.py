@@ -26,7 +26,7 @@ from experiments.discrete.parts.arch_pads import (
 from experiments.harness.results import RESULTS
 from seqopt.engines.discrete.engine import Across, Pinch, _pad_stiffness
 from seqopt.sequence.two_robots import sequential
-from seqopt.study._discrete_arches import STEPS, error, moved
+from seqopt.study._yardstick import STEPS, error, moved
 from seqopt.study.published import STUDY_PADS, printed
 
 

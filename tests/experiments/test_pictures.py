@@ -18,7 +18,7 @@ from tests.quality.engine_limits import picture as limits_picture
 DRAWN = {name: draw for claim in claims().values() for name, draw in claim.pictures.items()}
 DRAWN["engine_limits.png"] = limits_picture
 LONG = {"calibration.png", "outside_assemblies.png", "dry_map.png", "decision_sensitivity.png"}
-DAILY = ("frame_contrast.png", "soft_grips.png", "four_arms.png")
+DAILY = ("soft_grips.png", "four_arms.png")
 ELSEWHERE = {"report.png", "half_built.png"}  # of a browser
 TOUCHING = 1.5  # pixels that texts may share
 
@@ -82,10 +82,10 @@ def test_stored_figures_are_of_this_style():
 
 def test_redraw_writes_figures_and_runs_nothing(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("experiments.harness.results.FIGURES", tmp_path)
-    claim = claims()["frame_contrast"]
+    claim = claims()["soft_grips"]
     claim.main(["--redraw"])
     assert [path.name for path in tmp_path.iterdir()] == [*claim.pictures]
-    assert capsys.readouterr().out == "drawn: frame_contrast.png\n"  # and no verdict
+    assert capsys.readouterr().out == "drawn: soft_grips.png\n"  # and no verdict
 
 
 @styled

@@ -15,7 +15,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.layers.layers import candidate_layers, robot_use, steps_over, travel
+from seqopt.graph.layers.layers import candidate_layers, steps_over, travel
 from seqopt.network.build import build_network
 from seqopt.plan.calling.formulation import (
     End,
@@ -390,4 +390,4 @@ def test_budgets_of_the_reference_arch(problem25):
         flow = ALL["overlap_lp"].solve(capped).bound
         assert relaxed.bound == pytest.approx(flow, rel=1e-5)
     with pytest.raises(ProblemError, match="name it in `also`"):
-        robot_use(problem25, "rob9", 100.0, 1.0)
+        steps_over(problem25, "F_rob9", 100.0, 1.0)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seqopt.graph import Graph
-from seqopt.graph._lazy import FAILS, PASSES, lazy_path
+from seqopt.graph.paths import FAILS, PASSES, _lazy_path
 from tests.random_graphs import graphs, simple_paths
 
 
@@ -26,7 +26,7 @@ def sought(graph, passes, parts, *, recalls=False):
     def recall(part, rows):
         return np.where(passes[rows], 0, FAILS * recalls)
 
-    return lazy_path(graph, parts, known, ask, recall), known, asked
+    return _lazy_path(graph, parts, known, ask, recall), known, asked
 
 
 @given(graph=graphs(), data=st.data(), recalls=st.booleans())
@@ -73,7 +73,7 @@ def test_who_never_knows_leaves_no_path():
     def unsure(part, rows):
         return np.zeros(len(rows), dtype=np.int64)
 
-    assert lazy_path(graph, np.arange(2), known, unsure, unsure) is None
+    assert _lazy_path(graph, np.arange(2), known, unsure, unsure) is None
     assert known.tolist() == [PASSES, FAILS]
 
 
@@ -89,5 +89,5 @@ def test_it_tells_before_every_path(told):
     def ask(part, rows):
         return np.where(rows > told, PASSES, FAILS)
 
-    lazy_path(graph, np.arange(4), known, ask, lambda _, rows: 0 * rows, lambda: count.append(1))
+    _lazy_path(graph, np.arange(4), known, ask, lambda _, rows: 0 * rows, lambda: count.append(1))
     assert len(count) == (2 if told == 0 else 4)

@@ -12,9 +12,8 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SeqoptError, SolverError, StepError
 from seqopt.graph.states.states import build_states, within
 from seqopt.network.build import build_network
-from seqopt.plan._front_states import StateFront
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, find_formulation
-from seqopt.plan.front import FrontSelection, find_front
+from seqopt.plan.front import FrontSelection, _StateFront, find_front
 from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
@@ -96,7 +95,7 @@ def test_problems_go_to_their_own_formulations(plan):
     with pytest.raises(ProblemError, match=r"are asked for; use .*schedule_search"):
         solve(plan.graph, "minimax")
     with pytest.raises(ProblemError, match="and Pareto sets are asked for; use pareto_zones"):
-        find_front(StateFront(posed("F_largest")), "schedule_search")
+        find_front(_StateFront(posed("F_largest")), "schedule_search")
     with pytest.raises(ProblemError, match="layers of candidates are asked for"):
         solve(object(), find_formulation("schedule_search"))
 
@@ -142,7 +141,7 @@ class Changed:
 def front_of(engine25):
     """Return the checked front of a changed answer."""
     problem = build_states(engine25, FreeRules(), ONES, "F_largest,M_sup")
-    front = StateFront(problem, {"F_largest": 20.0, "M_sup": 2.0})
+    front = _StateFront(problem, {"F_largest": 20.0, "M_sup": 2.0})
 
     def judged(change):
         formulation = Formulation(
@@ -189,7 +188,7 @@ def test_a_set_that_was_not_finished_says_so(front_of):
 
 
 def test_what_differs_by_rounding_alone_is_no_other_point():
-    front = find_front(StateFront(posed("F_largest,M_sup,T_max,D_max")))
+    front = find_front(_StateFront(posed("F_largest,M_sup,T_max,D_max")))
     points = front.table[["F_largest", "M_sup", "T_max", "D_max"]].to_numpy()
     assert len(points) == len(
         np.unique(np.array([[f"{x:.8e}" for x in p] for p in points]), axis=0)

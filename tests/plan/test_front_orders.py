@@ -11,7 +11,7 @@ import pytest
 import seqopt
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph import orders
-from seqopt.plan import _front_states
+from seqopt.plan import front as fronts
 from seqopt.plan.calling.formulation import find_formulation
 from seqopt.plan.front import FrontSelection, find_front
 from seqopt.plan.solving import graph_of
@@ -90,10 +90,10 @@ def test_that_no_order_has_a_plan_is_proven():
 
 
 def test_what_does_not_fit_is_one_line(monkeypatch):
-    monkeypatch.setattr(_front_states, "free_memory", lambda: 0.0)
+    monkeypatch.setattr(fronts, "free_memory", lambda: 0.0)
     with pytest.raises(ProblemError, match="do not fit the memory; give an order"):
         find_front(posed(AIMS[0], orders="tied"))
-    monkeypatch.setattr(_front_states, "free_memory", lambda: np.inf)
-    monkeypatch.setattr(_front_states, "MOST_PARTS", 3)
+    monkeypatch.setattr(fronts, "free_memory", lambda: np.inf)
+    monkeypatch.setattr(fronts, "MOST_PARTS", 3)
     with pytest.raises(orders.TooManySetsError, match="more than 3 sets of bricks; give an order"):
         find_front(posed(AIMS[0], orders="tied"))

@@ -15,9 +15,8 @@ from formulations.states.schedule_search import FORMULATION as PLAN
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.graph.states.states import build_states
-from seqopt.plan._front_states import StateFront
 from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.front import FrontSelection, find_front
+from seqopt.plan.front import FrontSelection, _StateFront, find_front
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import parse_goals
@@ -40,13 +39,13 @@ def order(**words):
 
 
 def front(**words):
-    return StateFront(free(**words))
+    return _StateFront(free(**words))
 
 
 def loop(limits=()):
     engine = free().engine
     schedule = seqopt.three_robot_loop(engine.network)
-    return StateFront(build_states(engine, schedule, ONES, "F_largest,M_sup", limits))
+    return _StateFront(build_states(engine, schedule, ONES, "F_largest,M_sup", limits))
 
 
 KINDS = {

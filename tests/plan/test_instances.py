@@ -13,7 +13,7 @@ import seqopt
 from formulations.solvers import _solve_file
 from seqopt._cli.main import main
 from seqopt.errors import FileError, ProblemError, SolverError
-from seqopt.plan._bare._instances import able
+from seqopt.plan._states import able
 from seqopt.sequence.rules import with_robots
 from tests.builders import small_arch
 

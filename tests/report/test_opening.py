@@ -11,8 +11,8 @@ import pytest
 
 from seqopt.problem.criteria import WORST_OVER_METHODS
 from seqopt.problem.requirements import SceneFacts
-from seqopt.report._opening._says import deciding_step, in_a_sentence, worst_along
 from seqopt.report.page import Build, report_page
+from seqopt.report.text import _deciding_step, _in_a_sentence, _worst_along
 from seqopt.responses.table import Departure, analyze
 from seqopt.sequence.two_robots import sequential
 from seqopt.stability._builds import BuildVerdicts
@@ -46,14 +46,14 @@ def dry(*wrong, verdict=FALLS):
 def test_one_sentence_says_what_can_be_acted_on(engine25, table):
     scene = engine25.network.scene
     off = np.full(49, 3.12e-4)
-    said = in_a_sentence(scene, table, [dry()], (), off)
+    said = _in_a_sentence(scene, table, [dry()], (), off)
     assert said == (
         "2 robots build arch25 in 49 steps; all within payload, 95 % at most (robot 1 in step 26); "
         "every step stands, dry; rigid grips may be 310 µm off."
     )
-    assert "; whether its steps stand was not asked." in in_a_sentence(scene, table)
-    assert "may not be off at all in step 1." in in_a_sentence(scene, table, [dry()], (), 0 * off)
-    unknown = in_a_sentence(scene, table, [dry(3, 4, verdict=OPEN)])
+    assert "; whether its steps stand was not asked." in _in_a_sentence(scene, table)
+    assert "may not be off at all in step 1." in _in_a_sentence(scene, table, [dry()], (), 0 * off)
+    unknown = _in_a_sentence(scene, table, [dry(3, 4, verdict=OPEN)])
     assert "of 2 steps it is not known whether they stand dry" in unknown
     assert "every step" not in unknown
 
@@ -61,48 +61,48 @@ def test_one_sentence_says_what_can_be_acted_on(engine25, table):
 def test_what_cannot_be_built_is_said_first(engine25, table):
     scene, over = engine25.network.scene, table.copy()
     over.loc[46, "F_rob2_N"] = 500.0
-    said = in_a_sentence(scene, over, [dry(9, 12)], (), np.ones(49))
+    said = _in_a_sentence(scene, over, [dry(9, 12)], (), np.ones(49))
     assert said == (
         "Not buildable: payload exceeded in 1 of 49 steps, first in step 47 (robot 2 would hold up "
         "to 500 N and can hold 392.4 N); dry, 2 of 49 steps fall, the first is step 9 (brick 7, "
         "joint 6-7)."
     )
     known = [dry(9), BuildVerdicts("epoxy", (STANDS,) * 49)]
-    said = in_a_sentence(scene, table, known)
+    said = _in_a_sentence(scene, table, known)
     assert said.startswith("2 robots build arch25 in 49 steps; ")  # with the mortar of the scene
     assert "; dry, step 9 falls (brick 7, joint 6-7); every step stands with epoxy." in said
-    arms = in_a_sentence(scene, table, known, faults=["rob1 reaches no posture (step 3)"])
+    arms = _in_a_sentence(scene, table, known, faults=["rob1 reaches no posture (step 3)"])
     assert arms.startswith("Not buildable: rob1 reaches no posture (step 3); ")
-    left = in_a_sentence(scene, table, known, [Departure("rotation", "1 rad, too much", (3,))])
+    left = _in_a_sentence(scene, table, known, [Departure("rotation", "1 rad, too much", (3,))])
     assert left.startswith("Outside the linear range: rotation of up to 1 rad, too much (step 3).")
 
 
 def test_the_step_that_decides_is_never_one_that_nobody_holds(engine25, table):
     scene = engine25.network.scene
     shares = [table[f"F_rob{k}_N"].abs().max() for k in (1, 2)]
-    assert deciding_step(scene, table, ()) == 25
+    assert _deciding_step(scene, table, ()) == 25
     assert table.loc[25, "F_rob1_N"] == max(shares)
     last = np.arange(49.0)
-    assert deciding_step(scene, table, (), last) == 47  # in the last one all let go
-    assert deciding_step(scene, table, [dry(9)], last) == 8
+    assert _deciding_step(scene, table, (), last) == 47  # in the last one all let go
+    assert _deciding_step(scene, table, [dry(9)], last) == 8
     assert (
-        deciding_step(scene, table, [dry(9), dry()], last) == 47
+        _deciding_step(scene, table, [dry(9), dry()], last) == 47
     )  # it stands with the last mortar
     over = table.copy()
     over.loc[[3, 30], "F_rob1_N"] = 500.0
-    assert deciding_step(scene, over, [dry(9)], last) == 3
+    assert _deciding_step(scene, over, [dry(9)], last) == 3
 
 
 def test_the_worst_along_a_build_is_that_of_its_aim(engine25, table):
     scene, criterion = engine25.network.scene, WORST_OVER_METHODS.for_scene(SceneFacts(engine25))
-    ratios = worst_along(scene, table, "minmax", criterion)
+    ratios = _worst_along(scene, table, "minmax", criterion)
     terms = dict(criterion.limits)
     at = int(ratios.argmax())
     assert ratios[at] == pytest.approx(1e-6 * table["D_max_1e-3mm"][at] / terms["D_max"])
     assert at == 46
-    tensions = worst_along(scene, table, "T_max", criterion)
+    tensions = _worst_along(scene, table, "T_max", criterion)
     np.testing.assert_allclose(tensions, table["F_max_N"])
-    assert worst_along(scene, table, "steps", criterion) is None
+    assert _worst_along(scene, table, "steps", criterion) is None
 
 
 @pytest.fixture

@@ -18,8 +18,7 @@ from seqopt.plan.calling.formulation import On, formulations
 from seqopt.plan.solving import layers_of
 from seqopt.problem.problem import Aim
 from seqopt.report._speed._chart import PALE, speed_chart
-from seqopt.report._speed._measure import Timer, speed_accuracy
-from seqopt.report._speed._reference import Reference
+from seqopt.report._speed._measure import Reference, Timer, speed_accuracy
 from seqopt.report._speed._table import CUT, DONE, SAME, SpeedTable, dominated
 from seqopt.sequence.schedule_file import find_schedule
 from tests.builders import small_arch

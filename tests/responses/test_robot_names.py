@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from seqopt._cli.main import main
 from seqopt._cli.values import parse_criterion, parse_limits
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.layers import candidate_layers, robot_use
+from seqopt.graph.layers.layers import candidate_layers, steps_over
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
 from seqopt.problem.requirements import Limit, payload_limits
@@ -110,7 +110,7 @@ def test_limits_and_budgets_mean_the_robot(name):
     assert limits[1] == Limit(robot_response(name), 20.0)
     problem = posed(scene, EQUATIONS, limits=limits, also=(robot_response(name),))
     own = [step.responses[robot_response(name)] for step in problem.evaluation.steps]
-    budget = robot_use(problem, name, 0.0, 99.0)
+    budget = steps_over(problem, robot_response(name), 0.0, 99.0)
     assert sum(a.sum() for a in (*budget.single, *budget.shared)) == sum((a > 0).sum() for a in own)
 
 

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from seqopt.errors import SceneError
-from seqopt.scene._fitting import which_fit
+from seqopt.scene._checks import which_fit
 from seqopt.scene.scene_file import load_scene
 
 

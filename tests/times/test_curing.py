@@ -13,7 +13,7 @@ import seqopt
 from seqopt.contact.curing import Curing, _find_curing
 from seqopt.errors import InfeasibleError, ProblemError, SceneError, SolverError, StepError
 from seqopt.plan._status import Status
-from seqopt.plan.judge._mortar.check import check_cured
+from seqopt.plan.judge._mortar_check import check_cured
 from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.problem.standing import Standing
 from seqopt.sequence.rules import FreeRules, with_robots

@@ -14,7 +14,7 @@ import seqopt
 from seqopt.contact.curing import _find_curing
 from seqopt.engines.interface import Want
 from seqopt.errors import SceneError
-from seqopt.plan._aged import SHARE, _softened, aged_table
+from seqopt.plan._times import SHARE, _softened, aged_table
 from seqopt.sequence._timing import step_times
 from seqopt.sequence.steps import Step, StepKind
 from tests.builders import small_arch

@@ -27,7 +27,7 @@ from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network._mechanics import node_motion
 from seqopt.network.network import GROUND, Network
-from seqopt.study._discrete_arches import error, inner_nodes, moved
+from seqopt.study._yardstick import error, inner_nodes, moved
 from seqopt.study.published import STUDY_BED, STUDY_PADS
 
 PAD = 0.02  # m, side of the square that a pad touches: not printed

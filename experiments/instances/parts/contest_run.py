@@ -19,7 +19,7 @@ from seqopt import judge_instance, save_instance, solve
 from seqopt.errors import SeqoptError
 from seqopt.graph.instances.instance import Instance
 from seqopt.graph.paths import fewest_moves, reached
-from seqopt.plan._bare._instances import _claims, able
+from seqopt.plan._states import _claims, able
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import find_formulation
 

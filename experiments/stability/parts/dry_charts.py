@@ -10,26 +10,6 @@ from experiments.harness.charts import note, subplots
 from seqopt.contact.mortar import EPOXY
 from seqopt.report._style import GRAY, SMALL, dress, looks, name_panels, plain, styled
 
-
-@styled
-def grips_chart(table: pd.DataFrame) -> Figure:
-    figure, (share, work) = subplots(3.4, 1, 2)
-    for name, style in looks(table["case"].unique()).items():
-        rows = table[table["case"] == name]
-        line = style.line() | {"lw": 1.1, "ms": 4, "label": name}
-        share.plot(rows["bricks"], 100 * rows["stand"] / rows["sets"], **line)
-        work.semilogy(rows["bricks"], rows["solved"].clip(lower=1), **line)
-    sets = table.drop_duplicates("bricks")
-    work.semilogy(sets["bricks"], sets["sets"], color=GRAY, lw=2, label="all sets of grips")
-    share.set(xlabel="bricks placed", title="sets of grips that stand [%]", ylim=(0, 104))
-    work.set(xlabel="bricks placed", title="linear programs solved")
-    plain(work.yaxis)
-    dress(share, work)
-    name_panels(share, work)
-    figure.legend(*work.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    return figure
-
-
 DARK = 0.52  # from where figures are white
 LARGEST = 0.7  # payload over the arch's weight at the end of the scale
 

@@ -7,8 +7,7 @@ import textwrap
 
 import pandas as pd
 
-from seqopt._paper.agreement import AGREES, DISAGREES, PARTLY, TITLES, stated, verdict
-from seqopt._paper.items import ITEMS, Item
+from seqopt._paper.items import AGREES, DISAGREES, ITEMS, PARTLY, TITLES, Item, stated, verdict
 
 INTRODUCTION = """\
 ## Every figure and table

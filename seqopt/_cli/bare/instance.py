@@ -17,7 +17,7 @@ from seqopt._cli.values import number_word
 from seqopt._cli.words.given import file_name, take
 from seqopt.errors import ProblemError
 from seqopt.graph.instances._files import WRITERS, save_instance
-from seqopt.plan._bare._compiled import compile_instance
+from seqopt.plan._compiled import compile_instance
 from seqopt.plan.calling.formulation import find_formulation
 from seqopt.plan.judge._bare._claims import first_stage
 

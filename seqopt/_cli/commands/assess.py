@@ -1,16 +1,21 @@
-"""The command ``assess``: does every step stand, and with what margins."""
+"""The command ``assess``: does every step stand, with what margins, and how much load it bears."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
-from seqopt._cli.loading import LOADS, answer_load_factor
 from seqopt._cli.mapping import MAP, answer_map
 from seqopt._cli.options import (
     BUILT,
@@ -24,20 +29,126 @@ from seqopt._cli.options import (
     scene_options,
     steps_options,
 )
-from seqopt._cli.outputs import keep_apart, put_table
-from seqopt._cli.rows import Rows
+from seqopt._cli.outputs import keep_apart, put_table, require_out, write_outputs
 from seqopt._cli.screens import question
 from seqopt._cli.values import MOST_WORKERS, asked_mortar, count_word
+from seqopt._cli.words.given import plan_name
+from seqopt._files import csv_text, read_text
+from seqopt._showing import PAGE
 from seqopt.contact.mortar import Mortar
-from seqopt.engines.registry import versions
-from seqopt.errors import ProblemError
+from seqopt.engines.registry import USUAL, make_engine, versions
+from seqopt.errors import FileError, ProblemError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
+from seqopt.report._failures import load_page
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.steps import Step
+from seqopt.stability._load_factor import format_load_factors, load_factor_table, load_factors
 from seqopt.stability._step_verdicts import each_stability, find_margins, format_rows, stability_row
 from seqopt.stability.assessment import MARGINS, Verdict
 from seqopt.work.progress import with_progress
+
+LOADS = {
+    "--load-factor": "find the largest multiple of the scene's loads (forces on bricks and wind, "
+    "weights as they are) with which every step stands, and how it gives way then; --out is a "
+    "folder"
+}
+
+
+def answer_load_factor(options: argparse.Namespace) -> Answer:
+    """Answer how much load every step of a sequence bears."""
+    scene = asked_scene(options)
+    require_out(options)
+    network = build_network(scene)
+    steps = asked_steps(options, network)
+    found = load_factors(network, steps, asked_mortar(options), options.tell)
+    table, said = load_factor_table(steps, found), format_load_factors(steps, found)
+
+    def files() -> dict[str, bytes | str]:
+        engine = make_engine(USUAL, network, None)
+        page = load_page(engine, plan_name(options), steps, found, said)
+        return {"load_factors.csv": csv_text(table), PAGE: page}
+
+    written = write_outputs(options, files)
+    where = f"; written to {options.out}; {options.out / PAGE} shows how steps give way"
+    failing = (table["load_factor"] < 1) | (table["unloaded"] != "stands")
+    unsure = table["step"][table["load_factor"].isna() & (table["load_N"] > 0)]
+    unproven = f"seqopt: solver failed: steps {', '.join(map(str, unsure))} are not proven"
+    status = Status.DOES_NOT_HOLD if np.any(failing) else Status.DONE
+    return Answer(
+        facts={"scene": scene_facts(scene), "versions": versions(), "steps": table},
+        text=said + where if written else "",
+        data="" if written else csv_text(table),
+        written=written,
+        failures=(unproven,) if len(unsure) else (),
+        status=Status.FAILED if len(unsure) else status,
+    )
+
+
+Row = dict[str, object]
+
+
+class Rows:
+    """Rows beside the file that they are for, until it is written.
+
+    ``asked``: what determines the rows; those of anything else are not taken up.
+    """
+
+    def __init__(self, out: Path | None, asked: object) -> None:
+        self.path = None if out is None else out.with_name(f"{out.name}.part")
+        self._mark = sha256(repr(asked).encode()).hexdigest()
+        self.rows = [*self._earlier()]
+        self.taken_up = len(self.rows)
+
+    def _earlier(self) -> Iterator[Row]:
+        """Yield the rows of an earlier run that asked the same; a line cut short ends them."""
+        if self.path is None or not self.path.exists():
+            return
+        mark, *lines = read_text(self.path).splitlines() or [""]
+        if mark != self._mark:
+            return
+        for line in lines:
+            try:
+                yield json.loads(line)
+            except ValueError:
+                return
+
+    def add(self, row: Row) -> None:
+        """Add a row, and keep it."""
+        self.rows.append(row)
+        if self.path is None:
+            return
+        fresh = len(self.rows) == self.taken_up + 1
+        kept = self.rows if fresh else [row]
+        lines = [json.dumps(each, default=_plain) for each in kept]
+        try:
+            if fresh:  # what was cut short is not kept
+                self.path.write_text("\n".join([self._mark, *lines, ""]), encoding="utf-8")
+            else:
+                with self.path.open("a", encoding="utf-8") as stream:
+                    stream.write(f"{lines[0]}\n")
+        except OSError as error:
+            wrong = f"cannot write {self.path}: {error.strerror or error}"
+            raise FileError(wrong) from error
+
+    def where(self, total: int, what: str) -> str:
+        """Return where the rows found so far are, for whoever ended the run; empty if nowhere."""
+        if self.path is None or not self.rows:
+            return ""
+        found = f"{len(self.rows)} of {total} {what}"
+        return f"{found} are in {self.path}; the same command goes on from there"
+
+    def done(self) -> None:
+        """Let go of what was kept: the table is written."""
+        if self.path is not None:
+            with suppress(OSError):
+                self.path.unlink(missing_ok=True)
+
+
+def _plain(number: Any) -> object:
+    """Return a number of NumPy as one of Python."""
+    return number.item()
+
 
 DESCRIPTION = (
     "Prove of every step of a sequence that it stands, or that it does not, as rigid bricks whose "

@@ -209,7 +209,6 @@ def _fixed(result: Comparison) -> list[str]:
 
 
 def _where(folder: Path, *, speed: bool) -> str:
-    """Return which file of a folder is for what."""
     timed = "\n  speed.csv: a row per engine and formulation" * speed
     return (
         f"written to {folder}\n"

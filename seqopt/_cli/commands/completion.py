@@ -72,7 +72,6 @@ def _completed(whole: argparse.ArgumentParser) -> argparse.ArgumentParser:
 
 
 def _commands(whole: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
-    """Yield the parsers of all commands."""
     for action in whole._actions:
         if isinstance(action, argparse._SubParsersAction):
             yield from action.choices.values()

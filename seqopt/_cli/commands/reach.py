@@ -14,7 +14,7 @@ from seqopt._cli.outputs import figure_notes, require_out, write_outputs
 from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
-from seqopt.arms._listing import find_table, reach_table
+from seqopt.arms._permits import find_table, reach_table
 from seqopt.arms.reach import find_postures
 from seqopt.scene.scene import Scene
 
@@ -63,7 +63,7 @@ def _files(scene: Scene, table: pd.DataFrame) -> dict[str, bytes | str]:
     files["postures.csv"] = csv_text(find_table(scene).table())
     if figure_notes():
         return files
-    from seqopt.report._reach import reach_picture  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report._pictures import reach_picture  # noqa: PLC0415  # matplotlib is an extra
     from seqopt.report._style import picture_files  # noqa: PLC0415
 
     return files | picture_files("reach", reach_picture(table))

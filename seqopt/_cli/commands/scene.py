@@ -18,7 +18,7 @@ from seqopt._files import write_text
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report._scene_page import scene_page
-from seqopt.scene.holders._props import Prop
+from seqopt.scene._props import Prop
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, dump_scene, load_scene
@@ -96,7 +96,6 @@ def _network_facts(network: Network) -> dict[str, object]:
 
 
 def _list(options: argparse.Namespace) -> Answer:
-    """Return all built-in scenes and kinds of scenes."""
     found = {
         name: load_scene(name)
         for name in with_progress("reading built-in scenes", builtin_scenes(), options.tell)
@@ -114,7 +113,6 @@ def _list(options: argparse.Namespace) -> Answer:
 
 
 def _bears(prop: Prop) -> str:
-    """Return what a prop bears, in words."""
     out = _grip(prop).replace(", grip of", ":", 1) or ": rigid"
     if prop.direction is not None:
         out += ", pushes along ({:g}, {:g}, {:g}) only".format(*prop.direction)
@@ -137,7 +135,6 @@ def _grip(robot: Robot | Prop) -> str:
 
 
 def _described(scene: Scene, facts: dict[str, Any]) -> Iterator[str]:
-    """Yield what is in a scene, line by line."""
     yield size_line(scene)
     yield f"network: {facts['nodes']} nodes, {facts['edges']} edges"
     for robot in scene.robots:

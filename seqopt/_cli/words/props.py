@@ -8,7 +8,7 @@ from dataclasses import replace
 from seqopt._cli.values import number_word
 from seqopt.errors import SceneError, did_you_mean
 from seqopt.scene._checks import short
-from seqopt.scene.holders._props import Prop
+from seqopt.scene._props import Prop
 from seqopt.scene.scene import Scene
 
 _HOW = "give nodes, as 13,27, or every; then as 13:1e6 (N/m), and after a comma push, capacity=300"
@@ -38,7 +38,6 @@ def parse_props(text: str, scene: Scene, where: str = "--props") -> tuple[Prop, 
 
 
 def _placed(word: str, scene: Scene, where: str) -> Sequence[Prop]:
-    """Return the props of one word."""
     place, colon, stiffness = word.partition(":")
     own = number_word(stiffness, where) if colon else None
     if place == "every":

@@ -105,7 +105,6 @@ class DiscreteEngine(SerialEngine):
         return [self._solve_one(self._systems[bricks], *one) for one in each]
 
     def _solve_one(self, system: System, columns: Ints, hands: Hands | None) -> Fields:
-        """Return the fields of one grip set."""
         network, pinch, inner = self._network, self._pinch, self._network.inner.ravel()[columns]
         nodes = network.node_position[inner]
         springs: list[_Spring] = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,11 +79,7 @@ class LayeredCosts(FrozenValue):
         return [shared + single for shared, single in zip(self.shared, self.single, strict=True)]
 
     def parts(self, choice: Sequence[int]) -> list[float]:
-        """Return the costs that a choice meets.
-
-        ``choice``: a candidate for every move. Result: move by move, the single cost and the one
-        shared with the move before.
-        """
+        """Return what a choice meets, by move: its cost, and that shared with the move before."""
         out, before = [], 0
         for single, shared, now in zip(self.single, self.shared, choice, strict=True):
             out += [float(single[now]), float(shared[before, now])]
@@ -91,17 +87,11 @@ class LayeredCosts(FrozenValue):
         return out
 
     def cost(self, choice: Sequence[int]) -> float:
-        """Return the total cost of a choice.
-
-        ``choice``: a candidate for every move. Result: infinite if the choice is not allowed.
-        """
+        """Return the total cost of a choice; infinite if it is not allowed."""
         return sum(self.parts(choice))
 
     def worst(self, choice: Sequence[int]) -> float:
-        """Return the largest cost that a choice meets.
-
-        ``choice``: a candidate for every move. Result: infinite if the choice is not allowed.
-        """
+        """Return the largest cost that a choice meets; infinite if it is not allowed."""
         return max(self.parts(choice))
 
     def continuable(self) -> tuple[Bools, ...]:
@@ -176,10 +166,7 @@ class Budget(FrozenValue):
         return LayeredCosts(self.single, self.shared)
 
     def spent(self, choice: Sequence[int]) -> float:
-        """Return what a choice takes of the budget.
-
-        ``choice``: a candidate for every move. Result: in the unit of the budget.
-        """
+        """Return what a choice takes of the budget, in its unit."""
         return self.amounts.cost(choice)
 
     def slack(self, choice: Sequence[int]) -> float:
@@ -208,10 +195,7 @@ class Joined:
         self._least = np.inf
 
     def add(self, moves: tuple[int, ...], costs: Floats) -> None:
-        """Join the costs of a step.
-
-        ``moves``: open in it: one, or two neighboring ones; ``costs`` ((C,) or (C, D) float).
-        """
+        """Join the costs, (C,) or (C, D), of a step with one open move, or two neighboring ones."""
         finite = costs[np.isfinite(costs)]
         self._least = min(self._least, float(finite.min(initial=np.inf)))
         before = self._found.get(moves)
@@ -227,10 +211,7 @@ class Joined:
         return self._of((move,), (self._sizes[move],))
 
     def layered(self) -> LayeredCosts:
-        """Return the costs of single choices and of pairs.
-
-        Result: pairs of moves that share no step take no memory.
-        """
+        """Return the costs of choices and pairs; moves that share no step take no memory."""
         pairs = zip([1, *self._sizes[:-1]], self._sizes, strict=True)
         shared = tuple(self._of((k - 1, k), pair) for k, pair in enumerate(pairs))
         return LayeredCosts(tuple(map(self.single, range(len(self._sizes)))), shared)
@@ -240,3 +221,37 @@ class Joined:
             return self._found[moves]
         nothing = self._join is np.add or np.isinf(self._least)
         return np.broadcast_to(0.0 if nothing else self._least, shape)
+
+
+def _array_by_array(made: Callable[..., Floats], *costs: LayeredCosts | Budget) -> LayeredCosts:
+    """Return the costs that a function makes of several, given the arrays of one place at once."""
+    single = tuple(map(made, *(each.single for each in costs)))
+    return LayeredCosts(single, tuple(map(made, *(each.shared for each in costs))))
+
+
+def _where_allowed(costs: LayeredCosts, amounts: LayeredCosts | Budget) -> LayeredCosts:
+    """Return amounts of choices that are allowed by costs; the others are infinite."""
+
+    def taken(cost: Floats, amount: Floats) -> Floats:
+        return np.where(np.isfinite(cost), amount, np.inf)
+
+    return _array_by_array(taken, costs, amounts)
+
+
+def _least_to_go(arcs: Sequence[Floats]) -> list[Floats]:
+    """Return the least sum of arcs to the end, from the source, (1,), and every candidate (C_k,).
+
+    ``arcs`` (sequence of (C_{k-1}, C_k) float): as of `LayeredCosts.arcs`.
+    """
+    rest = [np.zeros(arcs[-1].shape[1])]
+    for arc in reversed(arcs):
+        rest.insert(0, (arc + rest[0]).min(axis=1))
+    return rest
+
+
+def _least_path(arcs: Sequence[Floats], rest: Sequence[Floats]) -> tuple[int, ...]:
+    """Return the choice whose arcs add up to least; ``rest`` as of `_least_to_go`."""
+    choice: list[int] = []
+    for arc, ahead in zip(arcs, rest[1:], strict=True):
+        choice.append(int(np.argmin(arc[choice[-1] if choice else 0] + ahead)))
+    return tuple(choice)

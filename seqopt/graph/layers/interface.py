@@ -118,22 +118,13 @@ class CostProblem(FrozenValue):
         return np.asarray(self.sums.shared[move][before])
 
     def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
-        """Return the choice: candidates are their own names.
-
-        ``choice``: a candidate for every move.
-        """
+        """Return the choice: candidates are their own names."""
         return tuple(choice)
 
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
-        """Return no steps.
-
-        ``choice``: a candidate for every move. Result: empty.
-        """
+        """Return no steps, whatever the choice."""
         return ()
 
     def seconds(self, aim: Aim) -> Mapping[str, float]:
-        """Return no times: the costs are given.
-
-        ``aim``: sums or peaks. Result: empty.
-        """
+        """Return no times: the costs are given."""
         return {}

@@ -221,10 +221,7 @@ class Layers(Shown):
         return replace(choices, moves=(move - 1, move), responses=responses)
 
     def seconds(self, aim: Aim) -> Mapping[str, float]:
-        """Return what computing the costs of an aim took.
-
-        ``aim``: sums or peaks. Result: ``respond`` (responses) and ``rank`` (costs), s.
-        """
+        """Return how long responses (``respond``) and costs (``rank``) of an aim took, s."""
         ranked = self._sums[1] if aim is Aim.SUM else self._peaks[1]
         return {"respond": self.evaluation.seconds, "rank": ranked}
 
@@ -297,24 +294,15 @@ class Layers(Shown):
             )
 
     def table(self) -> pd.DataFrame:
-        """Return what is to be chosen.
-
-        Result: a row per open grip; as of `seqopt.sequence.schedule.Schedule.table`.
-        """
+        """Return a row per open grip, as `seqopt.sequence.schedule.Schedule.table` does."""
         return self.schedule.table()
 
     def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
-        """Return the nodes that a choice stands for.
-
-        ``choice``: a candidate for every move.
-        """
+        """Return the nodes that a choice, a candidate for every move, stands for."""
         return tuple(m.candidates[c] for m, c in zip(self.schedule.moves, choice, strict=True))
 
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
-        """Return the checked steps of the schedule with a choice.
-
-        ``choice``: a candidate for every move. Raises `StepError` if a step is impossible.
-        """
+        """Return the checked steps of a choice; a `StepError` says which one is impossible."""
         return self.schedule.fill(self.nodes(choice))
 
 
@@ -326,32 +314,11 @@ def candidate_layers(
     also: Sequence[str] = (),
     resources: Resources = HERE,
 ) -> Layers:
-    """Return the problem of choosing the open grips of a schedule.
+    """Return the problem of choosing the open grips of a schedule; nothing is computed yet.
 
-    Parameters
-    ----------
-    engine : Engine
-        The engine that computes responses.
-    schedule : Schedule
-        The schedule whose open grips are to be chosen.
-    criterion : Criterion
-        What a step costs.
-    limits : sequence of Limit
-        Bounds that no step may exceed, whether or not a grip is open in it.
-    also : sequence of str
-        Further responses to compute, besides those that criterion and limits use.
-    resources : Resources, optional
-        Processes, memory and a folder for results; by default only this process.
-
-    Returns
-    -------
-    Layers
-        The problem; nothing is computed yet.
-
-    Raises
-    ------
-    ProblemError
-        If there is no such response, or no grip is open.
+    ``limits``: what no step may exceed, whether or not a grip is open in it. ``also``: responses to
+    compute besides those that criterion and limits use. Raises `ProblemError` if there is no such
+    response, or no grip is open.
     """
     known = {
         *CHOICE_RESPONSES,
@@ -385,16 +352,6 @@ def steps_over(problem: Layers, response: str, level: float, bound: float) -> Bu
         target = single if len(choices.moves) == 1 else shared
         target[choices.moves[-1]] += choices.responses[response] > level
     return Budget(f"steps with {response} over {level:g}", tuple(single), tuple(shared), bound)
-
-
-def robot_use(problem: Layers, robot: str, force: float, bound: float) -> Budget:
-    """Return a bound on the number of open steps in which a robot carries more than a force.
-
-    ``problem``: whose choices the budget is for; it evaluates the robot's force; ``robot``: name of
-    the robot; ``force``: n; ``bound``: how many steps there may be. Result: as of `steps_over`.
-    Raises `ProblemError` if the problem does not evaluate the force of this robot.
-    """
-    return steps_over(problem, robot_response(robot), force, bound)
 
 
 def travel(problem: Layers, bound: float) -> Budget:

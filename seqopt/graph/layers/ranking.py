@@ -12,8 +12,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Bools, Floats
-from seqopt.graph.layers._arcs import least_to_go
-from seqopt.graph.layers.costs import TINY, LayeredCosts
+from seqopt.graph.layers.costs import TINY, LayeredCosts, _least_to_go
 from seqopt.graph.layers.layers import Layers
 from seqopt.problem.criteria import Ranked, RankSum, WeightedSum, WorstRatio
 from seqopt.problem.requirements import Criterion
@@ -106,7 +105,7 @@ def _on_a_least_path(arcs: Sequence[Floats], size: float = TINY) -> list[Bools]:
         reached.append((reached[-1][:, None] + arc).min(axis=0))
     least = float(reached[-1].min())
     most = least + TIED_SUMS * max(abs(least), size)
-    ends = zip(reached[:-1], arcs, least_to_go(arcs)[1:], strict=True)
+    ends = zip(reached[:-1], arcs, _least_to_go(arcs)[1:], strict=True)
     out = []
     for before, arc, after in ends:
         whole = before[:, None] + (arc + after)

@@ -90,7 +90,6 @@ def steps_in_hands(
 
 
 def _begin_of(space: FreeSpace | ScheduleSpace) -> Site | None:
-    """Return where builds begin."""
     return space.schedule.begin if isinstance(space, ScheduleSpace) else space.rules.begin
 
 

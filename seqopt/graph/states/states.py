@@ -16,7 +16,6 @@ from seqopt.errors import ProblemError
 from seqopt.graph.scenarios import engine_for, require_alike
 from seqopt.graph.states._checks import checked_limits, of_states
 from seqopt.network.network import Network
-from seqopt.problem._cures import require_for_curing
 from seqopt.problem.problem import (
     LARGEST,
     STATE_RESPONSES,
@@ -26,6 +25,7 @@ from seqopt.problem.problem import (
     Measure,
     RobustAim,
     _goals,
+    _require_for_curing,
 )
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Criterion, Limit, state_costs
 from seqopt.problem.standing import Standing, StandingSets
@@ -301,10 +301,7 @@ class States(Shown):
         return out, within
 
     def stand(self, level: int, states: Ints) -> Bools:
-        """Return which states are proven to stand as is demanded.
-
-        ``states`` (n, c). Result (n,).
-        """
+        """Return which states (n, c) are proven to stand as is demanded, (n,)."""
         if self.each:
             return np.asarray(np.all([p.stand(level, states) for p in self.each], axis=0))
         bricks = self.space.bricks_at(level)
@@ -396,34 +393,12 @@ def build_states(
 ) -> States:
     """Return the problem of the free schedule of an engine's scene.
 
-    Parameters
-    ----------
-    engine : Engine
-        What computes responses.
-    rules : FreeRules or Schedule
-        Which moves are possible: what rules allow, or the open grips of a schedule, however many
-        are open in a step; where its states must stand, robots keep their payloads.
-    criterion : Criterion
-        What a step costs; ranks among choices cannot be used.
-    goals : sequence of Goal or str
-        What to minimize; see `parse_goals`.
-    limits : sequence of Limit
-        What no step may exceed.
-    stands : Standing, Mortar or str, optional
-        Requires that every state stands, with this mortar: ``"dry"``, ``"bond=3e3"`` (Pa).
+    ``rules``: what they allow, or the open grips of a schedule, however many are open in a step;
+    where its states must stand, robots keep their payloads. ``goals``: see `parse_goals`.
+    ``stands``: that every state does, with this mortar: ``"dry"``, ``"bond=3e3"`` (Pa). Nothing is
+    computed yet, except scales that a criterion takes from the scene. Raises `ProblemError` if
+    goals, criterion or limits use a response that a state does not have, or ranks among choices.
 
-    Returns
-    -------
-    States
-        Nothing is computed yet, except scales that a criterion takes from the scene.
-
-    Raises
-    ------
-    ProblemError
-        If goals, criterion or limits use a response that a state does not have.
-
-    Examples
-    --------
     >>> import seqopt
     >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
     >>> build_states(engine, FreeRules(), seqopt.CRITERIA["worst-ratio"], "minmax,steps")
@@ -444,8 +419,6 @@ def within(problem: States, caps: Mapping[str, float]) -> States:
     ``caps``: ``steps``, ``regrips``, ``travel`` (m) or ``sum(RESPONSE)``, and how much each may be.
     Raises `ProblemError` if something is no total, or a cap is no number from 0.
 
-    Examples
-    --------
     >>> import seqopt
     >>> engine = seqopt.make_engine("compliance", seqopt.load_scene("arch25"))
     >>> problem = build_states(engine, FreeRules(), seqopt.CRITERIA["worst-ratio"])
@@ -499,5 +472,5 @@ def _asked(problem: States) -> States:
         _ = problem.stability  # what cannot be asked is refused now
     if problem.is_timed:
         require_for_makespan(problem.network.scene, problem.rules)
-    require_for_curing(problem)
+    _require_for_curing(problem)
     return problem

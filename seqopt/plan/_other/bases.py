@@ -21,8 +21,8 @@ from seqopt.arms._permits import permits, within_reach
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Terse, Vector
 from seqopt.errors import InfeasibleError, ProblemError, SceneError
-from seqopt.plan._kept import moved
 from seqopt.plan.plan import Plan
+from seqopt.plan.solving import _moved
 from seqopt.problem.problem import Problem
 from seqopt.scene.arm import Arm
 from seqopt.scene.parts import Robot
@@ -211,15 +211,14 @@ def _standing(scene: Scene, bases: Mapping[str, Base]) -> Scene:
 
 
 def _with_arms(scene: Scene, change: Callable[[Arm], Arm | None]) -> Scene:
-    """Return a scene whose arms are changed."""
     pairs = ((robot, robot.arm) for robot in scene.robots)
     return scene.with_robots(
         *(r if arm is None else replace(r, arm=change(arm)) for r, arm in pairs)
     )
 
 
-class _Search:
-    """Looks at sets of bases, the most promising first, and keeps the best plan so far."""
+class Tried:
+    """The best plan so far of problems that are alike, and what became of each."""
 
     def __init__(self, problem: Problem, solved: Callable[[Problem], Plan], tell: Tell) -> None:
         self._problem, self._solved, self._tell = problem, solved, tell
@@ -228,6 +227,28 @@ class _Search:
         self._of: Problem | None = None
         self._rows: list[dict[str, object]] = []
         self._left: list[tuple[float, ...]] = []  # bounds of sets whose best plan is not proven
+
+    @property
+    def _proven(self) -> bool:
+        """Whether no set that was looked at allows a better plan."""
+        return not any(_is_below(bound, self._best) for bound in self._left)
+
+    def _kept(self, problem: Problem, plan: Plan) -> tuple[str, tuple[float, ...]]:
+        """Take a plan that is better than those before; return what to say of it."""
+        value, bound = _value(plan), _bound(plan)
+        if _is_below(bound, value):
+            self._left.append(bound)
+        if self._plan is None or _is_below(value, self._best):
+            self._plan, self._of, self._best = plan, problem, value
+        return "solved", value
+
+    def _named(self, bound: tuple[float, ...]) -> dict[str, float]:
+        pairs = zip(self._problem.goals, bound, strict=False)
+        return {str(goal): goal.shown(value) for goal, value in pairs}
+
+
+class _Search(Tried):
+    """Looks at sets of bases, the most promising first, and keeps the best plan so far."""
 
     def found(self, sets: Sequence[tuple[dict[str, Base], Scene]]) -> FoundBases:
         """Return the best plan of sets of bases."""
@@ -245,8 +266,7 @@ class _Search:
             raise InfeasibleError(
                 f"bases: none of {len(sets)} sets of bases allows a plan; give other places"
             )
-        proven = not any(_is_below(bound, self._best) for bound in self._left)
-        return FoundBases(self._plan, self._of, pd.DataFrame(self._rows), proven)
+        return FoundBases(self._plan, self._of, pd.DataFrame(self._rows), self._proven)
 
     def _by_promise(
         self, sets: Sequence[tuple[dict[str, Base], Scene]]
@@ -275,30 +295,20 @@ class _Search:
             lacking = _lacking(apart)
             if lacking is not None:
                 return f"no plan: nobody reaches brick {lacking}", (inf,)
-            alone = (-inf,) if soft else _bound(self._solved(moved(self._problem, apart)))
+            alone = (-inf,) if soft else _bound(self._solved(_moved(self._problem, apart)))
             if self._plan is not None and not _is_below(alone, self._best):
                 return "skipped: by reach alone no better", alone
             find_postures(scene, self._problem.resources.cache, self._tell)
-            problem = moved(self._problem, scene)
+            problem = _moved(self._problem, scene)
             plan = self._solved(problem)
         except InfeasibleError:
             return "no plan", (inf,)
         except SceneError as error:
             return f"no plan: {error}", (inf,)
-        bound = _bound(plan)
         if plan.arms is not None and plan.arms.postures.unreached:
-            self._left.append(bound)
+            self._left.append(bound := _bound(plan))
             return "no plan that keeps postures was found", bound
-        value = _value(plan)
-        if _is_below(bound, value):
-            self._left.append(bound)
-        if self._plan is None or _is_below(value, self._best):
-            self._plan, self._of, self._best = plan, problem, value
-        return "solved", value
-
-    def _named(self, bound: tuple[float, ...]) -> dict[str, float]:
-        pairs = zip(self._problem.goals, bound, strict=False)
-        return {str(goal): goal.shown(value) for goal, value in pairs}
+        return self._kept(problem, plan)
 
 
 def _lacking(scene: Scene) -> int | None:

@@ -16,13 +16,12 @@ import pandas as pd
 
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError, StepError
-from seqopt.plan._kept import moved
-from seqopt.plan._other.bases import _bound, _is_below, _value
+from seqopt.plan._other.bases import Tried
 from seqopt.plan.judge._proof import Proof
 from seqopt.plan.plan import Plan
-from seqopt.plan.solving import states_of
+from seqopt.plan.solving import _moved, states_of
 from seqopt.problem.problem import Measure, Problem
-from seqopt.scene.holders._props import Prop
+from seqopt.scene._props import Prop
 from seqopt.scene.scene import Scene
 from seqopt.work.progress import Tell
 
@@ -96,7 +95,7 @@ def fewest_props(
     return _Search(problem, order, [since[prop] for prop in order], solved, tell).found()
 
 
-class _Search:
+class _Search(Tried):
     """Looks at sets of props, the smallest first, and keeps the best plan so far."""
 
     def __init__(
@@ -107,13 +106,8 @@ class _Search:
         solved: Callable[[Problem], Plan],
         tell: Tell,
     ) -> None:
-        self._problem, self._candidates, self._since = problem, candidates, since
-        self._solved, self._tell = solved, tell
-        self._best: tuple[float, ...] = ()
-        self._plan: Plan | None = None
-        self._of: Problem = problem
-        self._rows: list[dict[str, object]] = []
-        self._left: list[tuple[float, ...]] = []  # bounds of sets whose best plan is not proven
+        super().__init__(problem, solved, tell)
+        self._candidates, self._since = candidates, since
         self._cuts: dict[int, set[_Set]] = {}  # first props of sets without a better plan
 
     def found(self) -> FoundProps:
@@ -122,10 +116,9 @@ class _Search:
         for size in range(count + 1):
             sets += comb(count, size)
             whole = all(map(self._look, self._sets(size, ())))
-            if self._plan is not None:
-                proven = whole and not any(_is_below(bound, self._best) for bound in self._left)
+            if self._plan is not None and self._of is not None:
                 rows = pd.DataFrame(self._rows)
-                return FoundProps(self._plan, self._of, rows, sets, proven)
+                return FoundProps(self._plan, self._of, rows, sets, whole and self._proven)
             if not whole:
                 raise ProblemError(
                     f"aim props: {_MOST} sets were looked at, and none of up to {size} props was "
@@ -164,29 +157,21 @@ class _Search:
         nodes = " ".join(str(prop.node) for prop in props)
         self._tell(f"props, {len(self._rows)} sets looked at, now {nodes or 'none'}")
         outcome, value = self._outcome(chosen, self._problem.scene.with_props(*props))
-        named = zip(self._problem.goals, value, strict=False)
-        known = {str(goal): goal.shown(number) for goal, number in named}
-        self._rows.append({"nodes": nodes, "outcome": outcome, **known})
+        self._rows.append({"nodes": nodes, "outcome": outcome, **self._named(value)})
         return len(self._rows) < _MOST
 
     def _outcome(self, chosen: _Set, scene: Scene) -> tuple[str, tuple[float, ...]]:
         """Return what is known of a set, in words, and the values of its best plan."""
         try:
-            problem = moved(self._problem, scene)
+            problem = _moved(self._problem, scene)
             stop = Proof(states_of(problem)).stops_at(self._wanted())
             if stop is not None:
                 self._cuts.setdefault(stop, set()).add(self._until(chosen, stop))
                 why = "no plan" if self._plan is None else "none as good"
                 return f"{why}, by {stop} bricks", ()
-            plan = self._solved(problem)
+            return self._kept(problem, self._solved(problem))
         except (InfeasibleError, StepError) as error:
             return f"no plan: {error}", (inf,)
-        value, bound = _value(plan), _bound(plan)
-        if _is_below(bound, value):
-            self._left.append(bound)
-        if self._plan is None or _is_below(value, self._best):
-            self._plan, self._of, self._best = plan, problem, value
-        return "solved", value
 
     def _wanted(self) -> tuple[float, ...]:
         """Return what the first goal of a plan must not exceed, if states say so."""

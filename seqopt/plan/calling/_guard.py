@@ -85,10 +85,7 @@ def unchanged(name: str, judged: Callable[[], object]) -> Iterator[None]:
 
 @contextmanager
 def readable(name: str) -> Iterator[None]:
-    """Say that a formulation failed where what it returned cannot be read.
-
-    ``name``: of the formulation.
-    """
+    """Say that a formulation, by name, failed where what it returned cannot be read."""
     try:
         yield
     except (TypeError, ValueError, AttributeError, OverflowError) as error:
@@ -225,7 +222,6 @@ def _motion(given: Floats) -> Floats:
 
 
 def _arrays(proof: LabelProof) -> LabelProof:
-    """Return labels as arrays of numbers."""
     states, labels, prices = proof
     numbers = [np.array(part, dtype=float) for part in (labels, prices)]
     return LabelProof(np.array(states, dtype=np.int64), *numbers)
@@ -261,10 +257,7 @@ def require_time(formulation: Formulation, time_limit: float) -> None:
 
 
 def require_proof(proof: object) -> None:
-    """Raise an error where a lazy search is to leave out the proof, which is all it is for.
-
-    Raises `ProblemError`.
-    """
+    """Raise a `ProblemError` where a lazy search is to leave out the proof, all it is for."""
     if not proof:
         raise ProblemError("a lazy search proves what it finds; leave out lazy, or ask for a proof")
 
@@ -289,7 +282,6 @@ def select(
 def _called(
     formulation: Formulation, problem: PlacementProblem, watch: Watch, options: dict[str, Any]
 ) -> Selection:
-    """Return what a formulation returns, if that is a selection."""
     told = {WATCH: watch} if formulation.watched else {}
 
     def judged() -> tuple[object, ...]:

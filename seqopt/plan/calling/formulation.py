@@ -72,8 +72,6 @@ class Watch:
 
     ``time_limit``: after which the formulation is to stop, s; ``progress``: told every finding.
 
-    Examples
-    --------
     >>> watch = Watch(time_limit=60.0)
     >>> watch.tell(objective=12.0)
     >>> watch.tell(bound=9.0)
@@ -137,10 +135,7 @@ class Watch:
 
 
 def trace_rows(trace: Sequence[Finding]) -> list[dict[str, float]]:
-    """Return a trace as rows of a table.
-
-    Result: columns ``seconds``, ``objective``, ``bound`` and ``gap``.
-    """
+    """Return a trace as rows of ``seconds``, ``objective``, ``bound`` and ``gap``."""
     names = ("seconds", "objective", "bound", "gap")
     return [{name: getattr(found, name) for name in names} for found in trace]
 

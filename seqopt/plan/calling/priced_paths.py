@@ -17,8 +17,14 @@ from scipy import sparse
 
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
-from seqopt.graph.layers._arcs import least_path, least_to_go, where_allowed
-from seqopt.graph.layers.costs import TINY, Budget, LayeredCosts
+from seqopt.graph.layers.costs import (
+    TINY,
+    Budget,
+    LayeredCosts,
+    _least_path,
+    _least_to_go,
+    _where_allowed,
+)
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.plan.calling.formulation import End, Selection, Watch
 from seqopt.plan.judge._budget_proof import too_small
@@ -82,10 +88,7 @@ class LayeredFlow(FrozenValue):
         return value - ACCURACY * max(abs(value), self.scale)
 
     def prices(self, duals: Sequence[float]) -> dict[str, float]:
-        """Return what one more unit of each budget would save.
-
-        ``duals``: of the scaled caps. Result: by budget: cost per unit of the budget.
-        """
+        """Return what one more unit of each budget would save, by duals of the scaled caps."""
         pairs = zip(self.names, self.units, duals, strict=True)
         return {name: float(self.scale / unit * dual) for name, unit, dual in pairs}
 
@@ -130,7 +133,7 @@ def _within_each(problem: PlacementProblem) -> bool:
     for budget in problem.budgets:
         if budget.amounts.sizes != problem.sums.sizes:
             raise ProblemError(f"budget {budget.name!r} is for other moves or candidates")
-        least = least_sum(where_allowed(problem.sums, budget))
+        least = least_sum(_where_allowed(problem.sums, budget))
         sizes = sum(float(np.abs(a).max()) for a in (*budget.single, *budget.shared))
         if least > budget.bound + TOLERANCE * sizes:
             raise too_small(budget, least)
@@ -220,8 +223,8 @@ def _choices(problem: PlacementProblem, costs: LayeredCosts) -> Iterator[tuple[i
     assert choice is not None  # there is no time limit
     yield choice
     for budget in problem.budgets:
-        arcs = where_allowed(costs, budget).arcs()
-        yield least_path(arcs, least_to_go(arcs))
+        arcs = _where_allowed(costs, budget).arcs()
+        yield _least_path(arcs, _least_to_go(arcs))
 
 
 ROUNDING = 1e-9  # of a budget or a cost: within this, sums are equal; budgets have as much more
@@ -265,10 +268,7 @@ class PricedPaths:
     names: tuple[str, ...]
 
     def path(self, choice: Sequence[int]) -> Path:
-        """Return a choice with what it costs and takes.
-
-        ``choice``: a candidate for every move.
-        """
+        """Return a choice, a candidate for every move, with what it costs and takes."""
         pairs = list(zip((0, *choice[:-1]), choice, strict=True))
         cost = sum(float(arc[pair]) for arc, pair in zip(self.arcs, pairs, strict=True))
         taken = sum(a[:, i, j] for a, (i, j) in zip(self.amounts, pairs, strict=True))
@@ -284,7 +284,7 @@ class PricedPaths:
         priced = [
             arc + np.tensordot(prices, a, 1) for arc, a in zip(self.arcs, self.amounts, strict=True)
         ]
-        return priced, least_to_go(priced)
+        return priced, _least_to_go(priced)
 
     def cheapest(self, prices: Floats) -> tuple[Path, float]:
         """Return the path that is cheapest at given prices, and the bound that they prove.
@@ -295,7 +295,7 @@ class PricedPaths:
         priced, rest = self.to_go(prices)
         bound = float(rest[0][0] - prices @ self.caps)
         size = 1 + float(prices @ (1 + np.abs(self.caps)))  # of what is summed, per move
-        path = self.path(least_path(priced, rest))
+        path = self.path(_least_path(priced, rest))
         return path, bound - EPS * (len(priced) + 1) ** 2 * size
 
     def named(self, prices: Floats) -> dict[str, float]:
@@ -399,10 +399,7 @@ def best_prices(paths: PricedPaths, watch: Watch) -> Priced:
 
 
 def _highest(paths: Sequence[Path], reach: float) -> tuple[Floats, float]:
-    """Return the prices up to ``reach`` at which the lowest plane of the paths is highest.
-
-    And its height there.
-    """
+    """Return prices up to ``reach`` where the lowest plane of paths is highest, and how high."""
     planes = np.array([[1.0, *-path.over] for path in paths])
     heights = np.array([path.cost for path in paths])
     count = planes.shape[1] - 1

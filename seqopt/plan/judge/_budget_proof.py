@@ -200,10 +200,7 @@ def _spared(case: _Case) -> list[Floats]:
 
 
 def _unbeaten(at: Ints, cost: Floats, taken: Floats) -> Bools:
-    """Return which partial choices no other one beats in cost and in all budgets.
-
-    Not all that are beaten are found.
-    """
+    """Return which partial choices none is found to beat in cost and in all budgets."""
     order = np.lexsort((taken.sum(axis=1), cost, at))
     at, cost, taken = at[order], cost[order], taken[order]
     good = np.ones(len(at), dtype=bool)

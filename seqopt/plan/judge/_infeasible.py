@@ -15,8 +15,7 @@ from seqopt.engines.registry import recipe_of
 from seqopt.errors import InfeasibleError, SeqoptError, SolverError
 from seqopt.graph._counted import least_by_counts
 from seqopt.graph._explore import Explorer
-from seqopt.graph.layers._arcs import array_by_array, where_allowed
-from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.costs import Budget, LayeredCosts, _array_by_array, _where_allowed
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.paths import distances, least_peak, tied
 from seqopt.graph.scenarios import engine_for
@@ -32,9 +31,9 @@ from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, length_text
 from seqopt.scene.arm import Arm
 from seqopt.scene.scene import Scene
-from seqopt.sequence._reach import enough_reach
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.two_robots import _enough_reach
 
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none
 
@@ -52,7 +51,7 @@ def smallest_conflict(problem: PlacementProblem) -> tuple[Budget, ...]:
 
 def _conflict(costs: LayeredCosts, budgets: tuple[Budget, ...]) -> bool:
     """Return whether it is proven that no allowed choice keeps all budgets."""
-    nothing = where_allowed(costs, array_by_array(np.zeros_like, costs))
+    nothing = _where_allowed(costs, _array_by_array(np.zeros_like, costs))
     return least_within(CostProblem(nothing, budgets), 1.0, {}, 1.0) >= PROVEN
 
 
@@ -68,7 +67,7 @@ def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
             f"claimed by {name}, and not proven: no choice is within all budgets; raise a bound"
         )
     if len(found) == 1:
-        return too_small(found[0], least_sum(where_allowed(problem.sums, found[0])))
+        return too_small(found[0], least_sum(_where_allowed(problem.sums, found[0])))
     named = [f"{budget.bound:.6g} of {budget.name!r}" for budget in found]
     fewer = "each can alone" if len(found) == 2 else "any fewer of them can"
     return InfeasibleError(
@@ -171,7 +170,6 @@ def _why_impossible(problem: States, seconds: float = np.inf) -> str:
 
 
 def _where(problem: States, look: Look) -> str:
-    """Return where it stops."""
     placed = problem.network.scene.placed
     stops = look(replace(problem, goals=STEPS)).reached
     if isinstance(problem.rules, Schedule):
@@ -213,7 +211,7 @@ def _opening(problem: States, look: Look) -> Iterator[str]:
         alone = _with_arms(problem, lambda arm: arm and replace(arm, keeps_apart=False))
         yield APART if look(alone).whole else ARMS
     if recipe_of(problem.engine) and not (scene.has_arms or problem.scenarios):
-        yield from enough_reach(scene, lambda other: look(_in_scene(problem, other)).whole)
+        yield from _enough_reach(scene, lambda other: look(_in_scene(problem, other)).whole)
     for limit in problem.limits:
         rest = tuple(other for other in problem.limits if other is not limit)
         if look(replace(problem, limits=rest)).whole:
@@ -252,7 +250,6 @@ def _with_arms(problem: States, changed: Callable[[Arm | None], Arm | None]) -> 
 
 
 def _in_scene(problem: States, scene: Scene) -> States:
-    """Return a problem in another scene of the same bricks."""
     engine, rules = engine_for(problem.engine, scene), problem.rules
     moves = replace(rules, scene=engine.network.scene) if isinstance(rules, Schedule) else rules
     return replace(problem, engine=engine, rules=moves)

@@ -1,8 +1,9 @@
-"""Which states the arms of robots can be in, looked up in the posture table, one by one.
+"""Which states arms and props can be in, as a judge sees them: looked up, one by one.
 
 A second route to what `seqopt.arms.reach.Permits` says: it takes from there with which postures
 plans are made, and asks the table itself what these hit. How grips give way by the joints of arms
-is found by moving every joint a little, from places of the flange, without the Jacobian.
+is found by moving every joint a little, from places of the flange, without the Jacobian. Of what
+props hold and bear nothing is shared but the engine.
 """
 
 from __future__ import annotations
@@ -16,9 +17,51 @@ from seqopt.arms._model import ArmModel
 from seqopt.arms._permits import permits
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.errors import StepError
+from seqopt.engines.interface import Engine, Want
+from seqopt.errors import SolverError, StepError
+from seqopt.scene._props import Prop
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
+
+_UNFELT = 1e-3  # of the mean weight of a brick, far more than forces err
+
+
+def props_that_hold(scene: Scene, bricks: int, robots: int) -> list[tuple[int, Prop]]:
+    """Return props by the numbers of their grips, with so many bricks and robots that hold."""
+    if not robots and bricks >= len(scene.build_order):
+        return []
+    kinds, first, out = scene.grip_kinds, len(scene.robots), []
+    stand = {node for brick in scene.placed[:bricks] for node in brick.nodes}
+    for i, prop in enumerate(scene.props):
+        if prop.node in stand:
+            kind = int(kinds.of_robot[first + i]) if len(kinds.turns) > 1 else 0
+            out.append((prop.node + kinds.span * kind, prop))
+    return out
+
+
+def check_props(engine: Engine, steps: Sequence[Step]) -> None:
+    """Raise a `SolverError` if a prop pulls that may only push, or bears more than it may."""
+    scene = engine.network.scene
+    if not any(prop.direction or prop.capacity for prop in scene.props):
+        return
+    weight = float(np.linalg.norm(engine.network.weight, axis=1).mean())
+    for step in steps:
+        held = scene.grip_numbers(step.grips)
+        props = props_that_hold(scene, step.bricks, len(held))
+        grips = np.array([[*held, *(number for number, _ in props)]], dtype=np.int64)
+        force = engine.solve(step.bricks, grips, Want(0)).grip_force[0, len(held) :]
+        for own, (_, prop) in zip(force, props, strict=True):
+            _check(prop, own, _UNFELT * (weight or 1.0), step.number)
+
+
+def _check(prop: Prop, force: np.ndarray, little: float, number: int) -> None:
+    size = float(np.linalg.norm(force))
+    if prop.capacity is not None and size > prop.capacity + little:
+        raise SolverError(
+            f"step {number}: the {prop.label} bears {size:.4g} N of {prop.capacity:g} N"
+        )
+    if prop.direction is not None and np.dot(force, prop.direction) < -little:
+        raise SolverError(f"step {number}: the {prop.label} pulls, and may only push")
 
 
 class PostureRules:

@@ -15,14 +15,13 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import InfeasibleError
 from seqopt.graph._budgets import budget_bounds, is_beyond
-from seqopt.graph._lazy import FAILS, PASSES, lazy_path
 from seqopt.graph.duality import lexicographic_bounds
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import lexicographic, reached, tied
+from seqopt.graph.paths import FAILS, PASSES, _lazy_path, lexicographic, reached, tied
 from seqopt.graph.states._visits import move_amounts
 from seqopt.graph.states.states import States
 from seqopt.plan.judge._answers import alike, ask, near, screens
-from seqopt.plan.judge._mortar.floors import cured_rows
+from seqopt.plan.judge._mortar_floors import cured_rows
 from seqopt.plan.judge._rule_moves import Follows, RuleTables, ScheduleTables
 from seqopt.plan.judge._standing_proof import StandingProof
 from seqopt.plan.judge._timed_goals import Claim, GoalProofs, TimedStates
@@ -131,10 +130,7 @@ class Passable:
         )
 
     def valued(self, level: int, states: Ints, asked: Asked) -> tuple[Floats, Bools]:
-        """Return what goals take of states, and which ones a better plan could pass.
-
-        ``states`` (n, c). Results: ``values`` (n, g); ``ok`` (n,).
-        """
+        """Return what goals take of states (n, g), and which a better plan could pass (n,)."""
         goals = self.problem.goals
         if not self.tables.bricks_at(level):
             return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
@@ -375,7 +371,7 @@ class Proof:
         def recall(part: int, rows: Ints) -> Ints:
             return passable.recalled(*of(part, rows))
 
-        lazy_path(graph, parts, known, ask, recall)
+        _lazy_path(graph, parts, known, ask, recall)
         left = reached(graph, (known != FAILS)[graph.target])
         self.states = max(self.states, int(left.sum()))
         return not graph.ends[left].any()

@@ -114,10 +114,7 @@ class RuleTables:
         return len(self._able)
 
     def start(self) -> Ints:
-        """Return the state in which the build begins.
-
-        Result (1, c).
-        """
+        """Return the state (1, c) in which the build begins."""
         limited = self._rules.regrips is not None
         out: Ints = np.zeros((1, self.robots + limited), dtype=np.int32)
         _, held, regrips = self._book.start

@@ -15,7 +15,7 @@ from seqopt.graph.duality import cut, potentials
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import tied
 from seqopt.graph.states.states import States
-from seqopt.plan.judge._mortar.floors import CuredRows
+from seqopt.plan.judge._mortar_floors import CuredRows
 from seqopt.plan.judge._rule_moves import RuleTables, ScheduleTables
 from seqopt.plan.judge._time_proof import Closed, Limits, Team, TimedMoves, kept_below, limit_below
 from seqopt.problem.problem import Measure

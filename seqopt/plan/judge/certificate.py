@@ -10,9 +10,8 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import FileError, SolverError
-from seqopt.graph.layers._arcs import array_by_array
 from seqopt.graph.layers._partial_costs import PartialCosts, least_possible
-from seqopt.graph.layers.costs import TINY, LayeredCosts
+from seqopt.graph.layers.costs import TINY, LayeredCosts, _array_by_array
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.scenarios import ScenarioLayers
@@ -219,18 +218,12 @@ def _value(costs: LayeredCosts, choice: tuple[int, ...], aim: Aim) -> float:
 
 
 def least(costs: LayeredCosts, aim: Aim) -> float:
-    """Return the least value of any choice, ignoring budgets.
-
-    ``aim``: takes `least_sum` or `least_peak`. Result: infinite if no choice is allowed.
-    """
+    """Return the least value of any choice, budgets aside; infinite if none is allowed."""
     return least_sum(costs) if aim is Aim.SUM else least_peak(costs)
 
 
 def least_sum(costs: LayeredCosts) -> float:
-    """Return the least sum that any choice reaches, budgets aside: forward, move by move.
-
-    Result: infinite if no choice is allowed.
-    """
+    """Return the least sum of any choice, forward, budgets aside; infinite if none is allowed."""
     reached = np.zeros(1)
     for single, shared in zip(costs.single, costs.shared, strict=True):
         reached = (reached[:, None] + shared).min(axis=0) + single
@@ -318,4 +311,4 @@ def _proven(
         parts = [weight * each for weight, each in zip(weights, costs, strict=True) if weight > 0]
         return np.where(np.isfinite(costs).all(axis=0), sum(parts), np.inf)
 
-    return least_sum(array_by_array(weighed, *layers))
+    return least_sum(_array_by_array(weighed, *layers))

@@ -20,10 +20,9 @@ from seqopt.errors import SolverError, StepError
 from seqopt.graph._counted import least_by_counts
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.judge._mortar.check import check_cured
-from seqopt.plan.judge._posture_rules import check_postures
+from seqopt.plan.judge._mortar_check import check_cured
+from seqopt.plan.judge._posture_rules import check_postures, check_props
 from seqopt.plan.judge._proof import BELOW, Hint, Proof
-from seqopt.plan.judge._prop_rules import check_props
 from seqopt.plan.judge._standing_proof import proven_margins, require_margin
 from seqopt.plan.judge._time_proof import makespan, step_ends
 from seqopt.plan.judge._timed_goals import Claim
@@ -289,10 +288,7 @@ def _margins(problem: States, steps: Sequence[Step]) -> Mapping[str, float]:
 def _state_columns(
     problem: States, steps: Sequence[Step], table: pd.DataFrame
 ) -> Mapping[str, np.ndarray]:
-    """Return the named responses of a table of steps, SI units.
-
-    ``table``: from `seqopt.analyze`. Result (dict of str to (n,) float).
-    """
+    """Return responses (n,) by name, SI units, of a table of `seqopt.analyze`."""
     forces = table[[force_column(robot) for robot in problem.network.scene.robots]].abs()
     out = {LARGEST: forces.max(axis=1).fillna(0.0).to_numpy(float)}
     for name in problem.named:
@@ -308,10 +304,7 @@ def _state_columns(
 
 
 def _travel_of(problem: States, steps: Sequence[Step]) -> float:
-    """Return how far robots go from one grip to the next.
-
-    Result: m; straight lines.
-    """
+    """Return how far robots go straight from one grip to the next, m."""
     scene, site, total = problem.network.scene, problem.rules.begin, 0.0
     before = () if site is None else (site.stays or site.holds(scene), site.holds(scene))
     for nodes in zip(*before, *(step.grips for step in steps), strict=True):  # robot by robot

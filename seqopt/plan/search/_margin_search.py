@@ -12,7 +12,7 @@ import numpy as np
 from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError
 from seqopt.graph._explore import Explorer
-from seqopt.graph._lazy import FAILS, PASSES, lazy_path
+from seqopt.graph.paths import FAILS, PASSES, _lazy_path
 from seqopt.graph.states._visits import FreeStates
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import Goal, Measure
@@ -80,7 +80,7 @@ class _Look:
             return asked.recalled(*self._part(part, rows))
 
         tell = partial(self._tell, self._found)
-        path = lazy_path(self._graph, self._parts, known, ask, recall, tell)
+        path = _lazy_path(self._graph, self._parts, known, ask, recall, tell)
         if path is None:
             return False
         self.found = [(level, *state.tolist()) for level, _, state in self._visited.of(path)]

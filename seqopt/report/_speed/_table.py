@@ -53,8 +53,6 @@ class SpeedTable:
     ``error`` of responses, both by the reference, its ``status`` and ``why`` there is no plan;
     ``refused``: engines that cannot compute the scene, and why.
 
-    Examples
-    --------
     >>> rows = [("compliance", "overlap_dp", True, True, 0.1, 0.0, 0.0, "done", "")]
     >>> names = ["engine", "formulation", "proof", "exact", "seconds", "gap", "error"]
     >>> table = pd.DataFrame(rows, columns=[*names, "status", "why"])
@@ -77,7 +75,6 @@ class SpeedTable:
         return "\n".join([self.sentence, "", *self.lines()])
 
     def _repr_html_(self) -> str:
-        """Return the sentence and the table as HTML."""
         return f"<p>{self.sentence}</p>{self.rows()._repr_html_()}"  # type: ignore[operator]
 
     def plot(self) -> Figure:
@@ -198,8 +195,6 @@ def _digits(seconds: float) -> str:
 def seconds_text(seconds: float) -> str:
     """Return a time in words.
 
-    Examples
-    --------
     >>> seconds_text(0.1014), seconds_text(26.04), seconds_text(512.2)
     ('0.101 s', '26.0 s', '512 s')
     """
@@ -214,8 +209,6 @@ def gap_text(gap: float) -> str:
 def error_text(error: float) -> str:
     """Return an error as people write it: 2e-6, 0.02.
 
-    Examples
-    --------
     >>> error_text(2.1e-6), error_text(0.0213), error_text(0.0)
     ('2e-6', '0.021', '0')
     """

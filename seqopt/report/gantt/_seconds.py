@@ -17,8 +17,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from seqopt.errors import StepError
-from seqopt.report._pictures import DARK, LANE, LETTER, SHADES
-from seqopt.report._style import SMALL, new_picture, styled
+from seqopt.report._pictures import DARK, LANE, SHADES, _label, _lanes
+from seqopt.report._style import new_picture, styled
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence._timing import StepTime, Waits, step_times
@@ -99,12 +99,7 @@ def _cured(before: float, time: StepTime) -> tuple[float, float] | None:
 def _frame(axes: Axes, scene: Scene, span: tuple[float, float], *, cures: bool) -> None:
     """Set lanes, limits and names, and explain the marks."""
     room = 0.01 * (span[1] - span[0])
-    limits: Any = {"xlim": (span[0] - room, span[1] + room)}
-    axes.set(xlabel="seconds", ylim=(len(scene.robots) - 0.5, -0.5), axisbelow=True, **limits)
-    axes.set_yticks(range(len(scene.robots)), [robot.name for robot in scene.robots])
-    axes.tick_params(left=False)
-    axes.grid(visible=True, axis="x", lw=0.3)
-    axes.spines[["top", "right", "left"]].set_visible(False)
+    _lanes(axes, scene, "seconds", (span[0] - room, span[1] + room))
     handles = [
         Patch(fc=PREPARES, ec=DARK, lw=0.5, hatch="///", label="prepares"),
         Line2D([], [], color=DARK, marker="|", ms=11, mew=3.2, lw=0, label="places the brick"),
@@ -134,16 +129,3 @@ def _prepared(axes: Axes, time: StepTime) -> None:
     look: Any = {"fc": PREPARES, "ec": DARK, "lw": 0.4, "hatch": "///"}
     look["gid"] = f"prepares {time.step}"
     axes.add_patch(Rectangle((time.prepares, low), span, LANE / 2, **look))
-
-
-def _label(axes: Axes, scene: Scene, hold: Hold, span: tuple[float, float, float]) -> None:
-    """Write brick and node into a bar, from when to when, as far as they fit; then inches per s."""
-    begin, end, inch = span
-    room = inch * (end - begin)
-    if room < 0.12 or hold.node is None:
-        return
-    words = f"{scene.brick_of_node[hold.node].name} · {hold.node}"
-    flat = room >= LETTER * len(words) + 0.06
-    look: Any = {"ha": "center", "va": "center", "fontsize": SMALL, "color": DARK, "clip_on": True}
-    look["bbox"] = {"boxstyle": "square,pad=0.1", "fc": (1, 1, 1, 0.72), "lw": 0}
-    axes.annotate(words, ((begin + end) / 2, hold.robot), rotation=0 if flat else 90, **look)

@@ -15,8 +15,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import FileError, SceneError
-from seqopt.scene._axes import units
-from seqopt.scene._checks import positive, short
+from seqopt.scene._checks import positive, short, units
 from seqopt.scene.boxes import as_vector, spring_fields
 from seqopt.scene.imports._content import GROUND, Content, FileJoint, Given
 from seqopt.scene.imports._meshes import Repaired
@@ -116,7 +115,6 @@ class _Facets:
 
 
 def _require_polygons() -> None:
-    """Require what cuts polygons."""
     if find_spec("shapely") is None:
         raise FileError("finding where blocks touch needs shapely; pip install 'seqopt[blocks]'")
 
@@ -343,7 +341,7 @@ class Contacts:
         return [*(pair for pair, _ in self.faces), *(joint.blocks for joint in self.joints)]
 
 
-def find_contacts(
+def _find_contacts(
     content: Content, given: Given, blocks: Sequence[Repaired], bricks: Mapping[int, Brick]
 ) -> Contacts:
     """Return where blocks touch each other and the ground, which those not built belong to."""

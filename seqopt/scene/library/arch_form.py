@@ -26,9 +26,18 @@ from seqopt.scene._checks import (
     whole_between,
 )
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.scene.boxes import require_apart
-from seqopt.scene.library.common import MASONRY, JointLaw, a_law, few_enough, joint_width
-from seqopt.scene.parts import THICKEST, Robot
+from seqopt.scene.boxes import as_vector, require_apart
+from seqopt.scene.library.common import (
+    MASONRY,
+    JointLaw,
+    _ground_under,
+    _joints_between,
+    a_law,
+    few_enough,
+    joint_width,
+    mobile_robots,
+)
+from seqopt.scene.parts import THICKEST, Brick, Robot
 from seqopt.scene.scene import Scene
 
 _Line = Callable[[float], Floats]
@@ -180,7 +189,6 @@ def arch(form: ArchForm, name: str = "", *, robots: Sequence[Robot] | None = Non
 
 
 def _arch(form: ArchForm, count: int, name: str, robots: Sequence[Robot] | None) -> Scene:
-    """Return the scene of an arch with a number of bricks."""
     gap, points = _laid(form, form.line, count)
     step = np.diff(points, axis=0)
     long, width, thickness = form.dimensions
@@ -330,7 +338,6 @@ def barrel_vault(
 
 
 def _vault_shape(row: dict[str, str], law: JointLaw) -> ArchShape:
-    """Return the shape of a tested vault."""
     span, rise, width = (float(row[key]) for key in ("L_m", "r_m", "b_m"))
     thickness, bricks = float(row["t_mm"]) / 1e3, int(row["n_bricks"])
     half = 2 * math.atan(2 * rise / span)
@@ -352,9 +359,129 @@ def _vault_shape(row: dict[str, str], law: JointLaw) -> ArchShape:
 
 
 def _tested(test: int) -> dict[str, str]:
-    """Return the printed numbers of a test."""
     source = resources.files("seqopt").joinpath("data/paper/arch_tests.csv")
     rows = {row["test"]: row for row in csv.DictReader(source.read_text("utf-8").splitlines())}
     if isinstance(test, bool) or not isinstance(test, int) or str(test) not in rows:
         raise SceneError(f"barrel vault: test is {short(test)}; give 1 to {len(rows)}")
     return rows[str(test)]
+
+
+_TRIED_VAULTS = 8  # numbers of courses, where none is given
+Laid = tuple[float, Floats]  # the width of joints between courses, and the points between them
+
+
+@dataclass(frozen=True, kw_only=True)
+class _BarrelShape:
+    """The numbers that shape a barrel vault; lengths in m.
+
+    ``span``, ``rise``, ``curve``, ``gap``, ``density``, ``law``: as of an arch. ``columns``: bricks
+    in a course, which runs along the vault; every second course is shifted by half a brick.
+    ``courses``: from one springing to the other, by default as fit the curve. ``dimensions``:
+    length along the vault, width along the curve and thickness of a brick.
+    """
+
+    span: float
+    rise: float
+    columns: int
+    curve: str = "circular"
+    courses: int | None = None
+    dimensions: Vector = (0.2, 0.1, 0.06)
+    gap: float = 0.01
+    density: float = 2000.0
+    law: JointLaw = MASONRY
+
+    def __post_init__(self) -> None:
+        check(self, "vault", columns=partial(whole_between, least=1))
+        check(self, "vault", courses=unless_none(partial(whole_between, least=2)))
+        few_enough("vault", self.columns * (self.courses or 1))
+        _ = self.form
+
+    @property
+    def form(self) -> ArchForm:
+        """The arch over which courses lie: a brick of it is as long as a course is wide."""
+        long, width, thickness = self.dimensions
+        return ArchForm(
+            span=self.span,
+            rise=self.rise,
+            curve=self.curve,
+            bricks=self.courses,
+            dimensions=(width, long, thickness),
+            gap=self.gap,
+            density=self.density,
+            law=self.law,
+        )
+
+
+def _barrel(shape: _BarrelShape, name: str = "") -> Scene:
+    """Return the scene of a barrel vault that is built course by course from one springing.
+
+    It spans along x from z = 0 and runs towards +y. Raises `SceneError` if courses do not fill the
+    curve, or bricks interpenetrate.
+    """
+    form = shape.form
+    refused: SceneError | None = None
+    for courses in [form.bricks] if form.bricks else _counts(form)[:_TRIED_VAULTS]:
+        few_enough("vault", shape.columns * courses)
+        try:
+            return _vault(shape, _laid(form, form.line, courses), name)
+        except SceneError as error:
+            refused = refused or error
+    raise refused or SceneError("vault: no number of courses fills its curve; give one")
+
+
+def _vault(shape: _BarrelShape, laid: Laid, name: str) -> Scene:
+    _, points = laid
+    courses = len(points) - 1
+    bricks = [
+        _brick(shape, course, column, laid)
+        for course in range(courses)
+        for column in range(shape.columns)
+    ]
+    require_apart("vault", bricks, "give another number of courses, or thinner bricks")
+    tangents = np.diff(points, axis=0) / np.linalg.norm(np.diff(points, axis=0), axis=1)[:, None]
+    ends = [(0, -tangents[0]), (courses - 1, tangents[-1])]
+    grounds = tuple(
+        _ground_under(bricks[course * shape.columns + column], np.array([x, 0.0, z]), shape.law)
+        for column in range(shape.columns)
+        for course, (x, z) in ends
+    )
+    return Scene(
+        name=name or f"vault {shape.columns} x {courses}",
+        provenance="Generated by seqopt.scene.library.",
+        bricks=tuple(bricks),
+        joints=_joints_between(bricks, _touching(shape.columns, courses), shape.law),
+        grounds=grounds,
+        build_order=tuple(brick.name for brick in bricks),
+        robots=mobile_robots(bricks),
+    )
+
+
+def _brick(shape: _BarrelShape, course: int, column: int, laid: Laid) -> Brick:
+    """Return a brick whose length lies along the vault."""
+    _, points = laid
+    start, end = points[course], points[course + 1]
+    x, z = 0.5 * (start + end)
+    tangent = (end - start) / np.linalg.norm(end - start)
+    name = course * shape.columns + column + 1
+    along = (shape.dimensions[0] + shape.gap) * (column + 0.5 * (course % 2))
+    return Brick(
+        name=name,
+        position=as_vector(np.array([x, along, z])),
+        length_axis=(0.0, 1.0, 0.0),
+        width_axis=as_vector(np.array([tangent[0], 0.0, tangent[1]])),
+        dimensions=shape.dimensions,
+        density=shape.density,
+        nodes=(2 * name, 2 * name + 1),
+        placing_node=2 * name,
+    )
+
+
+def _touching(columns: int, courses: int) -> Sequence[tuple[int, int]]:
+    """Return which bricks share a joint: those beside each other, and those of the next course."""
+    out = []
+    for i in range(columns * courses):
+        course, column = divmod(i, columns)
+        before = (column, column + 1) if course % 2 else (column - 1, column)
+        out += [(i - column - columns + c, i) for c in before if course and 0 <= c < columns]
+        out += [(i - 1, i)] if column else []
+    return out

@@ -1,4 +1,4 @@
-"""What generators share: joint laws, checked numbers, robots, orders that touch, herringbone."""
+"""What generators share: joints where faces meet, checked numbers, robots, orders, herringbone."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from heapq import heapify, heappop, heappush
 
 import numpy as np
 
-from seqopt.arrays import Vector
+from seqopt.arrays import Floats, FrozenValue, Ints, Vector
 from seqopt.errors import SceneError
 from seqopt.scene._checks import (
     MOST_BRICKS,
@@ -19,10 +19,12 @@ from seqopt.scene._checks import (
     kind_of,
     positive,
     stiffness,
+    units,
     unless_none,
 )
 from seqopt.scene.arch import STANDARD_GRAVITY
-from seqopt.scene.parts import Brick, Robot
+from seqopt.scene.boxes import Boxes, as_vector, boxes, spring_fields
+from seqopt.scene.parts import THICKEST, Brick, Ground, Joint, Robot
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,3 +168,230 @@ def neighbors(chosen: Sequence[Tile]) -> list[tuple[int, int]]:
         for cell in ((row + 1, column), (row, column + 1))
     ]
     return sorted({(min(pair), max(pair)) for pair in beside if pair[0] != pair[1]})
+
+
+_ON_EDGE = 1e-12  # distance treated as zero, over the size of the faces
+_PARALLEL = 1e-12  # sine of an angle between edges treated as zero
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _ContactAreas(FrozenValue):
+    """The overlaps of P pairs of faces."""
+
+    area: Floats  # (P,); m²; 0 where faces do not overlap
+    centroid: Floats  # (P, 2); m
+    moments: Floats  # (P, 2); second moments of area about the two axes through the centroid, m⁴
+
+
+def _contact_areas(first: Floats, second: Floats) -> _ContactAreas:
+    """Return the overlaps of convex polygons (P, m, 2), counterclockwise, m."""
+    near = first.mean(axis=1, keepdims=True)
+    one, other = first - near, second - near
+    slack = _ON_EDGE * np.abs(one).max(initial=0.0)  # an edge that both have is counted once
+    start, end = (
+        np.concatenate(parts, axis=1)
+        for parts in zip(_inside(one, other, slack), _inside(other, one, -slack), strict=True)
+    )
+    turn = _cross(start, end)
+    area = 0.5 * turn.sum(axis=1)
+    real = area > slack**2
+    size = np.where(real, area, 1.0)[:, None]
+    centroid = (turn[:, :, None] * (start + end)).sum(axis=1) / (6 * size)
+    start, end = start - centroid[:, None], end - centroid[:, None]
+    squares = start**2 + start * end + end**2
+    moments = (_cross(start, end)[:, :, None] * squares).sum(axis=1)[:, ::-1] / 12
+    return _ContactAreas(
+        np.where(real, area, 0.0), centroid + near[:, 0], np.where(real[:, None], moments, 0.0)
+    )
+
+
+def _inside(polygon: Floats, other: Floats, slack: float) -> tuple[Floats, Floats]:
+    """Return where the part of each edge in another polygon starts and ends, each (P, m, 2)."""
+    start, step = polygon, np.roll(polygon, -1, axis=1) - polygon
+    side = units(np.roll(other, -1, axis=1) - other)
+    height = _cross(side[:, None], start[:, :, None] - other[:, None])  # (P, m, m)
+    slope = _cross(side[:, None], step[:, :, None])
+    flat = np.abs(slope) <= _PARALLEL * np.linalg.norm(step, axis=2)[:, :, None]
+    crossing = -height / np.where(flat, 1.0, slope)
+    outside = flat & (height + slack < 0)
+    enters = np.where(outside, np.inf, np.where(flat | (slope < 0), 0.0, crossing))
+    leaves = np.where(flat | (slope > 0), 1.0, crossing)
+    low = np.maximum(enters.max(axis=2), 0.0)
+    high = np.maximum(np.minimum(leaves.min(axis=2), 1.0), 0.0)
+    low = np.minimum(low, high)
+    return start + low[:, :, None] * step, start + high[:, :, None] * step
+
+
+def _cross(first: Floats, second: Floats) -> Floats:
+    return np.asarray(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0])
+
+
+_Pairs = Sequence[tuple[int, int]]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Faces(FrozenValue):
+    """The faces of boxes that look at others: box, axis across the face, unit vectors outward."""
+
+    which: Ints
+    axis: Ints
+    out: Floats
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _Overlaps(FrozenValue):
+    """Where pairs of boxes look at each other, seen along mean normals into the second.
+
+    ``sides`` (P, 2, 3): unit vectors across the normals, the first most nearly an edge of the first
+    box.
+    """
+
+    faces: tuple[_Faces, _Faces]
+    along: Floats
+    sides: Floats
+    shared: _ContactAreas
+
+
+def _overlaps(shapes: Boxes, pairs: _Pairs, normals: Floats | None = None) -> _Overlaps:
+    """Return where boxes look at each other, by default with the faces that do so most."""
+    a, b = np.array(pairs, dtype=np.int64).T
+    step = shapes.place[b] - shapes.place[a]
+    axes = _facing(shapes, a, b) if normals is None else _across(shapes, a, b, normals)
+    one, other = _towards(shapes, a, axes[0], step), _towards(shapes, b, axes[1], -step)
+    along = units(one.out - other.out)
+    across = shapes.frame[a, (one.axis + 1) % 3]
+    across = units(across - along * (along * across).sum(axis=1, keepdims=True))
+    sides = np.stack([across, np.cross(along, across)], axis=1)
+    shared = _contact_areas(_corners(shapes, one, sides), _corners(shapes, other, sides))
+    return _Overlaps((one, other), along, sides, shared)
+
+
+def _shares(bricks: Sequence[Brick], pairs: _Pairs, normals: Floats) -> Floats:
+    """Return how much of the smaller of two faces the other covers, (P,), from 0 to 1."""
+    if not pairs:
+        return np.zeros(0)
+    shapes = boxes(bricks)
+    found = _overlaps(shapes, pairs, normals)
+    whole = []
+    for face in found.faces:
+        side, other = (shapes.half[face.which, (face.axis + k) % 3] for k in (1, 2))
+        whole.append(4 * side * other)
+    return np.asarray(found.shared.area / np.minimum(*whole))
+
+
+def _between(shapes: Boxes, pairs: _Pairs, found: _Overlaps) -> tuple[Floats, list[float]]:
+    """Return the points (P, 3) halfway between faces, and the widths of joints that are thick."""
+    middle = (found.shared.centroid[:, None, :] @ found.sides)[:, 0]
+    start, end = (_height(shapes, face, found.along, middle) for face in found.faces)
+    slopes = [
+        (found.sides @ face.out[:, :, None])[..., 0] / (found.along * face.out).sum(axis=1)[:, None]
+        for face in found.faces
+    ]
+    area = np.maximum(found.shared.area, np.finfo(float).tiny)[:, None]
+    reach = np.sqrt(3 * found.shared.moments[:, ::-1] / area)  # half the sides of a rectangle
+    taper = (np.abs(slopes[1] - slopes[0]) * reach).sum(axis=1)  # at the ends of the overlap
+    place = middle + 0.5 * (start + end)[:, None] * found.along
+    thin = 2 * shapes.half[np.array(pairs)].min(axis=(1, 2))
+    widest = end - start + taper
+    thick: list[float] = np.where(widest > THICKEST * thin, widest, 0.0).tolist()
+    return place, thick
+
+
+def _across(shapes: Boxes, a: Ints, b: Ints, normals: Floats) -> tuple[Ints, Ints]:
+    """Return the axes of first and second boxes that are most nearly along given directions."""
+    one, other = (np.abs(shapes.frame[i] @ normals[:, :, None])[..., 0] for i in (a, b))
+    return one.argmax(axis=1), other.argmax(axis=1)
+
+
+def _facing(shapes: Boxes, a: Ints, b: Ints) -> tuple[Ints, Ints]:
+    """Return the axes across the faces of first and second boxes that look at each other.
+
+    Of the first's faces, each with the most nearly parallel one of the second, it is those beyond
+    which the other box lies farthest, in its size.
+    """
+    turned = shapes.frame[a] @ shapes.frame[b].transpose(0, 2, 1)
+    partner = np.abs(turned).argmax(axis=2)
+    second = np.take_along_axis(_beyond(shapes, b, a), partner, axis=1)
+    axis = (_beyond(shapes, a, b) + second).argmax(axis=1)
+    return axis, partner[np.arange(len(a)), axis]
+
+
+def _beyond(shapes: Boxes, which: Ints, other: Ints) -> Floats:
+    """Return how far other boxes lie along the axes of some, (P, 3), over where they touch."""
+    frame = shapes.frame[which]
+    away = (frame @ (shapes.place[other] - shapes.place[which])[:, :, None])[:, :, 0]
+    turned = np.abs(frame @ shapes.frame[other].transpose(0, 2, 1))
+    reach = (turned @ shapes.half[other][:, :, None])[:, :, 0]
+    return np.asarray(np.abs(away) / (shapes.half[which] + reach))
+
+
+def _towards(shapes: Boxes, which: Ints, axis: Ints, step: Floats) -> _Faces:
+    """Return the faces across some axes that look along steps (P, 3)."""
+    normal = shapes.frame[which, axis]
+    return _Faces(which, axis, np.sign((normal * step).sum(axis=1))[:, None] * normal)
+
+
+def _corners(shapes: Boxes, face: _Faces, sides: Floats) -> Floats:
+    """Return the corners (P, 4, 2) of faces along two axes each (P, 2, 3), counterclockwise."""
+    row = np.arange(len(face.which))
+    edges = [(face.axis + k) % 3 for k in (1, 2)]
+    frame, half = shapes.frame[face.which], shapes.half[face.which]
+    flat = [
+        half[row, edge][:, None] * (sides @ frame[row, edge][:, :, None])[:, :, 0] for edge in edges
+    ]
+    flat[1] *= np.sign(flat[0][:, :1] * flat[1][:, 1:] - flat[0][:, 1:] * flat[1][:, :1])
+    center = shapes.place[face.which] + half[row, face.axis][:, None] * face.out
+    middle = (sides @ center[:, :, None])[:, :, 0]
+    signs = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    return np.stack([middle + a * flat[0] + b * flat[1] for a, b in signs], axis=1)
+
+
+def _height(shapes: Boxes, face: _Faces, along: Floats, point: Floats) -> Floats:
+    """Return how far along directions (P, 3) from points (P, 3) faces lie, (P,)."""
+    half = shapes.half[face.which, face.axis]
+    away = ((shapes.place[face.which] - point) * face.out).sum(axis=1) + half
+    return np.asarray(away / (along * face.out).sum(axis=1))
+
+
+_STUB = 0.05  # m; of a ground end that does not say
+
+
+def _joints_between(
+    bricks: Sequence[Brick], pairs: _Pairs, law: JointLaw, normals: Floats | None = None
+) -> tuple[Joint, ...]:
+    """Return the joints of bricks, each where the faces that look at each other overlap.
+
+    They are in the middle of the overlap, halfway between the faces; axes are the faces' mean
+    normal and the edge of the first brick that is most nearly across it. One that is thick says so.
+    """
+    if not pairs:
+        return ()
+    shapes = boxes(bricks)
+    found = _overlaps(shapes, pairs, normals)
+    apart = np.flatnonzero(found.shared.area == 0)
+    if len(apart):
+        i, j = pairs[apart[0]]
+        raise SceneError(
+            f"joint ({bricks[i].name}, {bricks[j].name}): the faces of its bricks do not overlap; "
+            "move the bricks to each other"
+        )
+    place, thick = _between(shapes, pairs, found)
+    stiff = map(law.stiffness, found.shared.area.tolist(), found.shared.moments.tolist())
+    fields = map(spring_fields, place, found.along, found.sides[:, 0], stiff)
+    return tuple(
+        Joint(bricks=(bricks[i].name, bricks[j].name), thickness=width or None, **held)
+        for (i, j), held, width in zip(pairs, fields, thick, strict=True)
+    )
+
+
+def _ground_under(brick: Brick, down: Floats, law: JointLaw, stub: float = _STUB) -> Ground:
+    """Return the ground end in the middle of the face of a brick that looks down (3,) most."""
+    shapes = boxes([brick])
+    frame, half = shapes.frame[0], shapes.half[0]
+    i = int(np.abs(frame @ down).argmax())
+    out = np.sign(frame[i] @ down) * frame[i]
+    place = shapes.place[0] + half[i] * out
+    side, other = (i + 1) % 3, (i + 2) % 3
+    stiff = law.over_rectangle(2 * float(half[side]), 2 * float(half[other]))
+    fields = spring_fields(place, -out, frame[side], stiff)
+    return Ground(brick=brick.name, anchor=as_vector(place + stub * out), **fields)

@@ -17,13 +17,13 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.scene._axes import units
-from seqopt.scene._checks import check, finite, length, whole_between
+from seqopt.scene._checks import check, finite, length, units, whole_between
 from seqopt.scene.boxes import as_vector, require_apart
-from seqopt.scene.library._joints import ground_under, joints_between
 from seqopt.scene.library.common import (
     JointLaw,
     Tile,
+    _ground_under,
+    _joints_between,
     mobile_robots,
     neighbors,
     tiles,
@@ -319,7 +319,7 @@ def _joints(line: _ArchLine, chosen: Sequence[Tile], bricks: Sequence[Brick]) ->
     own = len(line.bricks)
     pairs = [pair for pair in neighbors(chosen) if pair[1] >= own]
     pairs.sort(key=lambda pair: pair[::-1])
-    return (*line.joints, *joints_between(bricks, pairs, line.law))
+    return (*line.joints, *_joints_between(bricks, pairs, line.law))
 
 
 def _grounds(
@@ -332,5 +332,5 @@ def _grounds(
         if foot:
             forward = np.array(brick.length_axis if tile.along else brick.width_axis)
             forward = forward * np.sign(forward @ line.speed(np.array([tile.middle[0]]))[0])
-            out.append(ground_under(brick, foot * forward, line.law, line.stub))
+            out.append(_ground_under(brick, foot * forward, line.law, line.stub))
     return tuple(out)

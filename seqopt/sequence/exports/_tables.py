@@ -40,8 +40,6 @@ class StepStates:
 def step_states(scene: Scene, steps: Sequence[Step]) -> Iterator[StepStates]:
     """Yield what becomes of every block in every step of a checked plan for the scene.
 
-    Examples
-    --------
     >>> import seqopt
     >>> scene = seqopt.load_scene("arch25")
     >>> steps = seqopt.sequential(seqopt.build_network(scene))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cache, partial
 
@@ -17,13 +17,24 @@ import numpy as np
 import pandas as pd
 
 from seqopt._files import csv_text
+from seqopt.arms.reach import PostureTable
+from seqopt.arrays import Floats
 from seqopt.errors import StepError
 from seqopt.scene._checks import finite, positive, rows, short
-from seqopt.scene.boxes import vertices_of
+from seqopt.scene.boxes import as_vector, vertices_of
 from seqopt.scene.parts import Brick, Robot, Sphere
 from seqopt.scene.scene import Scene
-from seqopt.sequence.exports._compas_values import Document, compas_frame, mesh_data, typed
-from seqopt.sequence.exports._grip_frames import Frame, Held, brick_frame, hold
+from seqopt.sequence._postures import PlanPostures, plan_postures
+from seqopt.sequence.exports._grip_frames import (
+    Document,
+    Frame,
+    Held,
+    brick_frame,
+    compas_frame,
+    hold,
+    mesh_data,
+    typed,
+)
 from seqopt.sequence.steps import Grips, Step, StepKind
 
 Postures = Mapping[tuple[str, int], Sequence[float]]
@@ -131,7 +142,6 @@ def _grip(
     robot: Robot,
     node: int,
 ) -> _Grip:
-    """Return how a robot holds a node."""
     brick = scene.brick_of_node[node]
     away = max(brick.dimensions) if far is None else far
     posture = known.get((robot.name, node))
@@ -207,7 +217,6 @@ def tasks_json(scene: Scene, tasks: Iterable[Task]) -> str:
 
 
 def _block(brick: Brick) -> Document:
-    """Return a block: its shape where it is built."""
     shape = typed("compas.datastructures/Mesh", mesh_data(*vertices_of(brick)))
     frame = compas_frame(brick_frame(brick))
     return {"block": brick.name, "mass": brick.mass, "frame": frame, "shape": shape}
@@ -272,3 +281,64 @@ def _places(name: str, frames: Sequence[Frame | None]) -> pd.DataFrame:
         out[known, 3:] = turned[:, [3, 0, 1, 2]]
     ends = ("x", "y", "z", "qw", "qx", "qy", "qz")
     return pd.DataFrame(out.round(9) + 0.0, columns=[f"{name}_{end}" for end in ends])
+
+
+def _known_tasks(
+    scene: Scene,
+    steps: Sequence[Step],
+    distance: float | None = None,
+    postures: Postures | None = None,
+) -> Iterator[Task]:
+    """Yield tasks of a plan as `plan_tasks` does, by default in the postures of its arms.
+
+    Raises `ExtraError` if these have to be computed and nothing is installed that does.
+    """
+    tasks = plan_tasks(scene, steps, distance, postures)
+    found = plan_postures(scene, steps) if postures is None else None
+    return tasks if found is None else _in_postures(scene, tasks, found)
+
+
+def _in_postures(scene: Scene, tasks: Iterable[Task], found: PlanPostures) -> Iterator[Task]:
+    """Yield tasks of a plan with the postures of its steps; those of steps without stay.
+
+    A robot that lets go does so in the posture in which it held, that of the step before.
+    """
+    places = {robot.name: i for i, robot in enumerate(scene.robots)}
+    for task in tasks:
+        step = task.step - 1 - (task.action is Action.RELEASE)
+        row = found.steps[step][places[task.robot]]
+        brick = scene.brick_of_node[task.node]
+        yield task if row is None else _in_posture(task, brick, found.table, row)
+
+
+def _in_posture(task: Task, brick: Brick, table: PostureTable, row: int) -> Task:
+    """Return a task with the joints and the frames of a row of the table."""
+    axes, block = table.axes[row], brick_frame(brick)
+    tool = Frame(brick.node_position(task.node), as_vector(axes[:, 0]), as_vector(axes[:, 1]))
+    out = replace(task, grip_in_block=tool.inside(block), depth=_depth(brick, tool))
+    if task.grip is None:
+        return out
+    joints = table.joints[row]
+    approach, retreat = (_gone(task, tool, frame) for frame in (task.approach, task.retreat))
+    posture = tuple(joints[np.isfinite(joints)].tolist())
+    return replace(out, grip=tool, approach=approach, retreat=retreat, posture=posture)
+
+
+def _gone(task: Task, tool: Frame, frame: Frame | None) -> Frame | None:
+    """Return where a tool comes from or goes to, as far from its grip as was proposed.
+
+    A block that is placed comes along its own way; else the tool goes straight back.
+    """
+    if frame is None or task.grip is None:
+        return None
+    way: Floats = np.subtract(frame.point, task.grip.point)
+    far = float(np.linalg.norm(way))
+    back = way / far if task.action is Action.PLACE else -tool.axes[2]
+    return tool.moved(back, far)
+
+
+def _depth(brick: Brick, tool: Frame) -> float:
+    """Return how far a node is behind the face that its tool looks through, m."""
+    out = -tool.axes[2]
+    half = 0.5 * float(np.abs(brick.frame @ out) @ np.array(brick.dimensions))
+    return half - float(np.subtract(tool.point, brick.position) @ out)

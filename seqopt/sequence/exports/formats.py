@@ -1,38 +1,373 @@
-"""Formats in which a plan can be written, and reading the folder of a plan."""
+"""Formats in which a plan can be written, and reading the folder of a plan.
+
+Those of COMPAS are JSON as `compas.json_load` reads it, written without COMPAS.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+import csv
+import io
+import json
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from seqopt._files import read_text
+from seqopt.arrays import Floats
 from seqopt.errors import FileError, StepError
 from seqopt.scene._checks import short
+from seqopt.scene.boxes import vertices_of
+from seqopt.scene.imports._building import block_numbers, carry
+from seqopt.scene.imports._compas_models import assembly_graph, by_guid
+from seqopt.scene.imports._compas_shapes import kind, payload
+from seqopt.scene.imports._content import entry, parse_json
+from seqopt.scene.imports.formats import read_content, sniffed
+from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.exports._arm_tasks import _known_tasks
-from seqopt.sequence.exports._blocks import blocks_obj, boxes_csv
-from seqopt.sequence.exports._compas_fab import fab_json
-from seqopt.sequence.exports._compas_plans import Source, compas_assembly, read_source, timber_plan
-from seqopt.sequence.exports._tables import plan_csv, plan_json, sequencer_json
-from seqopt.sequence.exports._tasks import Postures, Task, tasks_csv, tasks_json
+from seqopt.sequence.exports._grip_frames import (
+    Document,
+    Frame,
+    Held,
+    brick_frame,
+    compas_frame,
+    hold,
+    mesh_data,
+    typed,
+)
+from seqopt.sequence.exports._tables import (
+    StepStates,
+    plan_csv,
+    plan_json,
+    sequencer_json,
+    step_states,
+)
+from seqopt.sequence.exports._tasks import Postures, Task, _known_tasks, tasks_csv, tasks_json
 from seqopt.sequence.schedule_file import read_plan
-from seqopt.sequence.steps import Step
+from seqopt.sequence.steps import Step, StepKind
+
+
+def _boxes_csv(scene: Scene) -> str:
+    """Return bricks as the table of boxes that ``import`` reads, in m and degrees.
+
+    A brick of another shape is as long, wide and high as it extends.
+    """
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    turns, sizes = ("roll", "pitch", "yaw"), ("length", "width", "height")
+    writer.writerow(["name", "x", "y", "z", *sizes, *turns, "density", "course"])
+    for brick in scene.bricks:
+        from scipy.spatial.transform import Rotation  # noqa: PLC0415  # slow to import
+
+        turn = Rotation.from_matrix(brick.frame.T)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of many angles for a turn one is enough
+            angles = turn.as_euler("xyz", degrees=True).tolist()
+        numbers = [*brick.position, *brick.dimensions, *angles, brick.density]
+        writer.writerow([brick.name, *map(repr, numbers), scene.since[brick.name]])
+    return out.getvalue()
+
+
+def _blocks_obj(scene: Scene) -> str:
+    """Return bricks as a mesh each, in m: objects of an OBJ file, called as the bricks are."""
+    lines, first = list[str](), 1
+    for brick in scene.bricks:
+        points, faces = vertices_of(brick)
+        lines.append(f"o {brick.name}")
+        lines += ["v " + " ".join(map(repr, row)) for row in np.asarray(points).tolist()]
+        lines += ["f " + " ".join(str(first + i) for i in face) for face in faces]
+        first += len(points)
+    return "\n".join(lines) + "\n"
+
+
+_WORLD = Frame((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+_REVOLUTE = 0  # the type of a joint that turns
+
+
+def _fab_json(scene: Scene, tasks: Iterable[Task]) -> str:
+    """Return tasks for compas_fab.
+
+    ``cell`` is a ``RobotCell`` without a robot, with every block as a ``RigidBody`` in its own
+    frame; ``states`` has a ``RigidBodyState`` of each where it is built; ``tasks`` has a row for
+    each task, with its ``approach``, ``grip`` and ``retreat`` as ``FrameTarget`` of the tool, the
+    ``attachment`` frame of the block in the tool's, and the ``posture`` as ``ConfigurationTarget``.
+    """
+    cell = {
+        "robot_model": None,
+        "robot_semantics": None,
+        "tool_models": {},
+        "rigid_body_models": {_name(brick.name): _body(brick) for brick in scene.placed},
+    }
+    whole = {
+        "format": "seqopt-compas_fab",
+        "version": 1,
+        "scene": scene.name,
+        "cell": typed("compas_fab.robots/RobotCell", cell),
+        "states": {_name(brick.name): _state(brick) for brick in scene.placed},
+        "tasks": [_task(task) for task in tasks],
+    }
+    return json.dumps(whole, ensure_ascii=False) + "\n"
+
+
+def _name(block: int) -> str:
+    return f"block_{block}"
+
+
+def _body(brick: Brick) -> Document:
+    """Return what a rigid body holds: the mesh of a block in its own frame."""
+    points, faces = vertices_of(brick)
+    own = (points - brick.position) @ brick.frame.T
+    mesh = typed("compas.datastructures/Mesh", mesh_data(own, faces))
+    return {"visual_meshes": [mesh], "collision_meshes": [mesh], "native_scale": 1.0}
+
+
+def _state(brick: Brick) -> Document:
+    """Return a block where it is built."""
+    data: Document = {
+        "frame": compas_frame(brick_frame(brick)),
+        "attached_to_link": None,
+        "attached_to_tool": None,
+        "touch_links": [],
+        "touch_bodies": [],
+        "attachment_frame": None,
+        "is_hidden": False,
+    }
+    return typed("compas_fab.robots/RigidBodyState", data)
+
+
+def _task(task: Task) -> Document:
+    """Return a task with targets for a tool; what there is not is null."""
+    said = f"{task.robot}, step {task.step}: {task.action.value} {_name(task.block)}"
+    targets = {
+        name: _target(f"{said}, {name}", getattr(task, name))
+        for name in ("approach", "grip", "retreat")
+    }
+    return {
+        "step": task.step,
+        "type": task.kind.value,
+        "action": task.action.value,
+        "robot": task.robot,
+        "block": _name(task.block),
+        "node": task.node,
+        "built": task.built,
+        **targets,
+        "attachment": compas_frame(_WORLD.inside(task.grip_in_block)),
+        "posture": _configuration(said, task.posture),
+    }
+
+
+def _target(said: str, frame: Frame | None) -> Document | None:
+    if frame is None:
+        return None
+    data = {
+        "target_frame": compas_frame(frame),
+        "target_mode": "TOOL",
+        "native_scale": 1.0,
+        "tolerance_position": None,
+        "tolerance_orientation": None,
+        "name": said,
+    }
+    return typed("compas_fab.robots/FrameTarget", data)
+
+
+def _configuration(said: str, posture: tuple[float, ...] | None) -> Document | None:
+    """Return a posture of joints that turn."""
+    if posture is None:
+        return None
+    joints = {
+        "joint_values": list(posture),
+        "joint_types": [_REVOLUTE] * len(posture),
+        "joint_names": [],
+    }
+    data = {
+        "target_configuration": typed("compas_robots/Configuration", joints),
+        "tolerance_above": None,
+        "tolerance_below": None,
+        "name": said,
+    }
+    return typed("compas_fab.robots/ConfigurationTarget", data)
+
+
+@dataclass(frozen=True)
+class _Source:
+    """A file from which a scene was imported."""
+
+    names: Mapping[int, str]  # of bricks: identifiers of elements of a COMPAS model, else keys
+    graph: Any = None  # its document if it is a graph of compas_assembly
+
+
+def _read_source(scene: Scene, path: Path) -> _Source:
+    """Return the file from which a scene was imported, in any format that ``import`` knows."""
+    content, graph = read_content(path), None
+    keys = names = [block.key for block in content.blocks]
+    if path.suffix.lower() == ".json":
+        document = parse_json(read_text(path), str(path))
+        form = sniffed(document, str(path))
+        graph = document if form == "compas_assembly" and isinstance(document, dict) else None
+        if form in ("compas_model", "compas_dem", "compas_timber"):
+            held = payload(document)
+            held = payload(held["model"]) if "model" in held else held
+            rows = by_guid(f"{path}: element", held["elements"])
+            beams = form == "compas_timber"  # its blocks are counted among its beams
+            guids = [guid for guid, item in rows if not beams or kind(item) == "beam"]
+            names = [guids[int(key)] for key in keys]
+    found = dict(zip(block_numbers(keys), names, strict=True))
+    lost = [brick.name for brick in scene.bricks if brick.name not in found]
+    if lost:
+        raise StepError(f"the source has no block {lost[0]}; give the file that was imported")
+    return _Source(found, graph)
+
+
+def _timber_plan(scene: Scene, steps: Sequence[Step], source: _Source | None = None) -> str:
+    """Return a plan as a ``BuildingPlan`` of compas_timber, JSON, in names of the source if any."""
+    names = source.names if source else {b.name: str(b.name) for b in scene.bricks}
+    robots, frames = {robot.name: robot for robot in scene.robots}, cache(partial(hold, scene))
+    rows, before = [], _Holds()
+    for row in step_states(scene, steps):
+        grips = {
+            robot: (f"{robot} holds {names[brick]} at node {node}", frames(robots[robot], node))
+            for robot, (node, brick) in row.holds.items()
+        }
+        frame = Frame((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+        if row.new:
+            frame = brick_frame(scene.placed[row.step.bricks - len(row.new)])
+        data = {
+            "location": compas_frame(frame),
+            "geometry": "box",
+            "priority": row.step.number - 1,
+            "element_ids": [names[name] for name in row.new],
+            "instructions": [_text(robot, *said) for robot, said in grips.items()],
+            "is_built": False,
+            "is_planned": True,
+            "elements_held": sorted({names[brick] for _, brick in row.holds.values()}),
+            "actor": "ROBOT",
+        }
+        said = ", ".join(_told(row, names, before))
+        rows.append(typed("compas_timber.planning/Step", data, name=said))
+        before = row.holds
+    return json.dumps(typed("compas_timber.planning/BuildingPlan", {"steps": rows})) + "\n"
+
+
+_Holds = dict[str, tuple[int, int]]
+
+
+def _told(row: StepStates, names: Mapping[int, str], before: _Holds) -> Iterator[str]:
+    """Yield what robots do in a step, in words, whose grips it changes."""
+    for robot, (node, brick) in row.holds.items():
+        if before.get(robot) != (node, brick):
+            does = "places" if brick in row.new else "takes"
+            yield f"{robot} {does} {names[brick]}"
+    for robot, (_, brick) in before.items():
+        if robot not in row.holds:
+            does = "removes" if row.step.kind is StepKind.REMOVE else "lets go of"
+            yield f"{robot} {does} {names[brick]}"
+
+
+def _text(robot: str, said: str, held: Held) -> Document:
+    """Return what a robot holds as an instruction: text where its tool is."""
+    data = {"id": robot, "location": compas_frame(held.grip), "text": said, "size": held.depth}
+    return typed("compas_timber.planning/Text3d", data)
+
+
+def _assembly_with_plan(scene: Scene, steps: Sequence[Step], source: _Source | None = None) -> str:
+    """Return an assembly of compas_assembly with the plan as attributes, JSON.
+
+    A source that is an assembly stays as it is, with attributes added; otherwise blocks and faces
+    are those of the scene, and ``name`` what the source calls them. Every node of a block that is
+    built has ``order``, its place in the build, ``place_step`` and ``held``, a list of step, robot
+    and node; the graph has ``plan``, a list of steps.
+    """
+    kept = None if source is None else source.graph
+    whole = _assembly(scene) if kept is None else kept
+    graph = assembly_graph(whole, "source")[0]
+    found = entry("source", graph, "node", "vertex")
+    names = source.names if source else {}
+    nodes = {
+        brick.name: found[names[brick.name] if kept is not None else str(brick.name)]
+        for brick in scene.bricks
+    }
+    for i, brick in enumerate(scene.placed):
+        nodes[brick.name].update(order=i, place_step=None, held=[])
+        if source and kept is None:
+            nodes[brick.name]["name"] = names[brick.name]
+    plan = graph.setdefault("attributes", {})["plan"] = []
+    for row in step_states(scene, steps):
+        number, kind_of = row.step.number, row.step.kind.value
+        for name in row.new:
+            nodes[name]["place_step"] = number
+        for robot, (node, name) in row.holds.items():
+            nodes[name]["held"].append([number, robot, node])
+        holds = {robot: list(held) for robot, held in row.holds.items()}
+        plan.append({"step": number, "type": kind_of, "placed": list(row.new), "holds": holds})
+    keys = {name: names[name] if kept is not None else str(name) for name in nodes}
+    carry(graph, keys, scene, "m" if kept is None else None)
+    return json.dumps(whole) + "\n"
+
+
+def _assembly(scene: Scene) -> Document:
+    """Return the blocks of a scene and the faces between them as an assembly.
+
+    Faces on the ground make a support of their own, a surface: a block that is not closed.
+    """
+    nodes: dict[str, Document] = {
+        str(brick.name): {"block": _block(*vertices_of(brick))} for brick in scene.bricks
+    }
+    faces = [(joint.bricks, joint.corners) for joint in scene.joints]
+    most = max(brick.name for brick in scene.bricks)
+    stands = [end for end in scene.grounds if end.corners is not None]
+    if stands:
+        most += 1
+        polygons = [end.corners for end in stands if end.corners is not None]
+        ends = np.cumsum([0, *map(len, polygons)]).tolist()
+        sheet = _block(np.concatenate(polygons), [range(a, b) for a, b in pairwise(ends)])
+        nodes[str(most)] = {"block": sheet, "is_support": True}
+        faces += [((most, end.brick), end.corners) for end in stands]
+    edges: dict[str, dict[str, Any]] = {name: {} for name in nodes}
+    for (a, b), corners in faces:
+        if corners is not None:
+            edge = edges[str(a)].setdefault(str(b), {"interfaces": []})
+            points = {"points": [list(corner) for corner in corners]}
+            edge["interfaces"].append(typed("compas_assembly.datastructures/Interface", points))
+    graph = {
+        "attributes": {"name": scene.name},
+        "default_node_attributes": {"block": None, "is_support": False},
+        "default_edge_attributes": {"interfaces": None},
+        "node": nodes,
+        "edge": edges,
+        "max_node": most,
+    }
+    data = {
+        "attributes": {"name": scene.name},
+        "graph": typed("compas.datastructures/Graph", graph),
+    }
+    return typed("compas_assembly.datastructures/Assembly", data)
+
+
+def _block(points: Floats, faces: Sequence[Iterable[int]]) -> Document:
+    return typed("compas_assembly.datastructures/Block", mesh_data(points, faces))
+
 
 _PLAIN: dict[str, Callable[[Scene, Sequence[Step]], str]] = {
     "csv": plan_csv,
     "json": plan_json,
     "sequencer": sequencer_json,
 }
-_WITH_SOURCE: dict[str, Callable[[Scene, Sequence[Step], Source | None], str]] = {
-    "compas_timber": timber_plan,
-    "compas_assembly": compas_assembly,
+_WITH_SOURCE: dict[str, Callable[[Scene, Sequence[Step], _Source | None], str]] = {
+    "compas_timber": _timber_plan,
+    "compas_assembly": _assembly_with_plan,
 }
 _TASKS: dict[str, Callable[[Scene, Iterable[Task]], str]] = {
     "tasks": tasks_json,
     "tasks_csv": lambda _, tasks: tasks_csv(tasks),
-    "compas_fab": fab_json,
+    "compas_fab": _fab_json,
 }
-_BLOCKS: dict[str, Callable[[Scene], str]] = {"boxes": boxes_csv, "obj": blocks_obj}
+_BLOCKS: dict[str, Callable[[Scene], str]] = {"boxes": _boxes_csv, "obj": _blocks_obj}
 TASKS = tuple(_TASKS)
 """Formats of what robots do, with postures where they have arms."""
 EXPORTS = (*_PLAIN, *_TASKS, *_WITH_SOURCE, *_BLOCKS)
@@ -76,7 +411,7 @@ def export_plan(  # what is written, and what some formats take beside
     if form not in _TASKS and (distance is not None or postures):
         raise StepError(f"format {form} takes no distance or postures; {', '.join(TASKS)} do")
     if form in _WITH_SOURCE:
-        read = None if source is None else read_source(scene, Path(source))
+        read = None if source is None else _read_source(scene, Path(source))
         return _WITH_SOURCE[form](scene, steps, read)
     if source is not None:
         raise StepError(f"format {form} takes no source; leave it out")

@@ -15,8 +15,8 @@ from compas_model.models import Model
 
 from seqopt.errors import FileError, SceneError
 from seqopt.scene.imports._content import FileBlock, Given
+from seqopt.scene.imports._mesh_files import _polysurface
 from seqopt.scene.imports._meshes import object_content, repair_shape
-from seqopt.scene.imports._rhino import _polysurface
 from seqopt.scene.imports.formats import import_scene, read_content
 
 DENSE, GIVEN = Given(density=2000.0), Given(unit="m", density=2000.0)

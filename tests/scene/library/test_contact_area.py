@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt.scene.library._joints import contact_areas
+from seqopt.scene.library.common import _contact_areas
 
 numbers = st.floats(-1, 1)
 
@@ -27,7 +27,7 @@ def about_origin(found):
 @given(wide=st.floats(0.1, 2), high=st.floats(0.1, 2), x=numbers, y=numbers)
 def test_a_face_on_itself(wide, high, x, y):
     face = rectangle(wide, high, x, y)
-    found = contact_areas(face, face)
+    found = _contact_areas(face, face)
     assert found.area == pytest.approx([wide * high])
     assert found.centroid[0] == pytest.approx([x, y], abs=1e-12)
     assert found.moments[0] == pytest.approx([wide * high**3 / 12, wide**3 * high / 12])
@@ -37,7 +37,7 @@ def test_a_face_on_itself(wide, high, x, y):
 def test_faces_side_by_side_in_line(x, y):
     """Edges in one line are counted once."""
     for dx, dy in ((x, y), (x, 0.0), (0.0, y)):
-        found = contact_areas(rectangle(1, 1), rectangle(1, 1, dx, dy))
+        found = _contact_areas(rectangle(1, 1), rectangle(1, 1, dx, dy))
         wide, high = 1 - abs(dx), 1 - abs(dy)
         assert found.area == pytest.approx([wide * high], rel=1e-9, abs=1e-15)
         assert found.centroid[0] == pytest.approx([dx / 2, dy / 2], abs=1e-6)
@@ -47,12 +47,14 @@ def test_faces_side_by_side_in_line(x, y):
 def test_parts_of_a_cut_add_up(x, y, first, turn, cut):
     """A long rectangle, cut in two across its length, overlaps another as its parts do."""
     face = rectangle(0.8, 0.5, first, 0.2, first)
-    whole = contact_areas(face, rectangle(1.2, 0.6, x, y, turn))
+    whole = _contact_areas(face, rectangle(1.2, 0.6, x, y, turn))
     c, s = np.cos(turn), np.sin(turn)
     total = np.zeros(5)
     for low, high in ((-0.6, cut), (cut, 0.6)):
         middle = 0.5 * (low + high)
-        part = contact_areas(face, rectangle(high - low, 0.6, x + c * middle, y + s * middle, turn))
+        part = _contact_areas(
+            face, rectangle(high - low, 0.6, x + c * middle, y + s * middle, turn)
+        )
         total += about_origin(part)
     assert about_origin(whole) == pytest.approx(total, abs=1e-9)
     assert 0 <= whole.area[0] <= 0.4 + 1e-9
@@ -61,11 +63,11 @@ def test_parts_of_a_cut_add_up(x, y, first, turn, cut):
 @given(x=numbers, y=numbers, turn=st.floats(-3, 3))
 def test_order_does_not_count(x, y, turn):
     one, other = rectangle(0.8, 0.5), rectangle(1.2, 0.6, x, y, turn)
-    there, back = contact_areas(one, other), contact_areas(other, one)
+    there, back = _contact_areas(one, other), _contact_areas(other, one)
     assert about_origin(there) == pytest.approx(about_origin(back), abs=1e-9)
 
 
 def test_faces_apart_share_nothing():
-    found = contact_areas(rectangle(1, 1), rectangle(1, 1, 2.0, 0.3, 0.4))
+    found = _contact_areas(rectangle(1, 1), rectangle(1, 1, 2.0, 0.3, 0.4))
     assert found.area == 0
     assert (found.moments == 0).all()

@@ -30,7 +30,7 @@ from seqopt.scene.library import (
     herringbone_vault,
     wall,
 )
-from seqopt.scene.library._joints import joints_between
+from seqopt.scene.library.common import _joints_between
 from seqopt.scene.scene_file import _find_warnings, _scene_by_words, load_scene
 from seqopt.sequence.schedule import islands
 from seqopt.sequence.three_robots import three_robot_loop
@@ -277,7 +277,7 @@ def test_bricks_that_are_apart_have_no_joint(arch25):
     with pytest.raises(
         SceneError, match=r"joint \(1, 13\): the faces of its bricks do not overlap"
     ):
-        joints_between(arch25.bricks, [(0, 12)], law)
+        _joints_between(arch25.bricks, [(0, 12)], law)
 
 
 def test_a_vault_is_as_large_as_asked_and_a_skew_of_either_sign_builds_from_its_foot():

@@ -75,7 +75,6 @@ class Prop(Terse):
 
 
 def _unit(where: str, values: Iterable[float]) -> Vector:
-    """Return a direction as a unit vector."""
     x, y, z = vector(where, values)
     size = math.hypot(x, y, z)
     if not size > 0:
@@ -84,10 +83,7 @@ def _unit(where: str, values: Iterable[float]) -> Vector:
 
 
 def settled_props(props: Sequence[Prop], bricks: Mapping[int, Brick]) -> tuple[Prop, ...]:
-    """Return props, those that are said by a position at the nodes next to these.
-
-    ``bricks``: by node.
-    """
+    """Return props, those that are said by a position at the nodes of bricks next to these."""
     out = tuple(p if p.position is None else _at_node(p, p.position, bricks) for p in props)
     for i, prop in enumerate(out):
         if prop.node not in bricks:
@@ -99,7 +95,6 @@ def settled_props(props: Sequence[Prop], bricks: Mapping[int, Brick]) -> tuple[P
 
 
 def _at_node(prop: Prop, position: Vector, bricks: Mapping[int, Brick]) -> Prop:
-    """Return a prop at the node next to a position."""
     away, node = min((math.dist(b.node_position(n), position), n) for n, b in bricks.items())
     most = _NEAR * min(bricks[node].dimensions)
     if away > most:

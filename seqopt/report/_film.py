@@ -127,7 +127,6 @@ def _filling(box: tuple[Floats, Floats], ratio: float) -> tuple[Floats, Floats]:
 
 
 def _shown(figure: Figure) -> Image.Image:
-    """Return what a figure shows, as an image."""
     out = io.BytesIO()
     figure.savefig(out, format="png", dpi=_DPI)
     return Image.open(out).convert("RGB")

@@ -229,7 +229,6 @@ def _arcs_between(graph: Graph, on: Bools) -> Bools:
 def _instance(
     name: str, graph: Graph, asked: Any, rows: Ints, timed: TimedGraph | None = None
 ) -> Instance:
-    """Return the instance of a graph."""
     names, goals, caps = asked
     arrays = graph.source, graph.target, graph.ends
     return Instance(name, *arrays, tuple(names), graph.amounts, goals, caps, rows, timed)

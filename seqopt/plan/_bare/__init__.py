@@ -1,1 +1,0 @@
-"""Problems as instances, which need no scene: compiled, and solved."""

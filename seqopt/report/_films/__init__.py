@@ -1,1 +1,0 @@
-"""Builds as films (extra ``plot``)."""

@@ -1,1 +1,0 @@
-"""What a page opens with: the step that decides, and one sentence that can be acted on."""

@@ -1,1 +1,0 @@
-"""What holds beside robots, and how long robots take."""
