@@ -13,7 +13,7 @@ import pytest
 from experiments.harness.results import RESULTS, markdown, stored, two
 from seqopt._cli.arguments import COMMANDS
 from seqopt.plan.calling.formulation import On, exhibits, formulations
-from tests.browser import browsed
+from tests.browser import PLAIN, browsed, browses
 from tests.builders import ROOT
 from tests.docs.extensions import stated
 from tests.docs.site_links import broken
@@ -41,7 +41,7 @@ def test_the_site_builds_strictly(tmp_path):
     assert broken(tmp_path / "html") == []
     assert too_much(tmp_path / "html") == []
     search = (tmp_path / "html" / "search.html").as_uri()
-    if "<p>here</p>" in browsed(tmp_path, "data:text/html,<p>here</p>")[0]:
+    if browses():
         assert "faq.html" in found(tmp_path, f"{search}?q=infeasible")
         assert ".html" not in found(tmp_path, f"{search}?q=zzzz")  # the control
 
@@ -74,7 +74,8 @@ def test_words_of_a_page_are_those_that_are_read(tmp_path):
 
 def found(folder, search):
     """Return the list of what a search finds; the sidebar around it has every page."""
-    return re.search(r'id="search-results".*?<ul(.*?)</ul>', browsed(folder, search)[0], re.S)[1]
+    page, _ = browsed(folder, search, PLAIN)
+    return re.search(r'id="search-results".*?<ul(.*?)</ul>', page, re.S)[1]
 
 
 def build_page(folder, text):

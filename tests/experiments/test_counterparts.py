@@ -118,6 +118,7 @@ def test_differences_and_errors_follow_from_the_values():
 
 
 @pytest.mark.slow
+@pytest.mark.xdist_group("counterparts")  # for which one worker has all methods
 @pytest.mark.parametrize("label", sorted(set(COUNTERPARTS) - DEEP))
 def test_stored_values_are_computed_anew(own, label):
     now, then = tabulate(label, own), STORED[STORED["id"] == label]
