@@ -189,7 +189,7 @@ def _points(*, quick: bool, load: bool) -> pd.DataFrame:
     if len(stored) and set(stored["version"]) == {version("seqopt")}:
         return stored
     module = "experiments.placement.parts.speed_points"
-    scenes, seconds = (QUICK_SCENES, 1.0) if quick else (SCENES, POINT_LIMIT)
+    scenes, seconds = (QUICK_SCENES, 5.0) if quick else (SCENES, POINT_LIMIT)
     rows = [row for scene in scenes for row in apart(module, scene, seconds)]
     return pd.DataFrame(rows).assign(version=version("seqopt"), machine=machine())
 

@@ -35,6 +35,8 @@ def test_the_site_builds_strictly(tmp_path):
     assert done.returncode == 0, done.stderr
     page = (tmp_path / "html" / "tutorials" / "reference_arch.html").read_text(encoding="utf-8")
     assert "306.5" in page  # a number that only the executed tutorial prints
+    assert re.search(r'alt="What the code above draws, under the heading: \w', page)
+    assert "<msup>" in (tmp_path / "html" / "mechanics.html").read_text(encoding="utf-8")
     page = (tmp_path / "html" / "formulations" / "index.html").read_text(encoding="utf-8")
     assert f"takes {STATED['lp_times_25']} times as long at 25 bricks" in " ".join(page.split())
     assert page.count("<table") >= 4
@@ -105,17 +107,6 @@ def test_a_flaw_fails_the_build(tmp_path, flaw, said):
     done = build_page(tmp_path, flaw)
     assert done.returncode != 0
     assert [text for text in said if text not in done.stderr] == []
-
-
-@pytest.mark.slow
-def test_what_code_draws_has_words_and_equations_need_no_script(tmp_path):
-    cell = "```{code-cell}\nimport matplotlib.pyplot as plt\n_ = plt.plot([1, 2])\n```"
-    done = build_page(tmp_path, f"$$ x^2 $$\n\n## Curve\n\n{cell}")
-    assert done.returncode == 0, done.stderr
-    page = (tmp_path / "html" / "index.html").read_text(encoding="utf-8")
-    assert 'alt="What the code above draws, under the heading: Curve"' in page
-    assert "<msup><mi>x</mi><mn>2</mn></msup>" in page
-    assert broken(tmp_path / "html") == []
 
 
 def test_readme_shows_two_commands_that_exist():

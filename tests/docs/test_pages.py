@@ -44,7 +44,7 @@ def told():
 
 
 # commands that take as long as all others
-LONG = ("--order search", "seqopt pareto arch25", "--aim tolerance,minmax")
+LONG = ("--order search", "seqopt pareto arch25", "tolerance,minmax", "--film")
 
 
 def shown(name, *, long):
