@@ -215,7 +215,7 @@ def test_a_build_in_another_order_shows_its_own_bricks(engine25, builds, shown, 
     assert [build["rank"] for build in data["builds"]] == [None, [*range(24, -1, -1)]]
     (path := tmp_path / "report.html").write_text(text, "utf-8")
     for build, brick in (("sequential", 1), ("backward", 25)):
-        found, errors = shown(path, f"step=1&build={build}")
+        found, errors = shown(path, f"step=1&build={build}", PLAIN)
         assert errors == []
         assert f"Brick {brick} is placed by robot 1; 1 of 25 bricks stand." in found
 
