@@ -183,7 +183,7 @@ def experiment(options: Options) -> Finding:
     steps = arches(engine, quick=options.quick)
     study = printed("de_validation").set_index("bricks")["error_percent"]
     study = study.loc[[step.bricks for step in steps]]
-    scanned = scan(engine, steps, SIDES[:: 12 if options.quick else 1])
+    scanned = scan(engine, steps, SIDES[:: 24 if options.quick else 1])
     best = best_sides(scanned, study)
     every = {"stated": readings(), "best of 4 to 50 mm": [Reading.of(*key) for key in best.index]}
     table = pd.DataFrame(

@@ -5,6 +5,7 @@ The samples ship with compas_cra 0.8 (ETH Zurich, Block Research Group, MIT lice
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -20,7 +21,10 @@ from seqopt.sequence.exports.formats import export_plan
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict, assess
 
-pytestmark = pytest.mark.filterwarnings("ignore:scene .* rest on the ground")  # shelves do
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:scene .* rest on the ground"),  # shelves do
+    pytest.mark.xdist_group("samples of compas_cra"),  # which one worker reads
+]
 compas = pytest.importorskip("compas")
 compas_cra = pytest.importorskip("compas_cra")
 FOLDER = Path(compas_cra.SAMPLE)
@@ -28,6 +32,10 @@ SNAKE = pytest.param("snake", marks=pytest.mark.slow)
 SMALL = [*sorted(set(SAMPLES) - {"armadillo_cra", "snake"}), SNAKE]
 
 
+theirs_of = cache(sample_scene)
+
+
+@cache
 def imported(name, **more):
     supports = [str(i) for i in SAMPLES[name].supports] or None
     gap = SAMPLES[name].distance if name == "snake" else None
@@ -42,7 +50,7 @@ def structure(scene):
 @pytest.mark.parametrize("name", SMALL)
 def test_blocks_and_faces_are_those_of_compas_cra(name):
     """Volumes, and areas of faces that we and compas_cra find or that the file has."""
-    scene, theirs = imported(name), sample_scene(name)
+    scene, theirs = imported(name), theirs_of(name)
     assert len(scene.bricks) == len(theirs.free)
     volume = sum(brick.mass for brick in scene.bricks) / 2000.0
     assert volume == pytest.approx(theirs.volume, rel=2e-3)  # faces that are not flat
@@ -54,7 +62,7 @@ def test_blocks_and_faces_are_those_of_compas_cra(name):
 def test_verdicts_are_those_of_compas_cra(name):
     friction = SAMPLES[name].friction
     mine = assess(structure(imported(name)), Mortar(friction=friction))
-    assert mine.verdict is force_only(sample_scene(name), friction).verdict is Verdict.STANDS
+    assert mine.verdict is force_only(theirs_of(name), friction).verdict is Verdict.STANDS
 
 
 def test_too_little_friction_falls_for_both():

@@ -13,7 +13,7 @@ import pytest
 from experiments.harness.results import RESULTS, markdown, stored, two
 from seqopt._cli.arguments import COMMANDS
 from seqopt.plan.calling.formulation import On, exhibits, formulations
-from tests.browser import browsed
+from tests.browser import PLAIN, browsed, browses
 from tests.builders import ROOT
 from tests.docs.extensions import stated
 from tests.docs.site_links import broken
@@ -35,13 +35,15 @@ def test_the_site_builds_strictly(tmp_path):
     assert done.returncode == 0, done.stderr
     page = (tmp_path / "html" / "tutorials" / "reference_arch.html").read_text(encoding="utf-8")
     assert "306.5" in page  # a number that only the executed tutorial prints
+    assert re.search(r'alt="What the code above draws, under the heading: \w', page)
+    assert "<msup>" in (tmp_path / "html" / "mechanics.html").read_text(encoding="utf-8")
     page = (tmp_path / "html" / "formulations" / "index.html").read_text(encoding="utf-8")
     assert f"takes {STATED['lp_times_25']} times as long at 25 bricks" in " ".join(page.split())
     assert page.count("<table") >= 4
     assert broken(tmp_path / "html") == []
     assert too_much(tmp_path / "html") == []
     search = (tmp_path / "html" / "search.html").as_uri()
-    if "<p>here</p>" in browsed(tmp_path, "data:text/html,<p>here</p>")[0]:
+    if browses():
         assert "faq.html" in found(tmp_path, f"{search}?q=infeasible")
         assert ".html" not in found(tmp_path, f"{search}?q=zzzz")  # the control
 
@@ -74,7 +76,8 @@ def test_words_of_a_page_are_those_that_are_read(tmp_path):
 
 def found(folder, search):
     """Return the list of what a search finds; the sidebar around it has every page."""
-    return re.search(r'id="search-results".*?<ul(.*?)</ul>', browsed(folder, search)[0], re.S)[1]
+    page, _ = browsed(folder, search, PLAIN)
+    return re.search(r'id="search-results".*?<ul(.*?)</ul>', page, re.S)[1]
 
 
 def build_page(folder, text):
@@ -104,17 +107,6 @@ def test_a_flaw_fails_the_build(tmp_path, flaw, said):
     done = build_page(tmp_path, flaw)
     assert done.returncode != 0
     assert [text for text in said if text not in done.stderr] == []
-
-
-@pytest.mark.slow
-def test_what_code_draws_has_words_and_equations_need_no_script(tmp_path):
-    cell = "```{code-cell}\nimport matplotlib.pyplot as plt\n_ = plt.plot([1, 2])\n```"
-    done = build_page(tmp_path, f"$$ x^2 $$\n\n## Curve\n\n{cell}")
-    assert done.returncode == 0, done.stderr
-    page = (tmp_path / "html" / "index.html").read_text(encoding="utf-8")
-    assert 'alt="What the code above draws, under the heading: Curve"' in page
-    assert "<msup><mi>x</mi><mn>2</mn></msup>" in page
-    assert broken(tmp_path / "html") == []
 
 
 def test_readme_shows_two_commands_that_exist():

@@ -43,7 +43,8 @@ def told():
             yield pytest.param(text, id=path.stem)
 
 
-LONG = ("--order search", "seqopt pareto arch25")  # commands that take as long as all others
+# commands that take as long as all others
+LONG = ("--order search", "seqopt pareto arch25", "tolerance,minmax", "--film")
 
 
 def shown(name, *, long):

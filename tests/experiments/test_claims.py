@@ -10,7 +10,7 @@ from tests.commands import run
 
 ALWAYS = "frame_contrast"  # one that takes a second runs among the quick tests too
 
-LONG = ("identify_arch25", "dry_map")
+LONG = ("identify_arch25", "dry_map", "speed_accuracy")  # parts of the last: test_harness
 
 
 def marks(name):

@@ -11,13 +11,12 @@ import pytest
 from experiments.study.paper_counterparts import KNOWN, faults
 from experiments.study.parts.counterpart_page import page
 from seqopt._paper.items import AGREES, DISAGREES, ITEMS, PARTLY, TITLES, verdict
-from seqopt._paper.rows import COUNTERPARTS, cell, ours, tabulate
+from seqopt._paper.rows import COUNTERPARTS, cell
 from tests.builders import ROOT
 
 STORED = pd.read_csv(ROOT / "experiments" / "results" / "paper_counterparts.csv")
 PAGE = (ROOT / "docs" / "counterparts.md").read_text(encoding="utf-8")
 WITH_NUMBERS = [item for item in ITEMS if item.has_numbers]
-DEEP = {"table:validation_results"}  # takes longer than a second
 
 
 def agreement(label, text):
@@ -114,20 +113,6 @@ def test_differences_and_errors_follow_from_the_values():
     assert np.abs(gap - STORED["difference"]).max() <= 5e-3
     size = STORED["printed"].abs().clip(lower=1)
     assert (STORED["error_pct"] <= 100 * (gap.abs() + 1e-3) / size).all()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("label", sorted(set(COUNTERPARTS) - DEEP))
-def test_stored_values_are_computed_anew(own, label):
-    now, then = tabulate(label, own), STORED[STORED["id"] == label]
-    assert now["quantity"].tolist() == then["quantity"].tolist()
-    assert now["at"].tolist() == then["at"].tolist()
-    assert now["ours"].to_numpy(float) == pytest.approx(then["ours"].to_numpy(), rel=1e-3, abs=1e-3)
-
-
-@pytest.fixture(scope="module")
-def own():
-    return ours()
 
 
 @pytest.mark.parametrize(

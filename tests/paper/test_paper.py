@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from seqopt._paper import files
+from seqopt._paper.agreement import TITLES
 from seqopt._paper.files import NUMBERED, agreement_table, paper_files
 from tests.builders import ROOT
 from tests.commands import command
@@ -41,14 +42,19 @@ def test_every_item_is_said_to_agree_or_not():
 
 
 @pytest.mark.slow
-def test_the_command_computes_what_is_stored(capsys, tmp_path):
+def test_the_command_computes_what_is_stored(capsys, monkeypatch, tmp_path):
+    """One figure is drawn; all are in the tests of the documentation's figures."""
+    assert {item.picture for item in NUMBERED} <= {*TITLES}
+    some = NUMBERED[0].picture
+    monkeypatch.setattr(files, "TITLES", {some: TITLES[some]})
     status, out, _ = command(capsys, "paper", "--out", tmp_path / "paper", "--json")
     assert status == 0
     values = pd.DataFrame(json.loads(out)["values"])
-    assert [*values["id"]] == [*STORED["id"]]
+    for column in ("id", "quantity", "at"):
+        assert [*values[column]] == [*STORED[column]]
     assert values["ours"].to_numpy(float) == pytest.approx(
         STORED["ours"].to_numpy(float), rel=1e-4, abs=1e-4
     )
     names = {path.name for path in (tmp_path / "paper").iterdir()}
-    assert {f"{item.picture}.png" for item in NUMBERED} <= names
+    assert {f"{some}.png", f"{some}.svg"} <= names
     assert {"counterparts.csv", "paper.md", "table_B1.csv", "figure_9.csv"} <= names

@@ -127,14 +127,13 @@ def test_a_limit_on_one_robot_binds_it_alone():
 
 
 class Changed:
-    """A formulation of Pareto sets whose answer is changed."""
+    """A formulation of Pareto sets whose answer, which is known, is changed."""
 
-    def __init__(self, change):
-        self.change = change
+    def __init__(self, found, change):
+        self.found, self.change = found, change
 
     def __call__(self, problem, **options):
-        found = find_formulation("pareto_zones").solve(problem, **options)
-        return self.change(found)
+        return self.change(self.found)
 
 
 @pytest.fixture(scope="module")
@@ -142,10 +141,11 @@ def front_of(engine25):
     """Return the checked front of a changed answer."""
     problem = build_states(engine25, FreeRules(), ONES, "F_largest,M_sup")
     front = _StateFront(problem, {"F_largest": 20.0, "M_sup": 2.0})
+    found = find_formulation("pareto_zones").solve(front)
 
     def judged(change):
         formulation = Formulation(
-            "changed", "", FormulationKind.EXACT, None, Changed(change), on=On.FRONTS
+            "changed", "", FormulationKind.EXACT, None, Changed(found, change), on=On.FRONTS
         )
         return find_front(front, formulation)
 

@@ -17,7 +17,7 @@ from seqopt.responses.table import Departure, analyze
 from seqopt.sequence.two_robots import sequential
 from seqopt.stability._builds import BuildVerdicts
 from seqopt.stability.assessment import Verdict
-from tests.browser import BROWSER, WORDS, browsed
+from tests.browser import BROWSER, PLAIN, WORDS, browsed, browses
 
 STANDS, FALLS, OPEN = Verdict.STANDS, Verdict.FALLS, Verdict.UNDECIDED
 browser = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
@@ -112,7 +112,7 @@ def page(engine25, steps, table, tmp_path):
     build = Build("sequential", steps, pressed, known)  # in its last step all edges are pressed
     path = tmp_path / "report.html"
     path.write_text(report_page(engine25, [build], "Two robots take turns."), "utf-8")
-    if "<p>here</p>" not in browsed(tmp_path, "data:text/html,<p>here</p>")[0]:
+    if not browses():
         pytest.skip("Chromium does not run here")
     return path
 
@@ -173,7 +173,7 @@ def test_a_telephone_scrolls_one_way(page, tmp_path):
     for wrong in ("", "<style>#use { min-width: 600px; } #say { overflow: visible; }</style>"):
         inner = text.replace("</body>", wrong + ASK)
         (tmp_path / "inner.html").write_text(inner, "utf-8")
-        seen.append(browsed(tmp_path, f"file://{tmp_path / 'frame.html'}")[0])
+        seen.append(browsed(tmp_path, f"file://{tmp_path / 'frame.html'}", PLAIN)[0])
     assert 'data-wide="true"' in seen[0]
     assert 'data-wide="false"' in seen[1]  # the control
 

@@ -32,9 +32,10 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.two_robots import cantilever, sequential
 from seqopt.workflow import optimize
 from tests.blocks import L_SHAPE, prism
-from tests.browser import BROWSER, browsed
+from tests.browser import BROWSER, PLAIN, WORDS, browsed, browses
 
 browser = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
+SMALL = "chain:bricks=7"
 
 
 @pytest.fixture(scope="module")
@@ -144,12 +145,12 @@ def test_fields_are_left_out_where_there_are_too_many_and_it_says_so(engine25, b
 @pytest.mark.slow
 def test_commands_write_it_and_folders_are_read_again(capsys, tmp_path):
     out = tmp_path / "best"
-    assert main(["optimize", "--formulation", "overlap_dp", "--out", str(out)]) == 0
+    assert main(["optimize", SMALL, "--formulation", "overlap_dp", "--out", str(out)]) == 0
     first = data_of((out / "report.html").read_text("utf-8"))
     assert first["builds"][0]["name"] == "overlap_dp"
     plan = (out / "plan.csv").read_text("utf-8").splitlines()
     assert [",".join(row) for row in first["builds"][0]["rows"]] == plan[1:]
-    assert main(["report", "arch25", str(out), "--out", str(tmp_path / "again.html")]) == 0
+    assert main(["report", SMALL, str(out), "--out", str(tmp_path / "again.html")]) == 0
     again = data_of((tmp_path / "again.html").read_text("utf-8"))
     assert [build["name"] for build in again["builds"]] == ["plan"]
     assert again["builds"][0]["steps"] == first["builds"][0]["steps"]
@@ -168,11 +169,11 @@ FIGURES = ("plan_steps", "plan_grips", "responses")
 @pytest.fixture
 def shown(tmp_path):
     """Show a page as a browser has it once its script has run, and what it said of errors."""
-    if "<p>here</p>" not in browsed(tmp_path, "data:text/html,<p>here</p>")[0]:
+    if not browses():
         pytest.skip("Chromium does not run here")
 
-    def show(path, state=""):
-        text, said = browsed(tmp_path, f"file://{path}#{state}")
+    def show(path, state="", words=WORDS):
+        text, said = browsed(tmp_path, f"file://{path}#{state}", words)
         return text, [line for line in said.splitlines() if "CONSOLE" in line and "error" in line]
 
     return show
@@ -214,7 +215,7 @@ def test_a_build_in_another_order_shows_its_own_bricks(engine25, builds, shown, 
     assert [build["rank"] for build in data["builds"]] == [None, [*range(24, -1, -1)]]
     (path := tmp_path / "report.html").write_text(text, "utf-8")
     for build, brick in (("sequential", 1), ("backward", 25)):
-        found, errors = shown(path, f"step=1&build={build}")
+        found, errors = shown(path, f"step=1&build={build}", PLAIN)
         assert errors == []
         assert f"Brick {brick} is placed by robot 1; 1 of 25 bricks stand." in found
 
@@ -303,7 +304,7 @@ def test_a_browser_runs_no_script_that_is_not_the_pages_own(engine25, builds, sh
     wrong += "<img src='data:,' onerror='document.body.dataset.wrong = 2'></body>"
     for page_text, runs in ((text, False), (unguarded(text), True)):  # the control
         path.write_text(page_text.replace("</body>", wrong), "utf-8")
-        found, _ = shown(path)
+        found, _ = shown(path, words=PLAIN)
         assert 'data-ready="true"' in found
         assert ('data-wrong="' in found) == runs
 
@@ -349,7 +350,7 @@ def test_a_point_shows_its_build_and_words_stand_out(engine25, builds, shown, tm
     path, pale = tmp_path / "report.html", tmp_path / "pale.html"
     text = unguarded(text)
     path.write_text(text.replace("</body>", f"{LOOK}</body>"), "utf-8")
-    found, errors = shown(path, "step=12&build=sequential")
+    found, errors = shown(path, "step=12&build=sequential", PLAIN)
     assert errors == []
     assert "cantilever, step 12 of 49" in found  # its point was chosen by its key
     contrast, told = (re.search(f'data-{n}="([0-9.]+)"', found)[1] for n in ("contrast", "texts"))
@@ -357,7 +358,7 @@ def test_a_point_shows_its_build_and_words_stand_out(engine25, builds, shown, tm
     assert int(told) > 60
     faint = text.replace("--soft: #595959", "--soft: #999999")
     pale.write_text(faint.replace("</body>", f"{LOOK}</body>"), "utf-8")
-    low = re.search('data-contrast="([0-9.]+)"', shown(pale)[0])[1]
+    low = re.search('data-contrast="([0-9.]+)"', shown(pale, words=PLAIN)[0])[1]
     assert float(low) < 4.5  # the control
 
 

@@ -258,18 +258,18 @@ def test_a_run_that_was_killed_goes_on(tmp_path, workers):
     script.write_text(RUN, encoding="utf-8")
     cache, environment = tmp_path / "cache", {**os.environ, "PYTHONPATH": str(ROOT)}
 
-    def start(out):
+    def start(out, workers="1"):
         words = ["arch25", str(tmp_path / out), str(cache), "--workers", workers, "--no-proof"]
         return subprocess.Popen([sys.executable, str(script), *words], env=environment)
 
-    killed = start("killed")
+    killed = start("killed", workers)
     while len(list(cache.glob("*/*.answers"))) < 5 and killed.poll() is None:
         time.sleep(0.002)
     killed.send_signal(signal.SIGKILL)
     assert killed.wait() == -signal.SIGKILL
     assert not (tmp_path / "killed").exists()
     kept = {path: path.stat().st_mtime_ns for path in cache.glob("*/*.answers")}
-    runs = [start("one"), start("other")]
+    runs = [start("one", workers), start("other")]
     assert [run.wait() for run in runs] == [0, 0]
     assert {path: path.stat().st_mtime_ns for path in kept} == kept  # used as they were
     plain = ["arch25", str(tmp_path / "plain"), str(tmp_path / "new"), "--no-proof"]
