@@ -6,10 +6,10 @@ import json
 
 import pandas as pd
 import pytest
-from seqopt._paper.agreement import TITLES
 
 from seqopt._paper import files
 from seqopt._paper.files import NUMBERED, agreement_table, paper_files
+from seqopt._paper.items import TITLES
 from tests.builders import ROOT
 from tests.commands import command
 
