@@ -23,7 +23,7 @@ from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence._timing import StepTime, Waits, reassigned_steps, step_times
 from seqopt.sequence.schedule import Hold
-from seqopt.sequence.site import Site, _begin_step
+from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, StepKind, idle_robots
 from seqopt.stability._aging.builds import JointsInTime
 
@@ -119,16 +119,14 @@ def _cured(time: StepTime, before: float) -> dict[str, object]:
     return {"cures_s": max(0.0, time.start - ready), "joint": time.joint}
 
 
-def busy_table(
-    scene: Scene, steps: Sequence[Step], waits: Waits | None = None, begin: Site | None = None
-) -> pd.DataFrame:
+def busy_table(scene: Scene, steps: Sequence[Step], waits: Waits | None = None) -> pd.DataFrame:
     """Return how long each robot ``prepares_s``, ``acts_s``, ``holds_s`` and is ``idle_s``."""
-    times = step_times(scene, steps, waits, begin)
+    times = step_times(scene, steps, waits)
     out = {
         robot.name: dict.fromkeys(("prepares_s", "acts_s", "holds_s"), 0.0)
         for robot in scene.robots
     }
-    before: Sequence[int | None] = _begin_step(scene, begin).grips
+    before: Sequence[int | None] = (None,) * len(scene.robots)
     end = 0.0
     for step, time in zip(steps, times, strict=True):
         for r, robot in enumerate(scene.robots):

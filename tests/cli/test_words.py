@@ -129,6 +129,22 @@ def test_a_command_loads_what_it_needs():
     assert done.stdout.split() == []
 
 
+@pytest.mark.parametrize("form", [[], ["--json"]])
+def test_pandas_is_loaded_where_a_table_is_made(form):
+    words = ["optimize", "chain:bricks=6", *form]
+    said = "print('pandas.core' in sys.modules, file=sys.stderr)"
+    program = f"import sys\nfrom seqopt._cli.main import load, main\nload({words})"
+    program += f"\nassert main({words}) == 0"
+    done = subprocess.run(
+        [sys.executable, "-c", f"{program}\n{said}"],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=ROOT,
+    )
+    assert done.stderr.split()[-1] == str(bool(form))
+
+
 @pytest.mark.parametrize(
     ("words", "light"),
     [([], True), (["--help"], True), (["--version"], True), (["scene", "--help"], False)],

@@ -15,6 +15,7 @@ from seqopt.plan._times import busy_table, reassign, times_table
 from seqopt.plan.judge._time_proof import makespan
 from seqopt.scene import Durations
 from seqopt.sequence._timing import step_times
+from tests.commands import command as run
 from tests.times.builders import WORDS
 
 SCENE = seqopt.load_scene("arch25")
@@ -135,3 +136,11 @@ def test_scene_files_keep_durations(tmp_path):
     scene = SCENE.with_durations(WORDS, "rob3:speed=0.5")
     seqopt.save_scene(scene, tmp_path / "own.json")
     assert seqopt.load_scene(tmp_path / "own.json") == scene
+
+
+def test_times_of_a_part_are_refused_by_their_own_reason(capsys, tmp_path):
+    path = tmp_path / "rest.csv"
+    table = seqopt.analyze(seqopt.make_engine("compliance", NETWORK), STEPS["sequential"])
+    table[10:].to_csv(path, index=False)
+    status, _, said = run(capsys, "times", "arch25", "--plan", str(path), "--durations", WORDS)
+    assert (status, "error: steps from 11 on: times are of whole builds" in said) == (2, True)

@@ -103,6 +103,8 @@ def run(options: argparse.Namespace) -> Answer:
     try:
         given = build.times()["end_s"].iloc[-1]
     except StepError as error:
+        if standing is None and "durations" not in str(error):
+            raise
         where = "--durations" if "durations" in str(error) else "--curing"
         raise ProblemError(f"{where}: {error}") from None
     least = None
