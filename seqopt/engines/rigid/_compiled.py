@@ -58,9 +58,8 @@ def solve_grips(
     """
     columns, index = held
     sets, count = index.shape
-    low = np.empty((count, count, _SIDE_BY_SIDE))
+    low, share = np.empty((count, count, _SIDE_BY_SIDE)), np.empty((count, _SIDE_BY_SIDE))
     at = np.empty(count, dtype=np.uint64)  # else each look-up asks whether it counts from the end
-    share, pivots, own = np.empty((3, count, _SIDE_BY_SIDE))
     for start in range(0, sets, _SIDE_BY_SIDE):
         for s in range(_SIDE_BY_SIDE):
             mine = min(start + s, sets - 1)
@@ -70,14 +69,25 @@ def solve_grips(
                     low[i, j, s] = flexibility[at[i], at[j]]
                 share[i, s] = -dead[at[i]]
             _brace(low, s, axis, columns, mine)
-            for i in range(count):
-                own[i, s] = low[i, i, s]
-        _eliminate(low, pivots)
-        _substitute(low, share)
-        for s in range(min(_SIDE_BY_SIDE, sets - start)):
-            for i in range(count):
-                force[start + s, i] = share[i, s]
-                pivot[i, start + s] = pivots[i, s] / own[i, s]
+        _undo(low, share, start, force, pivot)
+
+
+@_compiled()
+def _undo(low: Floats, share: Floats, start: int, force: Floats, pivot: Floats) -> None:
+    """Find forces (S, k) and scaled pivots (k, S) of the sets from one on, which lie side by side.
+
+    ``low`` (k, k, w), ``share`` (k, w): their equations, which are used up.
+    """
+    pivots, own = np.empty((2, len(share), _SIDE_BY_SIDE))
+    for i in range(len(share)):
+        for s in range(_SIDE_BY_SIDE):
+            own[i, s] = low[i, i, s]
+    _eliminate(low, pivots)
+    _substitute(low, share)
+    for s in range(min(_SIDE_BY_SIDE, len(force) - start)):
+        for i in range(len(share)):
+            force[start + s, i] = share[i, s]
+            pivot[i, start + s] = pivots[i, s] / own[i, s]
 
 
 @_compiled()

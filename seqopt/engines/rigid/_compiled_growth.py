@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines.rigid._compiled import _SIDE_BY_SIDE, _brace, _compiled, _eliminate, _substitute
+from seqopt.engines.rigid._compiled import _SIDE_BY_SIDE, _brace, _compiled, _undo
 from seqopt.engines.rigid._grown_maps import Edges, Ends, Grown, Motion, Part
 
 _ROUNDED = 1 + 1e-9  # a bound is as much larger than what rounding may leave
@@ -21,8 +21,7 @@ def solve_grown(grown: Grown, axis: Floats, columns: Ints, force: Floats, pivot:
     As `seqopt.engines.rigid._compiled.solve_grips`, from what grows with the build.
     """
     sets, count = force.shape
-    low = np.empty((count, count, _SIDE_BY_SIDE))
-    share, pivots, own = np.empty((3, count, _SIDE_BY_SIDE))
+    low, share = np.empty((count, count, _SIDE_BY_SIDE)), np.empty((count, _SIDE_BY_SIDE))
     for start in range(0, sets, _SIDE_BY_SIDE):
         for s in range(_SIDE_BY_SIDE):
             mine = min(start + s, sets - 1)
@@ -32,14 +31,7 @@ def solve_grown(grown: Grown, axis: Floats, columns: Ints, force: Floats, pivot:
                 for j in range(i + 1):
                     _gather(low, s, grown, at, (i, j))
             _brace(low, s, axis, columns, mine)
-            for i in range(count):
-                own[i, s] = low[i, i, s]
-        _eliminate(low, pivots)
-        _substitute(low, share)
-        for s in range(min(_SIDE_BY_SIDE, sets - start)):
-            for i in range(count):
-                force[start + s, i] = share[i, s]
-                pivot[i, start + s] = pivots[i, s] / own[i, s]
+        _undo(low, share, start, force, pivot)
 
 
 @_compiled()
