@@ -123,7 +123,7 @@ class BuildProver:
         }
 
     @contextmanager
-    def beside(self, steps: Sequence[Step]) -> Iterator[None]:
+    def begun(self, steps: Sequence[Step]) -> Iterator[None]:
         """Let another process begin with a large build, while something else is done here."""
         asked = self._new({_state(step): step for step in steps})
         work = sum(step.bricks for each in asked.values() for step in each)

@@ -68,7 +68,7 @@ def test_another_process_that_begins_says_the_same(flat, builds, found, monkeypa
     monkeypatch.setattr(_builds, "_SHARED", 0)
     monkeypatch.setattr(_builds, "cores", lambda: 2)
     prover, steps = BuildProver(flat), builds["cantilever"]
-    with prover.beside(steps):
+    with prover.begun(steps):
         assert prover._shared is not None
         assert prover.of_builds({"cantilever": steps})["cantilever"] == found["cantilever"]
     assert prover._shared is None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil, isfinite
@@ -162,6 +163,10 @@ class Found:
             self.prover.refusal = "interrupted"
             return {}
 
+    def proving(self) -> AbstractContextManager[None]:
+        """Let another process begin to prove what stands: a command may start one, no script."""
+        return self.prover.begun(self.plan.steps)
+
     @property
     def own(self) -> tuple[BuildVerdicts, ...]:
         """The same, by mortar alone."""
@@ -188,7 +193,9 @@ class Found:
 
 def run(options: argparse.Namespace) -> Answer:
     """Choose every open grip of a build, or every step, and write the plan."""
-    return answered(options, find(options))
+    found = find(options)
+    with found.proving():
+        return answered(options, found)
 
 
 def find(options: argparse.Namespace) -> Found:
@@ -230,8 +237,7 @@ def answered(options: argparse.Namespace, found: Found) -> Answer:
         name = "bases.csv" if found.props is None else "fewest_props.csv"
         return made if outer is None else made | {name: csv_text(outer.tried)}
 
-    with found.prover.beside(plan.steps):
-        return _answer(options, found, write_outputs(options, files))
+    return _answer(options, found, write_outputs(options, files))
 
 
 def _from_empty(whole: Problem | None, plan: Plan, choose: Callable[[Problem], Plan]) -> str:

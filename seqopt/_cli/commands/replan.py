@@ -98,7 +98,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Answer:
     """Plan the rest of a build, and say what changes."""
-    return answered(options, *find(options))
+    base, found = find(options)
+    with found.proving():
+        return answered(options, base, found)
 
 
 def find(options: argparse.Namespace) -> tuple[argparse.Namespace, optimize.Found]:
