@@ -212,15 +212,15 @@ class Evaluation(Terse):
         Which responses every move needs; no others are computed.
     resources : Resources, optional
         Processes, memory and a folder for answers; by default this process alone.
-    beside : float, optional
-        About how much work is done beside it, as `seqopt.responses._blocks.work` has it.
+    more_work : float, optional
+        About how much more work is to come, as `seqopt.responses._blocks.work` has it.
     """
 
     engine: Engine
     schedule: Schedule
     wanted: Wanted
     resources: Resources = HERE
-    beside: float = 0.0
+    more_work: float = 0.0
 
     @property
     def work(self) -> float:
@@ -322,7 +322,7 @@ def _by_level(
             groups = [batch_of(schedule, steps, evaluation.wanted) for steps in level]
             under_way.append(groups)
             for group in groups:
-                yield from group.blocks(compiled=total + evaluation.beside >= COMPILED)
+                yield from group.blocks(compiled=total + evaluation.more_work >= COMPILED)
 
     total = evaluation.work
     engine, resources = evaluation.engine, evaluation.resources

@@ -18,7 +18,7 @@ from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.mortar import Mortar
 from seqopt.network.network import Network
 from seqopt.sequence.steps import Grips, Step
-from seqopt.stability._step_verdicts import beside, given_out, parts_sent
+from seqopt.stability._step_verdicts import given_out, parts_sent, shared_out
 from seqopt.stability._verdict_chain import VerdictChain, Way
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 from seqopt.stability.limit_analysis import compile_equilibrium
@@ -105,7 +105,7 @@ class SharedVerdicts:
 
     def __iter__(self) -> Iterator[Verdict]:
         """Yield the verdicts, in the order in which they were asked."""
-        return beside(self._task, self._portions, self._crew, self._here, self._begun)
+        return shared_out(self._task, self._portions, self._crew, self._here, self._begun)
 
     def _here(self, portion: _Portion) -> Iterator[Verdict]:
         return quick_verdicts(self._parts, *portion)

@@ -157,7 +157,7 @@ def each_stability(
         portions = [replace(whole, steps=part) for part in cut]
         task = partial(_sent, pickle.dumps(parts))
         if shared[0] is None:
-            yield from beside(task, portions, crew, lambda portion: _each(parts, portion))
+            yield from shared_out(task, portions, crew, lambda portion: _each(parts, portion))
             return
         for found in map_ordered(task, portions, crew):
             yield from found
@@ -182,7 +182,7 @@ _Task = TypeVar("_Task")
 _Found = TypeVar("_Found")
 
 
-def beside(
+def shared_out(
     task: Callable[[_Task], tuple[_Found, ...]],
     portions: Sequence[_Task],
     crew: Crew,

@@ -43,7 +43,7 @@ def cores() -> int:
     return len(known(0)) if known else os.cpu_count() or 1
 
 
-def beside(function: Callable[[_Task], _Result], tasks: Sequence[_Task]) -> list[_Result]:
+def in_threads(function: Callable[[_Task], _Result], tasks: Sequence[_Task]) -> list[_Result]:
     """Return what a function that leaves Python's lock alone makes of tasks, one a thread."""
     if len(tasks) == 1:
         return [function(tasks[0])]

@@ -18,7 +18,7 @@ from seqopt.engines.interface import Want
 from seqopt.engines.rigid._grown_maps import Grown, Part, maps_by_entry
 from seqopt.engines.rigid._operator import Doubts, OperatorBuilder
 from seqopt.engines.rigid._response_maps import inner_edges
-from seqopt.work._threads import beside, cores, one_thread
+from seqopt.work._threads import cores, in_threads, one_thread
 
 _SETS = 64  # grip sets that a thread takes at least
 
@@ -73,7 +73,7 @@ class GrownExtremes:
 
         step = max(_SETS, -(-len(columns) // cores()))
         parts = [slice(start, start + step) for start in range(0, max(len(columns), 1), step)]
-        found = np.concatenate(beside(reduce, parts), axis=1)
+        found = np.concatenate(in_threads(reduce, parts), axis=1)
         np.sqrt(found[2:], out=found[2:])
         return found
 

@@ -24,7 +24,7 @@ from scipy import linalg
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.engines.interface import SPACE, Basis
 from seqopt.network.network import GROUND, Network
-from seqopt.work._threads import beside, cores
+from seqopt.work._threads import cores, in_threads
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -325,4 +325,4 @@ def _add_product(target: Floats, left: Floats, right: Floats) -> None:
             part = target[start : start + step]
             part += np.matmul(left[start : start + step], right, out=room[: len(part)])
 
-    beside(add, range(max(threads, 1)))
+    in_threads(add, range(max(threads, 1)))

@@ -94,7 +94,7 @@ class _Walk:
 
     def __init__(self, problem: Layers) -> None:
         self.alone, self._schedule = alone_steps(problem), problem.schedule
-        whole = replace(problem.evaluation, beside=self.alone.evaluation.work)
+        whole = replace(problem.evaluation, more_work=self.alone.evaluation.work)
         self._problem = replace(problem, evaluation=whole)  # of which little is asked at a time
         if self.alone.evaluation.streams:
             raise MemoryShortError(
