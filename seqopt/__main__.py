@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import _thread
 import contextlib
+import gc
 import io
 import os
 import signal
@@ -46,6 +47,7 @@ def run() -> int:
             with contextlib.suppress(OSError, AttributeError):
                 stream.flush()
         os._exit(INTERRUPTED)
+    gc.freeze()  # all ends together
     return status
 
 

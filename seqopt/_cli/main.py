@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from importlib import import_module
 from types import ModuleType
 
 from seqopt._cli.answer import Answer, Status, print_answer, status_of
@@ -33,32 +35,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return status
 
 
-class _LaterPandas(ModuleType):
-    """Stands for pandas until something of it is asked for."""
+class _Later(ModuleType):
+    """Stands for a library until something of it is asked for."""
 
     def __getattr__(self, name: str) -> object:
-        if sys.modules.get("pandas") is self:
-            del sys.modules["pandas"]
-        import pandas as pd  # noqa: PLC0415  # that is what it is for
+        if sys.modules.get(self.__name__) is self:
+            del sys.modules[self.__name__]
+        return getattr(import_module(self.__name__), name)
 
-        return getattr(pd, name)
+
+def _put_off() -> None:
+    """Let libraries wait that few commands need, or that only SciPy's start would load."""
+    import numpy as np  # noqa: PLC0415  # of which help needs nothing
+
+    sys.modules.setdefault("pandas", _Later("pandas"))
+    for part in ("f2py", "ma", "testing"):
+        if part not in vars(np):
+            vars(np)[part] = sys.modules.setdefault(f"numpy.{part}", _Later(f"numpy.{part}"))
 
 
 def load(words: Sequence[str]) -> None:
     """Load the libraries of the command that words ask for, if they ask for one.
 
-    They would meet its interrupts if they came later. Only pandas waits: what prints no table needs
-    none, and it takes a quarter of the time.
+    They would meet its interrupts if they came later. What is loaded stays, so that nobody need
+    look through it for what could be thrown away.
     """
+    gc.disable()
     asked = asked_command(words)
     if asked in COMMANDS:
-        sys.modules.setdefault("pandas", _LaterPandas("pandas"))
+        _put_off()
         if any(map(os.path.exists, words)):
             import jsonschema  # noqa: F401, PLC0415  # scene files need it
 
         import seqopt._cli.watcher  # noqa: F401, PLC0415  # of which help needs nothing
 
         COMMANDS[asked].load()
+    gc.freeze()
+    gc.enable()
 
 
 def _run(words: Sequence[str]) -> int:
