@@ -9,7 +9,8 @@ All that contacts and grips can bear is raised by the same force t, which is mad
 over second-order cones of four numbers, in which the first is no less than the others' length.
 Forces f hold as soon as t is not positive, and the multipliers of the first line are a motion in
 which it falls as soon as they prove a positive t, so few rounds are needed: an answer is offered
-after each. It proves nothing by itself.
+after each. It proves nothing by itself. Small assemblies are sought for beside each other, each
+with its own t: their numbers together take hardly longer than those of one.
 
 Primal-dual method with the scaling of Nesterov and Todd and Mehrotra's predictor, as Vandenberghe
 (2010) writes it down, "The CVXOPT linear and quadratic cone program solvers".
@@ -19,25 +20,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from seqopt.arrays import Bools, Floats
+from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.stability.limit_analysis import Answer, Case, Claim, limits
 
 ROUNDS = 25  # at most; most structures need two to eight
-_FLIP = np.array([1.0, -1.0, -1.0, -1.0])
-_MIRROR = np.diag(_FLIP)
+_FLIP = np.array([[1.0], [-1.0], [-1.0], [-1.0]])
+_MIRROR = np.diag(_FLIP[:, 0])[:, :, None]
 _SHARE = 0.95  # of the way to the edge of the cones that is gone in a round
 _STUCK = 1e-3  # share of a step so small that further rounds lead nowhere
 _ROUNDED = 1e-12  # share of a square by which a difference may be negative from rounding
 _FARTHEST = 1e3  # share of a step that counts as no limit
 _REGULAR = 1e-13  # of the largest entry, added to all on the diagonal: blocks may be loose
 _DONE = 1e-8  # t that counts as none, over the force scale
+_FEW = 0.5  # share of assemblies that are left, from which on it pays to search for them alone
 _ROOM = 0.1  # by which t starts above what the first forces need, over the force scale
 
 _Solve = Callable[[Floats], Floats]
@@ -45,10 +49,10 @@ _Solve = Callable[[Floats], Floats]
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """Forces f (N, 3), t, s (C, 4), the motion (6B,) and the cones' multipliers (C, 4)."""
+    """Forces f (3, N), t (A,), s (4, C), the motion (6B,) and the cones' multipliers (4, C)."""
 
     force: Floats
-    raised: float
+    raised: Floats
     slack: Floats
     motion: Floats
     press: Floats
@@ -67,10 +71,32 @@ class Part(NamedTuple):
     kept: Floats
 
 
-def _whole(assembly: Assembly) -> Part:
-    counts = len(assembly.centroid), len(assembly.corner), len(assembly.payload)
-    blocks, corners, grips = (np.ones(count, dtype=bool) for count in counts)
-    return Part(blocks, corners, grips, np.zeros((len(corners), 3)))
+class Sought(NamedTuple):
+    """For what forces or a motion are sought, and where from.
+
+    Of the case, only what it bears at a z of zero counts. ``force`` (N, 3): of corners and then of
+    grips, over the force scale; ``level`` (N, 3), positive: how much each may change beside the
+    others to come into equilibrium first; ``part``: what alone changes, by default all; forces and
+    levels are then those of its corners and grips.
+    """
+
+    assembly: Assembly
+    case: Case
+    force: Floats
+    level: Floats
+    part: Part | None = None
+
+    def changing(self) -> Part:
+        """Return what changes."""
+        if self.part is not None:
+            return self.part
+        assembly = self.assembly
+        counts = len(assembly.centroid), len(assembly.corner), len(assembly.payload)
+        blocks, corners, grips = (np.ones(count, dtype=bool) for count in counts)
+        return Part(blocks, corners, grips, np.zeros((len(corners), 3)))
+
+
+_Counts = list[int]  # one number for every assembly
 
 
 def _cut(assembly: Assembly, part: Part) -> list[sparse.csr_array]:
@@ -86,44 +112,89 @@ def _cut(assembly: Assembly, part: Part) -> list[sparse.csr_array]:
 class _Cones:
     """What corners and grips bear: cones of friction and payload, then cut-offs of tension.
 
-    ``most`` (C, 4): h; ``map`` (C, 4, 3): G, of the force of the corner or grip that owns the cone.
-    The first cones are owned in order, and the cut-offs by corners. A cut-off is left out where
-    the cone of friction ends before it.
+    ``most`` (C,): the first row of h, which has no other; ``map`` (4, 3, C): G, of the force of the
+    corner or grip that owns the cone; ``group`` (C,): number of the assembly. The first cones are
+    owned in order, those of corners first, and the cut-offs by corners whose cone of friction does
+    not end before.
     """
 
-    def __init__(self, assembly: Assembly, case: Case, part: Part) -> None:
-        tension, cohesion, payload = limits(assembly, case, 0.0)
-        tension, cohesion = tension[part.corners], cohesion[part.corners]
-        payload = payload[part.grips]
+    def __init__(self, sought: Sequence[Sought], parts: Sequence[Part]) -> None:
+        borne = [_borne(each, part) for each, part in zip(sought, parts, strict=True)]
+        tension, cohesion, payload, friction = map(np.concatenate, zip(*borne, strict=True))
         corners, self.owners = len(tension), len(tension) + len(payload)
-        cut = case.friction == 0 or bool((case.friction * tension < cohesion).any())
-        self._cuts = corners if cut else 0
-        self.owner = np.concatenate([np.arange(self.owners), np.arange(self._cuts)])
-        self.most = np.zeros((len(self.owner), 4))
-        self.most[:, 0] = np.concatenate([cohesion, payload, tension[: self._cuts]])
-        self.map = np.zeros((len(self.owner), 4, 3))
-        self.map[:corners, 0, 0] = case.friction
-        self.map[:corners, [1, 2], [1, 2]] = 1.0
-        self.map[corners : self.owners, [1, 2, 3], [0, 1, 2]] = 1.0
-        self.map[self.owners :, 0, 0] = 1.0
+        self._cut = np.flatnonzero((friction == 0) | (friction * tension < cohesion))
+        self.owner = np.concatenate([np.arange(self.owners), self._cut])
+        counts = [[len(each[0]) for each in borne], [len(each[2]) for each in borne]]
+        self.group = np.concatenate([_numbered(count) for count in counts])[self.owner]
+        self._groups = len(parts)
+        self.most = np.concatenate([cohesion, payload, tension[self._cut]])
+        self.map = np.zeros((4, 3, len(self.owner)))
+        self.map[0, 0, :corners] = friction
+        self.map[[1, 2], [1, 2], :corners] = 1.0
+        self.map[[1, 2, 3], [0, 1, 2], corners : self.owners] = 1.0
+        self.map[0, 0, self.owners :] = 1.0
 
     def of(self, force: Floats) -> Floats:
-        """Return G f (C, 4)."""
-        return _apply(self.map, force[self.owner])
+        """Return G f (4, C)."""
+        return _apply(self.map, force[:, self.owner])
 
     def owned(self, values: Floats) -> Floats:
-        """Return the sums over the cones of every owner, (N, ...)."""
-        out = values[: self.owners].copy()
-        out[: self._cuts] += values[self.owners :]
+        """Return the sums over the cones of every owner, (..., N)."""
+        out = values[..., : self.owners].copy()
+        out[..., self._cut] += values[..., self.owners :]
         return out
 
     def pulled(self, values: Floats) -> Floats:
-        """Return the transpose of G times values (C, 4), (N, 3)."""
-        return self.owned(np.einsum("cji,cj->ci", self.map, values))
+        """Return the transpose of G times values (4, C), (3, N)."""
+        return self.owned(_apply(self.map.swapaxes(0, 1), values))
+
+    def sums(self, values: Floats) -> Floats:
+        """Return the sums over every assembly, (A,), of values of its cones or their owners."""
+        return np.bincount(self.group[: len(values)], values, self._groups)
+
+    def least(self, values: Floats, which: Bools | slice = slice(None)) -> Floats:
+        """Return the least of some values (C,) of every assembly, (A,)."""
+        out = np.full(self._groups, np.inf)
+        np.minimum.at(out, self.group[which], values[which])
+        return out
+
+    def reach(self, cones: Floats, step: Floats) -> Floats:
+        """Return how many steps (4, C) lead from within the cones to their edge, (A,)."""
+        turned = step * _FLIP
+        second = _product(step, turned)
+        first, none = _product(cones, turned), _product(cones, cones * _FLIP)
+        under = first**2 - second * none
+        fall = np.sqrt(np.maximum(under, 0.0)) - first
+        ends = (under >= -_ROUNDED * first**2) & (fall > 0)  # zero where only the first is any
+        return np.minimum(self.least(none / fall, ends), _FARTHEST)
+
+
+def _borne(sought: Sought, part: Part) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return what changing corners bear of tension and cohesion, grips of payload, and friction."""
+    tension, cohesion, payload = limits(sought.assembly, sought.case, 0.0)
+    own = tension[part.corners]
+    friction = np.full(len(own), sought.case.friction)
+    return own, cohesion[part.corners], payload[part.grips], friction
+
+
+def _numbered(counts: _Counts) -> Ints:
+    """Return the number of its assembly for each of so many things of every one."""
+    return np.repeat(np.arange(len(counts)), counts)
+
+
+def _beside(maps: Sequence[sparse.csr_array]) -> sparse.csr_array:
+    """Return maps that have neither rows nor columns in common."""
+    rows, columns = zip(*(each.shape for each in maps), strict=True)
+    before = np.cumsum([0, *columns])
+    indices = [each.indices + first for each, first in zip(maps, before.tolist(), strict=False)]
+    counts = np.concatenate([[0], *(np.diff(each.indptr) for each in maps)])
+    entries = np.concatenate([each.data for each in maps]), np.concatenate(indices)
+    shape = sum(rows), int(before[-1])
+    return sparse.csr_array((*entries, np.cumsum(counts)), shape=shape)
 
 
 class _Balance:
-    """The map E from forces to wrenches, and systems E B E^T y = r for weights B (N, 3, 3).
+    """The map E from forces to wrenches, and systems E B E^T y = r for weights B (3, 3, N).
 
     Bodies that touch are numbered close together, so that such a system is a narrow band.
     """
@@ -149,7 +220,9 @@ class _Balance:
         self._products = np.empty(
             (len(order), 6, 6)
         )  # written again and again: new pages cost more
-        places, self._starts = np.unique(place[order], return_index=True)
+        places, starts = np.unique(place[order], return_index=True)
+        own = np.ones(len(order)), np.arange(len(order)), np.append(starts, len(order))
+        self._sum = sparse.csr_array(own, shape=(len(places), len(order)))
         every = np.union1d(places, each * (bodies + 1))  # bodies may be loose
         self._met = np.searchsorted(every, places)
         self._blocks = len(every)
@@ -161,12 +234,12 @@ class _Balance:
         self._band = (column * self._lines + line).ravel()[self._lower]
 
     def wrench(self, force: Floats) -> Floats:
-        """Return the wrenches (6B,) of forces (N, 3)."""
-        return np.asarray(self._map @ force.ravel())
+        """Return the wrenches (6B,) of forces (3, N)."""
+        return np.asarray(self._map @ force.T.ravel())
 
     def parting(self, motion: Floats) -> Floats:
-        """Return what a motion (6B,) does where forces act, (N, 3)."""
-        return np.asarray(self._transposed @ motion).reshape(-1, 3)
+        """Return what a motion (6B,) does where forces act, (3, N)."""
+        return np.ascontiguousarray((self._transposed @ motion).reshape(-1, 3).T)
 
     def solver(self, weight: Floats) -> _Solve:
         """Return the solution of systems with weights; raises an error if there is none.
@@ -174,11 +247,11 @@ class _Balance:
         It is that of a system with a larger diagonal, corrected once.
         """
         across = self._transposed.data.transpose(0, 2, 1)
-        np.matmul(across, weight[self._owner], out=self._half)
+        np.matmul(across, weight.transpose(2, 0, 1)[self._owner], out=self._half)
         np.take(self._half, self._first, axis=0, out=self._left, mode="clip")
         np.matmul(self._left, self._right, out=self._products)
         block = np.zeros((self._blocks, 6, 6))
-        block[self._met] = np.add.reduceat(self._products, self._starts)
+        block[self._met] = (self._sum @ self._products.reshape(-1, 36)).reshape(-1, 6, 6)
         regular = _REGULAR * np.abs(block).max()
         block[self._diagonal] += regular * np.eye(6)
         lines, bodies = self._lines, len(self._order)
@@ -200,190 +273,247 @@ class _Balance:
 
 
 class _Search:
-    def __init__(self, assembly: Assembly, case: Case, part: Part) -> None:
-        self._part, self._corners = part, np.count_nonzero(part.corners)
-        load = case.loads(assembly)[0] + assembly.contact_map @ part.kept.ravel()
-        self._load = load.reshape(-1, 6)[part.blocks].ravel()
-        self._balance = _Balance(_cut(assembly, part))
-        self._cones = _Cones(assembly, case, part)
+    def __init__(self, sought: Sequence[Sought]) -> None:
+        self._sought, self._parts = sought, [each.changing() for each in sought]
+        pairs = [*zip(sought, self._parts, strict=True)]
+        self._load = np.concatenate([_load(each, part) for each, part in pairs])
+        maps = zip(*(_cut(each.assembly, part) for each, part in pairs), strict=True)
+        self._balance = _Balance([_beside(each) for each in maps])
+        self._cones = _Cones(sought, self._parts)
+        self._bodies = _numbered([6 * np.count_nonzero(part.blocks) for part in self._parts])
+
+    def _works(self, motion: Floats) -> Floats:
+        """Return the work of the loads of every assembly, (A,)."""
+        return np.bincount(self._bodies, self._load * motion, len(self._parts))
 
     @np.errstate(all="ignore")
-    def start(self, force: Floats, level: Floats) -> tuple[_Point, Floats]:
-        """Return a point in equilibrium near forces, and the motion that nothing hinders, if any.
+    def start(self) -> tuple[_Point, Floats]:
+        """Return a point in equilibrium near forces, and the motions that nothing hinders."""
+        balance, cones = self._balance, self._cones
+        force, level = (self._joined(attrgetter(name)) for name in ("force", "level"))
+        weight = np.eye(3)[:, :, None] * np.square(level)
+        motion = balance.solver(weight)(self._load + balance.wrench(force))
+        force = force - np.square(level) * balance.parting(motion)
+        worst = np.zeros(len(self._parts))
+        np.maximum.at(worst, self._bodies, np.abs(self._load + balance.wrench(force)))
+        loose = np.where((worst > _DONE)[self._bodies], motion, 0.0)
+        slack = cones.of(force)
+        slack[0] += cones.most
+        needed = -cones.least(slack[0] - np.linalg.norm(slack[1:], axis=0))
+        raised = _ROOM + 1.2 * np.maximum(needed, 0.0)
+        slack[0] += raised[cones.group]
+        press = slack * _FLIP / _product(slack, slack * _FLIP)
+        press /= cones.sums(press[0])[cones.group]
+        return _Point(force, raised, slack, 0 * motion, press), loose
 
-        ``level`` (N, 3): how much each of the ``force`` (N, 3) may change beside the others.
+    def _joined(self, of: Callable[[Sought], Floats]) -> Floats:
+        """Return values (3, N) of all corners, and then of all grips."""
+        corners = [np.count_nonzero(part.corners) for part in self._parts]
+        pairs = [*zip(map(of, self._sought), corners, strict=True)]
+        both = [each[:count] for each, count in pairs], [each[count:] for each, count in pairs]
+        return np.ascontiguousarray(np.concatenate([*both[0], *both[1]]).T)
+
+    @np.errstate(all="ignore")
+    def better(self, point: _Point, done: Bools) -> _Point | None:
+        """Return a point that is better for assemblies not done (A,); none if no way leads to one.
+
+        Those that are done stay where they are.
         """
-        weight = np.einsum("ni,ij->nij", np.square(level), np.eye(3))
-        left = self._load + self._balance.wrench(force)
-        motion = self._balance.solver(weight)(left)
-        force = force - np.square(level) * self._balance.parting(motion)
-        left = self._load + self._balance.wrench(force)
-        loose = motion if np.abs(left).max() > _DONE else 0 * motion
-        slack = self._cones.most + self._cones.of(force)
-        raised = _ROOM + 1.2 * float(max((_length(slack[:, 1:]) - slack[:, 0]).max(), 0.0))
-        slack[:, 0] += raised
-        press = slack * _FLIP / _product(slack, slack * _FLIP)[:, None]
-        return _Point(force, raised, slack, 0 * motion, press / press[:, 0].sum()), loose
-
-    @np.errstate(all="ignore")
-    def better(self, point: _Point) -> _Point | None:
-        """Return a better point; none if there is no way to one."""
+        cones = self._cones
         scale, inverse = _scaling(point.slack, point.press)
         go = self._directions(point, inverse)
         even = _apply(scale, point.press)
         first = go(-even)
-        reach = min(1.0, _reach(point.slack, first.slack), _reach(point.press, first.press))
-        center = (1 - reach) ** 3 * _product(point.slack, point.press).sum() / (2 * len(even))
+        reach = cones.reach(point.slack, first.slack), cones.reach(point.press, first.press)
+        center = (1 - np.minimum(1.0, np.minimum(*reach))) ** 3 / (
+            2 * cones.sums(np.ones(even.shape[1]))
+        )
+        center *= cones.sums(_product(point.slack, point.press))
         aim = -_circle(even, even)
         aim -= _circle(_apply(inverse, first.slack), _apply(scale, first.press))
-        aim[:, 0] += center
+        aim[0] += center[cones.group]
         last = go(_divide(aim, even))
-        ahead = min(1.0, _SHARE * _reach(point.slack, last.slack))
-        turned = min(1.0, _SHARE * _reach(point.press, last.press))
-        if not (max(ahead, turned) > _STUCK and np.isfinite(last.raised)):
+        ahead = np.minimum(1.0, _SHARE * cones.reach(point.slack, last.slack))
+        turned = np.minimum(1.0, _SHARE * cones.reach(point.press, last.press))
+        goes = (np.maximum(ahead, turned) > _STUCK) & ~done
+        if not (goes.any() and np.isfinite(last.raised).all()):
             return None
+        ahead, turned = ahead * goes, turned * goes
+        of_cone = ahead[cones.group]
         return _Point(
-            force=point.force + ahead * last.force,
+            force=point.force + of_cone[: cones.owners] * last.force,
             raised=point.raised + ahead * last.raised,
-            slack=point.slack + ahead * last.slack,
-            motion=point.motion + turned * last.motion,
-            press=point.press + turned * last.press,
+            slack=point.slack + of_cone * last.slack,
+            motion=point.motion + turned[self._bodies] * last.motion,
+            press=point.press + turned[cones.group] * last.press,
         )
 
     def _directions(self, point: _Point, inverse: Floats) -> Callable[[Floats], _Point]:
         """Return the direction in which to go from a point, by the aim of the scaled cones.
 
-        ``inverse`` (C, 4, 4): of the scaling.
+        ``inverse`` (4, 4, C): of the scaling.
         """
-        balance, cones, square = self._balance, self._cones, inverse @ inverse
-        weighed = square @ cones.map
-        soft = _inverse(cones.owned(cones.map.transpose(0, 2, 1) @ weighed))
+        balance, cones, square = self._balance, self._cones, _times(inverse, inverse)
+        weighed = _times(square, cones.map)
+        soft = _inverse(cones.owned(_times(cones.map.swapaxes(0, 1), weighed)))
         solve = balance.solver(soft)
-        lift, stiff = cones.owned(weighed[:, 0]), square[:, 0, 0].sum()
+        lift, stiff = cones.owned(weighed[0]), cones.sums(square[0, 0])
         left = balance.wrench(point.force) + self._load
         uneven = balance.parting(point.motion) - cones.pulled(point.press)
-        too_much = point.press[:, 0].sum() - 1.0
+        too_much = cones.sums(point.press[0]) - 1.0
         lifting = solve(balance.wrench(_apply(soft, lift)))
         lifted = _apply(soft, lift - balance.parting(lifting))
+        stiff -= cones.sums(_product(lift, lifted))
 
         def direction(aim: Floats) -> _Point:
             pushed = _apply(inverse, aim)
             given = cones.pulled(pushed) - uneven
             motion = solve(balance.wrench(_apply(soft, given)) + left)
             force = _apply(soft, given - balance.parting(motion))
-            rest = pushed[:, 0].sum() + too_much - (lift * force).sum()
-            raised = float(rest / (stiff - (lift * lifted).sum()))
-            force, motion = force - raised * lifted, motion - raised * lifting
+            rest = cones.sums(pushed[0]) + too_much - cones.sums(_product(lift, force))
+            raised = rest / stiff
+            of_cone = raised[cones.group]
+            force = force - of_cone[: cones.owners] * lifted
+            motion = motion - raised[self._bodies] * lifting
             slack = cones.of(force)
-            slack[:, 0] += raised
+            slack[0] += of_cone
             return _Point(force, raised, slack, motion, pushed - _apply(square, slack))
 
         return direction
 
-    def claim(self, point: _Point) -> Answer:
-        """Return a point as an answer, whose z is what all bear more than they can."""
-        part, contact = self._part, self._part.kept.copy()
-        grip, motion = np.zeros((len(part.grips), 3)), np.zeros((len(part.blocks), 6))
-        contact[part.corners] = point.force[: self._corners]
-        grip[part.grips] = point.force[self._corners :]
-        motion[part.blocks] = point.motion.reshape(-1, 6)
-        return Answer(Claim.SOLVED, max(point.raised, 0.0), contact, grip, motion)
+    def narrowed(self, point: _Point, which: Bools) -> tuple[_Search, _Point]:
+        """Return a search, and the point, of some assemblies (A,) alone."""
+        cones, bodies = which[self._cones.group], which[self._bodies]
+        owners = cones[: self._cones.owners]
+        return _Search([*compress(self._sought, which)]), _Point(
+            force=point.force[:, owners],
+            raised=point.raised[which],
+            slack=point.slack[:, cones],
+            motion=point.motion[bodies],
+            press=point.press[:, cones],
+        )
 
-    def promises(self, point: _Point) -> bool:
-        """Return whether a point's forces or its motion may prove something."""
-        rest = (self._cones.most * point.press).sum()
-        return point.raised <= _DONE or bool(self._load @ point.motion > rest)
+    def claims(self, point: _Point, which: Bools) -> list[Answer]:
+        """Return a point as answers for some assemblies (A,).
+
+        Their z is what all bear more than they can.
+        """
+        owners = self._cones.group[: self._cones.owners]
+        out = []
+        for number in np.flatnonzero(which).tolist():
+            part = self._parts[number]
+            force = point.force[:, owners == number].T
+            contact, grip = part.kept.copy(), np.zeros((len(part.grips), 3))
+            motion = np.zeros((len(part.blocks), 6))
+            corners = np.count_nonzero(part.corners)
+            contact[part.corners], grip[part.grips] = force[:corners], force[corners:]
+            motion[part.blocks] = point.motion[self._bodies == number].reshape(-1, 6)
+            value = max(float(point.raised[number]), 0.0)
+            out.append(Answer(Claim.SOLVED, value, contact, grip, motion))
+        return out
+
+    def promises(self, point: _Point) -> Bools:
+        """Return for which assemblies a point's forces or its motion may prove something, (A,)."""
+        rest = self._cones.sums(self._cones.most * point.press[0])
+        return (point.raised <= _DONE) | (self._works(point.motion) > rest)
 
 
-def approach(
-    assembly: Assembly, case: Case, force: Floats, level: Floats, part: Part | None = None
-) -> Iterator[Answer]:
-    """Yield forces and motions, each nearer to a proof, until it is stuck or `ROUNDS` are over.
+def _load(sought: Sought, part: Part) -> Floats:
+    """Return the wrenches of loads, and of what does not change, on what does."""
+    load = sought.case.loads(sought.assembly)[0]
+    if part.kept.any():
+        load = load + sought.assembly.contact_map @ part.kept.ravel()
+    return load.reshape(-1, 6)[part.blocks].ravel()
 
-    Of the case, only what it bears at a z of zero counts. The first answer has the forces in
-    equilibrium next to ``force`` (N, 3), of corners and then of grips, over the force scale;
-    ``level`` (N, 3), positive: how much each may change for that beside the others; ``part``: what
-    alone changes, by default all; forces and levels are then those of its corners and grips.
+
+def approach_all(sought: Sequence[Sought], done: Bools) -> Iterator[list[tuple[int, Answer]]]:
+    """Yield forces and motions, each nearer to a proof, with the numbers of their assemblies.
+
+    ``done`` (A,): of which nothing more is asked, as the caller says. The first answers have the
+    forces in equilibrium next to those given. Ends when all is done, when all that is left is
+    stuck, or after `ROUNDS`.
     """
-    if not len(force):
+    if not all(len(each.force) for each in sought):
         return
-    search = _Search(assembly, case, _whole(assembly) if part is None else part)
+    search, numbers = _Search(sought), np.arange(len(sought))
     try:
         point: _Point | None
-        point, motion = search.start(force, level)
-        yield search.claim(replace(point, raised=0.0, motion=motion))
+        point, motion = search.start()
+        claimed, which = replace(point, raised=0 * point.raised, motion=motion), ~done
         for _ in range(ROUNDS):
-            point = search.better(point)
-            if point is None:
+            yield [*zip(numbers[which].tolist(), search.claims(claimed, which), strict=True)]
+            left = ~done[numbers]
+            if not left.any():
                 return
-            if search.promises(point):
-                yield search.claim(point)
+            if left.mean() <= _FEW:
+                search, point = search.narrowed(point, left)
+                numbers, left = numbers[left], left[left]
+            if (point := search.better(point, ~left)) is None:
+                return
+            claimed, which = point, left & search.promises(point)
     except (RuntimeError, np.linalg.LinAlgError):  # a system that has no solution
         return
 
 
+def approach(sought: Sought) -> Iterator[Answer]:
+    """Yield the same of one assembly."""
+    for answers in approach_all([sought], np.zeros(1, dtype=bool)):
+        yield from (answer for _, answer in answers)
+
+
 def _scaling(slack: Floats, press: Floats) -> tuple[Floats, Floats]:
-    """Return the matrices (C, 4, 4) that scale multipliers as their inverse does slacks."""
-    sizes = [np.sqrt(_product(part, part * _FLIP))[:, None] for part in (slack, press)]
+    """Return the matrices (4, 4, C) that scale multipliers as their inverse does slacks."""
+    sizes = [np.sqrt(_product(part, part * _FLIP)) for part in (slack, press)]
     slack, press = slack / sizes[0], press / sizes[1]
     middle = slack + press * _FLIP
-    middle /= np.sqrt(2 * (1 + _product(slack, press)))[:, None]
-    middle[:, 0] += 1.0
-    turn = middle[:, :, None] * middle[:, None] / middle[:, :1, None] - _MIRROR
-    size = np.sqrt(sizes[0] / sizes[1])[:, None]
+    middle /= np.sqrt(2 * (1 + _product(slack, press)))
+    middle[0] += 1.0
+    turn = middle[:, None] * (middle / middle[0]) - _MIRROR
+    size = np.sqrt(sizes[0] / sizes[1])
     return turn * size, turn * (_FLIP[:, None] * _FLIP) / size
 
 
 def _inverse(matrices: Floats) -> Floats:
-    """Return the inverses of positive definite matrices (N, 3, 3): a tenth of NumPy's time."""
-    (a, b, c), (_, d, e), (_, _, f) = np.ascontiguousarray(matrices.transpose(1, 2, 0))
+    """Return the inverses of positive definite matrices (3, 3, N): a tenth of NumPy's time."""
+    (a, b, c), (_, d, e), (_, _, f) = matrices
     first, second = b / a, c / a
     d = d - first * b
     third = (e - second * b) / d
     f = f - second * c - third * third * d
     far = first * third - second
     out = np.empty_like(matrices)
-    out[:, 2, 2] = 1 / f
-    out[:, 1, 2] = out[:, 2, 1] = -third / f
-    out[:, 0, 2] = out[:, 2, 0] = far / f
-    out[:, 1, 1] = 1 / d + third * third / f
-    out[:, 0, 1] = out[:, 1, 0] = -first / d - far * third / f
-    out[:, 0, 0] = 1 / a + first * first / d + far * far / f
+    out[2, 2] = 1 / f
+    out[1, 2] = out[2, 1] = -third / f
+    out[0, 2] = out[2, 0] = far / f
+    out[1, 1] = 1 / d + third * third / f
+    out[0, 1] = out[1, 0] = -first / d - far * third / f
+    out[0, 0] = 1 / a + first * first / d + far * far / f
     return out
 
 
-def _reach(cones: Floats, step: Floats) -> float:
-    """Return how many steps (C, 4) lead from within the cones to their edge."""
-    second = _product(step, step * _FLIP)
-    first, none = _product(cones, step * _FLIP), _product(cones, cones * _FLIP)
-    under = first**2 - second * none
-    fall = np.sqrt(np.maximum(under, 0.0)) - first
-    ends = (under >= -_ROUNDED * first**2) & (fall > 0)  # zero where only the first number is any
-    return float(np.min(none[ends] / fall[ends], initial=_FARTHEST))
-
-
 def _circle(first: Floats, second: Floats) -> Floats:
-    """Return the Jordan products of vectors (C, 4)."""
-    out = first[:, :1] * second + second[:, :1] * first
-    out[:, 0] = _product(first, second)
+    """Return the Jordan products of vectors (4, C)."""
+    out = first[0] * second + second[0] * first
+    out[0] = _product(first, second)
     return out
 
 
 def _divide(product: Floats, factor: Floats) -> Floats:
-    """Return the other factors of Jordan products (C, 4)."""
-    first = _product(product, factor * _FLIP) / _product(factor, factor * _FLIP)
-    out = (product - first[:, None] * factor) / factor[:, :1]
-    out[:, 0] = first
+    """Return the other factors of Jordan products (4, C)."""
+    turned = factor * _FLIP
+    first = _product(product, turned) / _product(factor, turned)
+    out = (product - first * factor) / factor[0]
+    out[0] = first
     return out
 
 
 def _product(first: Floats, second: Floats) -> Floats:
-    return np.asarray(np.einsum("ci,ci->c", first, second))
+    return np.asarray(np.einsum("ic,ic->c", first, second))
 
 
 def _apply(matrices: Floats, vectors: Floats) -> Floats:
-    return np.asarray(np.einsum("cij,cj->ci", matrices, vectors))
+    return np.asarray(np.einsum("ijc,jc->ic", matrices, vectors))
 
 
-def _length(vectors: Floats) -> Floats:
-    return np.asarray(np.linalg.norm(vectors, axis=1))
+def _times(first: Floats, second: Floats) -> Floats:
+    return np.asarray(np.einsum("ijc,jkc->ikc", first, second))

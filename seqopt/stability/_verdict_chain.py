@@ -18,7 +18,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.network.network import GROUND
 from seqopt.sequence.steps import Grips
-from seqopt.stability._interior_point import Part, approach
+from seqopt.stability._interior_point import Part, Sought, approach
 from seqopt.stability._prover import Proven, Prover
 from seqopt.stability.limit_analysis import EXACT, Answer, Case, Claim, Compile, bound, violation
 from seqopt.work._threads import one_thread
@@ -131,7 +131,7 @@ class VerdictChain:
         forces = len(assembly.corner) + len(held)
         force, level = np.zeros((forces, 3)), np.ones((forces, 3))
         if case.tension[0] > 0 or case.cohesion[0] > 0:
-            for answer in islice(approach(assembly, case, force, level), 1):
+            for answer in islice(approach(Sought(assembly, case, force, level)), 1):
                 yield _labeled(judged(assembly, case, answer), Way.FORCES)
         if self._near:
             yield from self._sought_near(assembly, case, held)
@@ -139,7 +139,7 @@ class VerdictChain:
         if self._corner_force is not None:
             force, level = self._earlier(assembly, held)
             way = Way.EARLIER_FORCES
-        for answer in approach(assembly, case, force, level):
+        for answer in approach(Sought(assembly, case, force, level)):
             yield _labeled(judged(assembly, case, answer), way)
             way = Way.FORCES
 
@@ -151,7 +151,7 @@ class VerdictChain:
         forces = np.concatenate([part.corners, part.grips])
         force, level = self._earlier(assembly, held) if self._stood else _none_yet(len(forces))
         way = Way.EARLIER_FORCES if self._stood else Way.FORCES
-        answers = approach(assembly, case, force[forces], level[forces], part)
+        answers = approach(Sought(assembly, case, force[forces], level[forces], part))
         for answer in islice(answers, 1, None):  # the first is near what was before
             if not self._stood and answer.value <= _TIGHT:
                 return  # others may fall
