@@ -148,8 +148,11 @@ def hidden_arrows(files: list[Path]) -> list[str]:
 
 
 def test_rooms_are_looked_up_in_three_places_only():
-    """The door opens every room; values find what draws them, commands are in their own room."""
-    known = ["seqopt", "seqopt._cli.arguments", "seqopt._showing"]
+    """The door opens every room; values find what draws them, commands are in their own room.
+
+    The start of a command puts off libraries of others.
+    """
+    known = ["seqopt", "seqopt._cli.arguments", "seqopt._cli.main", "seqopt._showing"]
     assert hidden_arrows(sources("seqopt")) == known
     commands = {f"seqopt._cli.{command.module}" for command in COMMANDS.values()}
     assert commands <= set(graph("seqopt"))

@@ -16,6 +16,8 @@ from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import _applied_rows, bare_assembly
 from seqopt.network.network import GROUND, Network
 
+_KEPT = 3000  # bricks in all partial structures that are kept, some 5 kB each
+
 
 class PartialAssemblies:
     """Gives what `step_assembly` does for steps of up to so many bricks.
@@ -39,12 +41,21 @@ class PartialAssemblies:
         self._map = whole.contact_map.tocsc()
         self._turning = self._map.indices % 6 >= 3  # which entries are moments
         self._last: dict[tuple[int, float], sparse.csr_array] = {}  # asked again by its next step
+        self._made: dict[tuple[int, tuple[int | None, ...]], Assembly] = {}
 
     def __call__(self, bricks: int, grips: Sequence[int | None]) -> Assembly:
-        """Return a partial structure with the grips that hold it.
+        """Return a partial structure with the grips that hold it; those made last are kept.
 
         Grips beyond those of the scene's robots bear what the strongest of these does.
         """
+        key = bricks, (*grips,)
+        if key not in self._made:
+            if len(self._made) >= max(_KEPT // bricks, 1):
+                self._made.clear()
+            self._made[key] = self._cut(*key)
+        return self._made[key]
+
+    def _cut(self, bricks: int, grips: Sequence[int | None]) -> Assembly:
         whole, scene = self._whole, self.network.scene
         contacts = len(self.network.springs.acting(bricks))
         corners = int(np.searchsorted(whole.contact, contacts))

@@ -11,7 +11,7 @@ import pickle
 from collections.abc import Iterable, Iterator, Sequence
 from enum import Enum
 from functools import partial
-from itertools import groupby
+from itertools import accumulate, groupby, islice
 from operator import attrgetter
 
 from seqopt.contact._partial_assemblies import PartialAssemblies
@@ -25,6 +25,7 @@ from seqopt.stability.limit_analysis import compile_equilibrium
 from seqopt.work._workers import Crew
 
 _DEAR = 50  # bricks from which on a proof takes much longer than trying others
+_BESIDE = 1500  # bricks in all steps that are sought for beside each other, where it is not dear
 _SPAN = 8  # brick counts whose grips hold a structure that is to fall all the same
 _MOST = 16  # brick counts for which nothing is sought at most after it was of no use
 _PORTIONS = 6  # of the steps with one mortar: what is found for one does not prove the next one
@@ -60,17 +61,40 @@ def quick_verdicts(
 ) -> Iterator[Verdict]:
     """Yield the verdict of every step as soon as it is found; best by ascending brick counts."""
     parts = PartialAssemblies(built, _most(steps)) if isinstance(built, Network) else built
-    network = parts.network
     prove = VerdictChain(parts, lambda each: bonded(each, mortar), compile_equilibrium, near=True)
+    for dear, same in groupby(steps, lambda step: step.bricks > _DEAR):
+        if dear:
+            yield from _each_dear(prove, [*same], parts.network)
+        else:
+            yield from _each_small(prove, [*same])
+
+
+def _each_small(prove: VerdictChain, steps: Sequence[Step]) -> Iterator[Verdict]:
+    """Yield verdicts of which those that earlier proofs leave open are sought beside each other."""
+    for number, step in enumerate(steps):
+        if step.bricks:
+            before = partial(_search, prove, steps, number)
+            yield _verdict_of(prove(step.bricks, step.grips, before)[1])
+        else:
+            yield Verdict.STANDS
+
+
+def _search(prove: VerdictChain, steps: Sequence[Step], number: int) -> None:
+    """Seek what proves a step and those that follow."""
+    near = [*islice(steps, number, number + _BESIDE)]
+    total = accumulate(step.bricks for step in near)
+    few = [step for step, bricks in zip(near, total, strict=True) if bricks <= _BESIDE]
+    prove.search([*dict.fromkeys((step.bricks, step.grips) for step in few if step.bricks)])
+
+
+def _each_dear(prove: VerdictChain, steps: Sequence[Step], network: Network) -> Iterator[Verdict]:
+    """Yield verdicts, where what may prove many is sought before what proves one."""
     groups = [(bricks, [*each]) for bricks, each in groupby(steps, attrgetter("bricks"))]
     patience, sought = {each: _Patience() for each in _Sought}, _Sought.FORCES
     for i, (bricks, group) in enumerate(groups):
         near = [step for _, each in groups[i : i + _SPAN] for step in each]
-        left = {each for each in _Sought if bricks > _DEAR and patience[each].ready()}
+        left = {each for each in _Sought if patience[each].ready()}
         for step in group:
-            if not bricks:
-                yield Verdict.STANDS
-                continue
             trial = _held(network, group if sought is _Sought.FORCES else near, bricks, sought)
             tried: list[object] = []
             before = partial(_try, prove, bricks, trial, tried)

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt._files import csv_text
+from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.mortar import DRY, EPOXY, Mortar
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
@@ -34,7 +35,7 @@ _State = tuple[int, Grips]  # bricks that stand, and nodes held
 _Asked = dict[str, list[Step]]  # steps by the mortar with which they are asked
 _Found = Iterator[tuple[_State, Verdict]]
 _Told = Callable[[], Iterator[Step]]  # steps, told as they are asked
-_Way = Callable[[Network, Sequence[Step], Mortar, _Told], _Found]
+_Way = Callable[[Sequence[Step], Mortar, _Told], _Found]
 WORDS = {Verdict.STANDS: "stands", Verdict.FALLS: "falls", Verdict.UNDECIDED: "is undecided"}
 _MANY = {Verdict.FALLS: "fall", Verdict.UNDECIDED: "are undecided"}
 
@@ -103,6 +104,7 @@ class BuildProver:
     ) -> None:
         self._network, self._mortars, self._progress = network, mortars, progress
         self._known: dict[str, dict[_State, Verdict]] = {name: {} for name in mortars}
+        self._parts: Network | PartialAssemblies = network
         self._shared: tuple[_Asked, SharedVerdicts] | None = None
         self.refusal = ""
 
@@ -137,7 +139,7 @@ class BuildProver:
                 self._shared = None
 
     def _begin(self, asked: _Asked, crew: Crew) -> tuple[_Asked, SharedVerdicts] | None:
-        if any(self._way(steps) is not _one_by_one for steps in asked.values()):
+        if any(map(self._many, asked.values())):
             return None
         pairs = [(self._mortars[name], steps) for name, steps in asked.items()]
         try:
@@ -158,13 +160,23 @@ class BuildProver:
 
     def _ask_all(self, distinct: Mapping[_State, Step]) -> None:
         asked = self._new(distinct)
-        shared = self._shared is not None and self._shared[0] == asked
-        found = iter(self._shared[1]) if self._shared is not None and shared else None
+        if not any(asked.values()):
+            return
+        way_of = self._ways(asked)
         for name, new in asked.items():
             what, mortar = f"proving what stands, {name}", self._mortars[name]
             tell = partial(with_progress, what, new, self._progress)
-            way = self._way(new) if found is None else partial(_as_found, found)
-            self._known[name].update(way(self._network, new, mortar, tell) if new else ())
+            self._known[name].update(way_of(new)(new, mortar, tell) if new else ())
+
+    def _ways(self, asked: _Asked) -> Callable[[Sequence[Step]], _Way]:
+        """Return what proves most quickly which of some steps stand."""
+        if self._shared is not None and self._shared[0] == asked:
+            found = partial(_as_found, iter(self._shared[1]))
+            return lambda _: found
+        most = max(step.bricks for new in asked.values() for step in new) or 1
+        self._parts = PartialAssemblies(self._network, most)
+        one, many = (partial(way, self._parts) for way in (_one_by_one, _screened))
+        return lambda new: many if self._many(new) else one
 
     def _new(self, distinct: Mapping[_State, Step]) -> _Asked:
         """Return by mortar which steps are not known, in the order in which they are asked."""
@@ -173,60 +185,57 @@ class BuildProver:
             for name, known in self._known.items()
         }
 
-    def _way(self, steps: Sequence[Step]) -> _Way:
-        """Return what proves most quickly which of some steps stand."""
+    def _many(self, steps: Sequence[Step]) -> bool:
+        """Return whether steps are so many that a program for all grips of a brick count pays."""
         counts = {step.bricks for step in steps}
-        many = len(steps) > _SETS * len(counts) and len(self._network.inner) <= SCREENED
-        return _screened if many else _one_by_one
+        return len(steps) > _SETS * len(counts) and len(self._network.inner) <= SCREENED
 
     def _of_build(self, steps: Sequence[Step], name: str) -> BuildVerdicts:
         verdicts = tuple(self._known[name][_state(step)] for step in steps)
         for step, verdict in zip(steps, verdicts, strict=True):
             if verdict is Verdict.FALLS:
-                failing = _failing(self._network, step, self._mortars[name])
+                failing = _failing(self._parts, step, self._mortars[name])
                 return BuildVerdicts(name, verdicts, step.number, *failing, steps[0].number)
         return BuildVerdicts(name, verdicts, begins=steps[0].number if steps else 1)
 
 
 def _one_by_one(
-    network: Network, steps: Sequence[Step], mortar: Mortar, tell: _Told | None = None
+    parts: PartialAssemblies, steps: Sequence[Step], mortar: Mortar, tell: _Told | None = None
 ) -> _Found:
     """Yield the verdicts of partial structures, by what was found for those before."""
     told = steps if tell is None else tell()
-    for step, found in zip(told, quick_verdicts(network, steps, mortar), strict=True):
+    for step, found in zip(told, quick_verdicts(parts, steps, mortar), strict=True):
         yield _state(step), found
 
 
-def _as_found(
-    found: Iterator[Verdict], _: Network, __: Sequence[Step], ___: Mortar, tell: _Told
-) -> _Found:
+def _as_found(found: Iterator[Verdict], _: Sequence[Step], __: Mortar, tell: _Told) -> _Found:
     """Yield verdicts as others find them, in the order in which they were asked."""
     for step in tell():
         yield _state(step), next(found)
 
 
-def _screened(network: Network, _: Sequence[Step], mortar: Mortar, tell: _Told) -> _Found:
+def _screened(parts: PartialAssemblies, _: Sequence[Step], mortar: Mortar, tell: _Told) -> _Found:
     """Yield the same, many grip sets at a time; what is left open is asked one by one."""
-    screen, scene = Screen(network, mortar), network.scene
+    screen, scene = Screen(parts.network, mortar), parts.network.scene
     place = {node: i for i, node in enumerate((n for b in scene.placed for n in b.nodes), 1)}
     payload = np.array([robot.payload for robot in scene.robots])
     for bricks, same in groupby(tell(), attrgetter("bricks")):
         part = [*same]
         if not bricks:
-            yield from _one_by_one(network, part, mortar)
+            yield from _one_by_one(parts, part, mortar)
             continue
         held = np.array([[place[n] if n is not None else 0 for n in s.grips] for s in part])
         found = screen.stands(bricks, held, payload)
         for step, each in zip(part, found.tolist(), strict=True):
             if each == OPEN:
-                yield from _one_by_one(network, [step], mortar)
+                yield from _one_by_one(parts, [step], mortar)
             else:
                 yield _state(step), Verdict.STANDS if each == STANDS else Verdict.FALLS
 
 
-def _failing(network: Network, step: Step, mortar: Mortar) -> tuple[str, str]:
+def _failing(parts: Network | PartialAssemblies, step: Step, mortar: Mortar) -> tuple[str, str]:
     """Return the brick and the joint that fail first in a step that falls."""
-    (found,) = each_verdict(network, [step], mortar)
+    (found,) = each_verdict(parts, [step], mortar)
     return found.first_block, found.first_contact
 
 

@@ -18,8 +18,9 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.network.network import GROUND
 from seqopt.sequence.steps import Grips
-from seqopt.stability._interior_point import Part, Sought, approach
 from seqopt.stability._prover import Proven, Prover
+from seqopt.stability._search.cones import Changing, Sought
+from seqopt.stability._search.interior_point import approach, approach_all
 from seqopt.stability.limit_analysis import EXACT, Answer, Case, Claim, Compile, bound, violation
 from seqopt.work._threads import one_thread
 
@@ -61,6 +62,7 @@ def judged(assembly: Assembly, case: Case, answer: Answer) -> Proven | None:
     return Proven(proven, proven, np.nan, answer) if proven > _CLEAR else None
 
 
+_State = tuple[int, Grips]
 _Tried = tuple[Proven | None, Way]
 
 
@@ -92,6 +94,7 @@ class VerdictChain:
         self._blocks = 0  # that stood
         self._bore = np.zeros(0, dtype=np.int64)  # blocks whose grips bore something then
         self._kept: list[tuple[Floats, dict[int, Floats]]] = []  # of as many corners
+        self._found: dict[_State, Proven] = {}
 
     def __call__(
         self, bricks: int, grips: Grips, before: Callable[[], object] | None = None
@@ -104,14 +107,37 @@ class VerdictChain:
         held += [-1 - i for i in range(len(assembly.payload) - len(held))]  # props
         case = self._ask(assembly)
         with one_thread():
-            known = _first(self._claimed(assembly, case, held))
+            known = self._known((bricks, grips), assembly, case, held)
             if known is None and before is not None:
                 before()
-                known = _first(self._claimed(assembly, case, held))
+                known = self._known((bricks, grips), assembly, case, held)
             known = known or _first(self._sought(assembly, case, held))
         proven, way = known or (Prover(assembly, self._compile)(case), Way.CONES)
         self._learn(assembly, proven, held)
         return assembly, proven, way
+
+    def search(self, states: Sequence[_State]) -> None:
+        """Seek what proves several cases beside each other; it is taken when they are asked."""
+        assemblies = [self._parts(*state) for state in states]
+        pairs = [(assembly, self._ask(assembly)) for assembly in assemblies]
+        counts = [len(each.corner) + len(each.payload) for each in assemblies]
+        starts = [_none_yet(count) for count in counts]
+        sought = [Sought(*pair, *start) for pair, start in zip(pairs, starts, strict=True)]
+        done = np.zeros(len(states), dtype=bool)
+        for answers in approach_all(sought, done):
+            for number, answer in answers:
+                proven = judged(*pairs[number], answer)
+                if proven is not None:
+                    self._found[states[number]], done[number] = proven, True
+
+    def _known(
+        self, state: _State, assembly: Assembly, case: Case, held: Sequence[int]
+    ) -> tuple[Proven, Way] | None:
+        """Return what was found for it, or for those before it."""
+        proven = self._found.pop(state, None)
+        if proven is not None:
+            return proven, Way.MOTION if proven.bound > 0 else Way.FORCES
+        return _first(self._claimed(assembly, case, held))
 
     def _claimed(self, assembly: Assembly, case: Case, held: Sequence[int]) -> Iterator[_Tried]:
         """Yield what forces and motions that were found before prove, those found last first."""
@@ -160,7 +186,7 @@ class VerdictChain:
             if self._stood and answer.value <= _TIGHT:
                 return  # it does not hold what is beside it
 
-    def _bearing(self, assembly: Assembly) -> Part | None:
+    def _bearing(self, assembly: Assembly) -> Changing | None:
         """Return what may bear new blocks and grips instead of those before, down to the ground."""
         blocks, corners = len(assembly.centroid), len(assembly.corner)
         if self._corner_force is None or self._blocks > blocks:
@@ -172,9 +198,9 @@ class VerdictChain:
         kept = np.zeros((corners, 3))
         kept[: len(self._corner_force)] = self._corner_force / assembly.scales[0]
         kept[changes] = 0.0
-        return Part(near, changes, np.ones(len(assembly.payload), dtype=bool), kept)
+        return Changing(near, changes, np.ones(len(assembly.payload), dtype=bool), kept)
 
-    def _falling(self, assembly: Assembly) -> Part | None:
+    def _falling(self, assembly: Assembly) -> Changing | None:
         """Return what fell before, and what is beside it; the rest is held."""
         if self._motion is None:
             return None
@@ -184,7 +210,9 @@ class VerdictChain:
         near = _neighbors(assembly, falls)
         bodies = assembly.bodies[assembly.contact]
         changes = ((bodies != GROUND) & near[bodies]).any(axis=1)
-        return Part(near, changes, near[assembly.grip_block], np.zeros((len(assembly.corner), 3)))
+        return Changing(
+            near, changes, near[assembly.grip_block], np.zeros((len(assembly.corner), 3))
+        )
 
     def _kept_forces(self, assembly: Assembly, held: Sequence[int]) -> Iterator[Answer]:
         """Yield forces that hold the same bricks with fewer grips: one more bears nothing."""

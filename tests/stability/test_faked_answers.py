@@ -283,7 +283,7 @@ def fed(seed):
         )
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(chain, "approach", lambda assembly, *_: iter([fake(assembly)]))
+        patch.setattr(chain, "approach", lambda sought: iter([fake(sought.assembly)]))
         found = each_verdict(network, steps, DRY, lambda assembly: lambda *_: fake(assembly))
         yield from zip(truth, (step.verdict for step in found), strict=True)
 

@@ -25,7 +25,9 @@ from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability import _verdict_chain as chain
-from seqopt.stability._interior_point import approach
+from seqopt.stability._ahead import quick_verdicts
+from seqopt.stability._search.cones import Sought
+from seqopt.stability._search.interior_point import approach, approach_all
 from seqopt.stability._step_verdicts import each_verdict, step_verdicts
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded, verdict
 from seqopt.stability.limit_analysis import EXACT, Answer, Claim, bound, violation
@@ -109,6 +111,36 @@ def test_verdicts_are_those_of_the_cone_program(name, mortar):
     assert step_verdicts(network, steps, MORTARS[mortar]) == expected
     back = step_verdicts(network, steps[::-1], MORTARS[mortar])
     assert back[::-1] == expected
+    assert tuple(quick_verdicts(network, steps, MORTARS[mortar])) == expected
+
+
+@pytest.mark.parametrize("mortar", [DRY, EPOXY])
+def test_what_is_sought_for_many_beside_each_other_is_as_for_each_alone(mortar):
+    """The same answers after every round, up to the one that proves something."""
+    network = build_network(SCENES["blocks"]())
+    parts = PartialAssemblies(network, len(network.inner))
+    sought = [start(parts(each.bricks, each.grips), mortar) for each in random_steps(network, 9, 6)]
+    done, together = np.zeros(len(sought), dtype=bool), [[] for _ in sought]
+    for answers in approach_all(sought, done):
+        for number, answer in answers:
+            together[number].append(answer)
+            if chain.judged(sought[number].assembly, sought[number].case, answer) is not None:
+                done[number] = True
+    assert done.all()
+    for each, answers in zip(sought, together, strict=True):
+        for alone, beside in zip(approach(each), answers, strict=False):
+            assert alone.value == pytest.approx(beside.value, abs=1e-6)
+            for name in ("contact_force", "grip_force", "motion"):
+                mine, other = getattr(alone, name), getattr(beside, name)
+                np.testing.assert_allclose(
+                    mine, other, atol=1e-6 * (1 + np.abs(other).max(initial=0))
+                )
+
+
+def start(assembly, mortar):
+    count = len(assembly.corner) + len(assembly.payload)
+    zero, one = np.zeros((count, 3)), np.ones((count, 3))
+    return Sought(assembly, bonded(assembly, mortar), zero, one)
 
 
 def bent(count, start, bend, pattern):
@@ -231,7 +263,7 @@ def arch():
 @pytest.mark.parametrize("mortar", [DRY, EPOXY])
 def test_nonsense_from_the_search_turns_no_verdict(arch, mortar, monkeypatch):
     network, steps, expected = arch
-    monkeypatch.setattr(chain, "approach", lambda assembly, *_: nonsense(assembly, 1))
+    monkeypatch.setattr(chain, "approach", lambda sought: nonsense(sought.assembly, 1))
     found = [*each_verdict(network, steps, mortar)]
     assert tuple(step.verdict for step in found) == expected[mortar]
     assert "cone program" in {step.proof for step in found}
@@ -239,9 +271,25 @@ def test_nonsense_from_the_search_turns_no_verdict(arch, mortar, monkeypatch):
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 @pytest.mark.parametrize("mortar", [DRY, EPOXY])
+def test_nonsense_of_many_beside_each_other_turns_no_verdict(arch, mortar, monkeypatch):
+    network, steps, expected = arch
+    asked = []
+
+    def offered(sought, done):
+        asked.extend(sought)
+        for answers in zip(*(nonsense(each.assembly, 4) for each in sought), strict=True):
+            yield [*enumerate(answers)]
+
+    monkeypatch.setattr(chain, "approach_all", offered)
+    assert tuple(quick_verdicts(network, steps, mortar)) == expected[mortar]
+    assert asked
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("mortar", [DRY, EPOXY])
 def test_nonsense_from_all_solvers_turns_no_verdict(arch, mortar, monkeypatch):
     network, steps, expected = arch
-    monkeypatch.setattr(chain, "approach", lambda assembly, *_: nonsense(assembly, 2))
+    monkeypatch.setattr(chain, "approach", lambda sought: nonsense(sought.assembly, 2))
     for number in range(7):
 
         def compiled(assembly, number=number):
@@ -405,9 +453,10 @@ def test_what_is_sought_near_a_change_is_proven_of_the_whole(name, lie, monkeypa
             proven.append(found is not None)
             yield found, way
 
-    def false(assembly, case, force, level, part=None):
+    def false(sought):
+        part = sought.part
         wrong = part if part is None else part._replace(kept=part.kept + 0.1)
-        return approach(assembly, case, force, level, wrong)
+        return approach(sought._replace(part=wrong))
 
     monkeypatch.setattr(chain.VerdictChain, "_sought_near", watched)
     if lie:
