@@ -49,7 +49,7 @@ def _put_off() -> None:
     import numpy as np  # noqa: PLC0415  # of which help needs nothing
 
     sys.modules.setdefault("pandas", _Later("pandas"))
-    for part in ("f2py", "ma", "testing"):
+    for part in ("f2py", "testing"):
         if part not in vars(np):
             vars(np)[part] = sys.modules.setdefault(f"numpy.{part}", _Later(f"numpy.{part}"))
 

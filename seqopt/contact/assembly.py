@@ -146,7 +146,7 @@ class Assembly(FrozenValue):
             levers.append(np.linalg.norm(self.corner[real] - self.centroid[body[real]], axis=1))
         return force or 1.0, float(np.concatenate(levers).max(initial=0.0)) or 1.0
 
-    @property
+    @cached_property
     def stress_scale(self) -> float:
         """The heaviest block's weight over the mean contact area, Pa."""
         area = float(self.area.mean()) if len(self.area) else self.scales[1] ** 2
