@@ -25,8 +25,14 @@ Whether an answer can be trusted is asked apart:
 'SOLVED WELL'
 """
 
-from seqopt.engines.diagnosis import Diagnosis, diagnose
+from typing import TYPE_CHECKING
+
+from seqopt._later import later
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.registry import ENGINES, make_engine
 
+if TYPE_CHECKING:
+    from seqopt.engines.diagnosis import Diagnosis, diagnose
+
 __all__ = ["ENGINES", "Diagnosis", "Engine", "Fields", "Want", "diagnose", "make_engine"]
+__getattr__, __dir__ = later(__name__, {"Diagnosis": "diagnosis", "diagnose": "diagnosis"})

@@ -15,8 +15,23 @@ arrays that no path is better.
 Best(path=(2, 3), values=(2.5, 2.0))
 """
 
-from seqopt.graph._explore import Explorer, Visited
-from seqopt.graph.graph import Graph
-from seqopt.graph.paths import Best, lexicographic
+from typing import TYPE_CHECKING
+
+from seqopt._later import later
+
+if TYPE_CHECKING:
+    from seqopt.graph._explore import Explorer, Visited
+    from seqopt.graph.graph import Graph
+    from seqopt.graph.paths import Best, lexicographic
 
 __all__ = ["Best", "Explorer", "Graph", "Visited", "lexicographic"]
+__getattr__, __dir__ = later(
+    __name__,
+    {
+        "Best": "paths",
+        "Explorer": "_explore",
+        "Graph": "graph",
+        "Visited": "_explore",
+        "lexicographic": "paths",
+    },
+)

@@ -30,12 +30,17 @@ bit:
 True
 """
 
-from seqopt.responses._calibration import StiffnessFit, calibrate
+from typing import TYPE_CHECKING
+
+from seqopt._later import later
 from seqopt.responses._choices import Evaluation, StepChoices
-from seqopt.responses._staged import analyze_staged
 from seqopt.responses.quantities import RESPONSES, Response, responses_of
 from seqopt.responses.resources import Resources
 from seqopt.responses.table import analyze
+
+if TYPE_CHECKING:
+    from seqopt.responses._calibration import StiffnessFit, calibrate
+    from seqopt.responses._staged import analyze_staged
 
 __all__ = [
     "RESPONSES",
@@ -49,3 +54,7 @@ __all__ = [
     "calibrate",
     "responses_of",
 ]
+__getattr__, __dir__ = later(
+    __name__,
+    {"StiffnessFit": "_calibration", "calibrate": "_calibration", "analyze_staged": "_staged"},
+)

@@ -18,11 +18,16 @@ than its weight loads it; `seqopt.save_scene` writes it to a file. `Durations` s
 takes.
 """
 
+from typing import TYPE_CHECKING
+
+from seqopt._later import later
 from seqopt.scene._durations import Durations
-from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.parts import Brick, Ground, Joint, Load, Robot
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
+
+if TYPE_CHECKING:
+    from seqopt.scene.arch import ArchShape, arch_scene
 
 __all__ = [
     "ArchShape",
@@ -36,3 +41,4 @@ __all__ = [
     "arch_scene",
     "load_scene",
 ]
+__getattr__, __dir__ = later(__name__, {"ArchShape": "arch", "arch_scene": "arch"})

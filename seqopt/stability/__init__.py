@@ -16,11 +16,16 @@ An assembly of blocks is assessed with the mortar in its joints. Every verdict i
 `load_factors` says what multiple of the scene's loads every step bears.
 """
 
-from seqopt.stability._load_factor import LoadFactor, load_factor_table, load_factors
+from typing import TYPE_CHECKING
+
+from seqopt._later import later
 from seqopt.stability._margins import Margins
 from seqopt.stability._screens import Screen
 from seqopt.stability.assessment import Stability, Verdict, assess
 from seqopt.stability.steps import assess_steps, stability_table
+
+if TYPE_CHECKING:
+    from seqopt.stability._load_factor import LoadFactor, load_factor_table, load_factors
 
 __all__ = [
     "LoadFactor",
@@ -34,3 +39,6 @@ __all__ = [
     "load_factors",
     "stability_table",
 ]
+__getattr__, __dir__ = later(
+    __name__, dict.fromkeys(("LoadFactor", "load_factor_table", "load_factors"), "_load_factor")
+)

@@ -6,7 +6,13 @@ accepted corrected (`seqopt.engines.rigid._refinement`). `solve_mixed` and `solv
 routes, for last resorts, tests and mechanisms.
 """
 
-from seqopt.engines.rigid._mixed import solve_dense, solve_mixed
+from typing import TYPE_CHECKING
+
+from seqopt._later import later
 from seqopt.engines.rigid.compliance import ComplianceEngine
 
+if TYPE_CHECKING:
+    from seqopt.engines.rigid._mixed import solve_dense, solve_mixed
+
 __all__ = ["ComplianceEngine", "solve_dense", "solve_mixed"]
+__getattr__, __dir__ = later(__name__, dict.fromkeys(("solve_dense", "solve_mixed"), "_mixed"))
