@@ -12,7 +12,7 @@ from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_p
 from seqopt._cli.words.given import given_scene, given_steps
 from seqopt._cli.words.props import parse_props
 from seqopt.contact.mortar import Mortar
-from seqopt.engines._auto import AutoEngine
+from seqopt.engines._kinds import ChoosingEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import LIMITED, make_engine
 from seqopt.errors import ProblemError, SceneError, StepError
@@ -103,7 +103,7 @@ def asked_steps(options: argparse.Namespace, network: Network) -> tuple[Step, ..
 
 def level_notes(engine: Engine) -> tuple[str, ...]:
     """Return which levels an engine that picks them took, and why."""
-    if not isinstance(engine, AutoEngine):
+    if not isinstance(engine, ChoosingEngine):
         return ()
     said = [
         f"engine: {choice.level.value} for {sets} grip sets: {choice.reason}"

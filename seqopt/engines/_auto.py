@@ -9,8 +9,6 @@ next level, to rounding.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
-from enum import Enum
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +18,7 @@ from seqopt.arrays import Bools, Floats
 from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines._hands import read_hands
+from seqopt.engines._kinds import ChoosingEngine, Level, LevelChoice
 from seqopt.engines._planar import _leaves_plane, find_plane, off_plane
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import (
@@ -35,23 +34,6 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-
-
-class Level(Enum):
-    """Levels of detail of a model, cheapest first; values are the engines' names."""
-
-    PLANAR = "planar"
-    RIGID = "compliance"
-    DISCRETE = "discrete"
-
-
-@dataclass(frozen=True)
-class LevelChoice:
-    """A level and why it was taken."""
-
-    level: Level
-    reason: str  # a clause that goes into a sentence
-
 
 _IN_PLANE = LevelChoice(Level.PLANAR, "bricks, springs, gravity, loads and grips lie in one plane")
 _OFF_PLANE = LevelChoice(Level.RIGID, "a grip lies outside the plane of the bricks")
@@ -114,14 +96,10 @@ def _of(moved: ArrayLike | None, which: Bools) -> Floats | None:
     return None if moved is None else np.asarray(moved, dtype=float)[which]
 
 
-class AutoEngine(NamedEngine):
-    """Computes every grip set at the cheapest level whose condition it meets.
+class AutoEngine(ChoosingEngine):
+    """Computes every grip set at the cheapest level whose condition it meets."""
 
-    ``tally``: how many grip sets of all calls were answered at which level, and why. ``unchecked``:
-    why elastic limits are not checked; empty if they are. ``limits``: those; none if they are not
-    known. ``rigid``: the engine of rigid bricks on springs that never break: for what need not be
-    the last word.
-    """
+    rigid: _RigidBricks
 
     def __init__(self, network: Network | Scene, mortar: Mortar = EPOXY) -> None:
         super().__init__(network)

@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines._hands import Hands, read_hands
-from seqopt.engines.interface import Basis, Fields, NamedEngine, Want, grip_columns
+from seqopt.engines._kinds import FlatEngine
+from seqopt.engines.interface import Basis, Fields, Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, SceneError
 from seqopt.network.network import GROUND, Network
@@ -165,7 +166,7 @@ def _spring(network: Network, index: int) -> str:
 _ELSE = "use the compliance engine"
 
 
-class PlanarEngine(NamedEngine):
+class PlanarEngine(FlatEngine):
     """Computes any batch of grip sets on any partial structure of a planar scene.
 
     Raises `SceneError` if bricks, springs, gravity, loads or movements of the ground leave the

@@ -11,19 +11,17 @@ import platform
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy
 
 from seqopt.arms._held import held_postures
 from seqopt.contact.mortar import Mortar, find_mortar
-from seqopt.engines._auto import AutoEngine
-from seqopt.engines._planar import PlanarEngine
-from seqopt.engines.discrete.engine import DiscreteEngine
-from seqopt.engines.frame import FrameEngine
+from seqopt.engines._kinds import ChoosingEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
@@ -102,12 +100,28 @@ def recipe_of(engine: object) -> Recipe | None:
     return found if isinstance(found, Recipe) else None
 
 
+def _loaded(name: str, network: Network | Scene, **options: Any) -> Engine:
+    """Return an engine that few problems take."""
+    from seqopt.engines._auto import AutoEngine  # noqa: PLC0415  # slow to import, as the others
+    from seqopt.engines._planar import PlanarEngine  # noqa: PLC0415
+    from seqopt.engines.discrete.engine import DiscreteEngine  # noqa: PLC0415
+    from seqopt.engines.frame import FrameEngine  # noqa: PLC0415
+
+    kinds: dict[str, Callable[..., Engine]] = {
+        "auto": AutoEngine,
+        "planar": PlanarEngine,
+        "frame": FrameEngine,
+        "discrete": DiscreteEngine,
+    }
+    return kinds[name](network, **options)
+
+
 ENGINES: dict[str, Callable[..., Engine]] = {
-    "auto": AutoEngine,
-    "planar": PlanarEngine,
+    "auto": partial(_loaded, "auto"),
+    "planar": partial(_loaded, "planar"),
     "compliance": ComplianceEngine,
-    "frame": FrameEngine,
-    "discrete": DiscreteEngine,
+    "frame": partial(_loaded, "frame"),
+    "discrete": partial(_loaded, "discrete"),
 }
 USUAL = "compliance"  # the engine where none is asked for
 LIMITED = ("auto", "discrete")  # engines whose joints hold what mortar does
@@ -170,7 +184,7 @@ def provenance(engine: Engine) -> dict[str, object]:
         why = "the default" if recipe.engine == USUAL else "asked for by name"
         said = {"name": recipe.engine, "reason": why}
         said |= {name: asdict(value) for name, value in recipe.options.items()}  # type: ignore[call-overload]
-    if isinstance(engine, AutoEngine):
+    if isinstance(engine, ChoosingEngine):
         said["levels"] = [
             {"engine": choice.level.value, "sets": sets, "reason": choice.reason}
             for choice, sets in engine.tally.items()

@@ -34,7 +34,7 @@ import numpy as np
 
 from seqopt._files import HIDDEN, make_folder, require_folder, write_bytes
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.engines._auto import Level, LevelChoice
+from seqopt.engines._kinds import Level, LevelChoice
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import Recipe, make_engine, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -140,7 +140,7 @@ _HELD = 2  # engines that a process keeps between tasks: of the run before, and 
 Blocks = Sequence[Block]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Shipment:
     """An engine as it is sent: how to make it, or itself where nobody knows."""
 

@@ -9,9 +9,7 @@ from itertools import chain
 import numpy as np
 
 from seqopt.arrays import Terse
-from seqopt.engines._auto import AutoEngine
-from seqopt.engines._planar import PlanarEngine
-from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines._kinds import ChoosingEngine, FlatEngine, OpeningEngine
 from seqopt.engines.registry import recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.responses._tolerance import each_tolerance, is_linear
@@ -20,7 +18,7 @@ from seqopt.responses.table import LinearRange, _Columns, _node, force_column, h
 from seqopt.scene.scene import Scene
 
 _FEW = 100  # bricks up to which tolerances take less than a second
-_KNOWN = AutoEngine, PlanarEngine, ComplianceEngine, DiscreteEngine
+_KNOWN = ChoosingEngine, FlatEngine, ComplianceEngine, OpeningEngine
 
 
 @dataclass(frozen=True, repr=False)
@@ -77,21 +75,21 @@ def what_was_enough(
 def _others(within: LinearRange, below: float, where: str) -> str:
     """Return what more detailed engines would change, in words; ``below``: the limits, Pa."""
     engine = within.engine
-    if isinstance(engine, DiscreteEngine):
+    if isinstance(engine, OpeningEngine):
         return "none is more detailed"
     if not isinstance(engine, _KNOWN):
         return "what another one would change is not known"
     flat = "compliance would change nothing, as nothing leaves the plane; "
-    said = flat if isinstance(engine, PlanarEngine) else ""
+    said = flat if isinstance(engine, FlatEngine) else ""
     if np.isnan(below):
         unchecked = "; ".join(within.unchecked) or str(getattr(engine, "unchecked", ""))
         why = unchecked or "steps build on earlier ones"
         return f"{said}what discrete elements would change is not known: {why}"
     if below >= 0:
         close = f"{where} comes closest to its elastic limits, {below / 1e6:.3g} MPa below them"
-        own = "" if isinstance(engine, AutoEngine) else " with epoxy"  # whose limits they are
+        own = "" if isinstance(engine, ChoosingEngine) else " with epoxy"  # whose limits they are
         return f"{said}discrete elements{own} would change nothing in these steps: {close}"
-    if isinstance(engine, AutoEngine):
+    if isinstance(engine, ChoosingEngine):
         return "discrete elements were taken where joints open, elsewhere they change nothing"
     return f"{said}what discrete elements would change is not known: {where} leaves its limits"
 
@@ -115,7 +113,7 @@ def _left_out(
         yield "that props lift off which only push (plans in which one would pull are not allowed)"
     if not staged and any(len(table["step"]) > 1 for table in tables):
         yield "what earlier steps lock in"
-    if not isinstance(within.engine, DiscreteEngine):
+    if not isinstance(within.engine, OpeningEngine):
         most = max(float(np.max(t[moved.column])) / moved.scale for t in tables) / within.far
         yield f"change of shape (bricks move by up to {_plain(100 * most, 2)} % of its limit)"
     yield "motion in time"

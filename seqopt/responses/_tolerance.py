@@ -15,9 +15,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines._auto import AutoEngine
-from seqopt.engines._planar import PlanarEngine
-from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines._kinds import ChoosingEngine, FlatEngine, OpeningEngine
 from seqopt.engines.interface import Engine, Want, grip_columns, select_sets
 from seqopt.engines.registry import make_engine, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -100,7 +98,7 @@ class Tolerance:
     misplacement: tuple[tuple[float, ...], ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class _Group:
     """Values of one kind, n for each of S grip sets, that misplacements change."""
 
@@ -139,13 +137,13 @@ class _Tensions(_Group):
 
 def _linear(engine: Engine) -> Engine:
     """Return the engine whose answers are linear in misplacements: of joints that never fail."""
-    why = {DiscreteEngine: "is not linear in where grips are", PlanarEngine: "has two directions"}
-    if type(engine) in why:
+    if isinstance(engine, FlatEngine | OpeningEngine):
+        flat = isinstance(engine, FlatEngine)
+        why = "has two directions" if flat else "is not linear in where grips are"
         raise ProblemError(
-            f"tolerance: a {type(engine).__name__} {why[type(engine)]}; take the engine compliance "
-            "or auto"
+            f"tolerance: a {type(engine).__name__} {why}; take the engine compliance or auto"
         )
-    return engine.rigid if isinstance(engine, AutoEngine) else engine
+    return engine.rigid if isinstance(engine, ChoosingEngine) else engine
 
 
 def _groups(
@@ -247,7 +245,7 @@ def held_in_steps(scene: Scene, steps: Sequence[Step]) -> list[_Held]:
 
 def is_linear(engine: Engine) -> bool:
     """Return whether an engine is known to be linear in where grips are, in all directions."""
-    return type(engine) in (AutoEngine, ComplianceEngine)
+    return isinstance(engine, ChoosingEngine | ComplianceEngine)
 
 
 def each_tolerance(engine: Engine, steps: Sequence[_Held]) -> Floats:

@@ -18,9 +18,7 @@ import pandas as pd
 from seqopt.arrays import Floats, Ints
 from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
-from seqopt.engines._auto import AutoEngine
-from seqopt.engines.discrete._equilibrium_path import FAR
-from seqopt.engines.discrete.engine import DiscreteEngine
+from seqopt.engines._kinds import FAR, ChoosingEngine, OpeningEngine
 from seqopt.engines.interface import Engine, Fields, Want, _empty_site
 from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.network import Network
@@ -81,13 +79,13 @@ class LinearRange:
 
     def __init__(self, engine: Engine) -> None:
         self.engine, self._network = engine, engine.network
-        self._breaks = isinstance(engine, AutoEngine | DiscreteEngine)
-        self._engine = engine.rigid if isinstance(engine, AutoEngine) else engine
+        self._breaks = isinstance(engine, ChoosingEngine | OpeningEngine)
+        self._engine = engine.rigid if isinstance(engine, ChoosingEngine) else engine
         self._known: dict[tuple[int, tuple[int, ...]], Floats] = {}
         thickness = engine.network.springs.thickness
         self._thickness = np.where(np.isnan(thickness) | self._breaks, np.inf, thickness)
         self.unchecked: tuple[str, ...] = ()
-        self._limits = engine.limits if isinstance(engine, AutoEngine) else None
+        self._limits = engine.limits if isinstance(engine, ChoosingEngine) else None
         try:
             if not self._breaks:
                 self._limits = find_elastic_limits(engine.network, EPOXY)
@@ -162,7 +160,7 @@ class LinearRange:
         """Return rotation, strain, excess of stress and in which joint, of every step, (n, 4)."""
         if fields is not None:
             return np.array([self._of(each) for each in fields])
-        if isinstance(self._engine, DiscreteEngine):
+        if isinstance(self._engine, OpeningEngine):
             return np.full((len(table["step"]), 4), -np.inf)  # whoever goes far is unstable there
         keys = [(bricks, held) for _, bricks, held in held_in_table(self._network.scene, table)]
         for key in keys:  # in order: engines grow with the build

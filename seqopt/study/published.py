@@ -6,7 +6,7 @@ from importlib import resources
 
 import pandas as pd
 
-from seqopt.engines.discrete._system import BedStiffness
+from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.graph.layers.layers import Layers
 from seqopt.problem.criteria import (

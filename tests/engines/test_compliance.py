@@ -10,6 +10,7 @@ import pytest
 
 from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.interface import _NAMES, Want, grip_columns
+from seqopt.engines.rigid import _refinement as refinement
 from seqopt.engines.rigid import compliance
 from seqopt.engines.rigid import compliance as trial
 from seqopt.engines.rigid._growth import grow_tree
@@ -34,7 +35,7 @@ def apart(fields, others):
 
 
 def test_nothing_is_corrected_where_joints_are_even(monkeypatch):
-    monkeypatch.setattr(compliance, "Refinement", None)
+    monkeypatch.setattr(refinement, "Refinement", None)
     for scene in (six_bricks(), from_both_sides(5), chain(9)):
         engine, count = ComplianceEngine(build_network(scene)), len(scene.bricks)
         for bricks in (1, 2, count - 1, count, 1):
@@ -193,7 +194,7 @@ def test_what_is_only_compared_is_corrected_once_and_right_to_six_digits(monkeyp
 def test_a_correction_is_kept_for_the_same_bricks_and_gets_their_operator(monkeypatch):
     made, helped = [], []
 
-    class Watched(compliance.Refinement):
+    class Watched(refinement.Refinement):
         def __init__(self, network, bricks, *more, **named):
             made.append(bricks)
             super().__init__(network, bricks, *more, **named)
@@ -202,7 +203,7 @@ def test_a_correction_is_kept_for_the_same_bricks_and_gets_their_operator(monkey
             helped.append(operator is not None)
             return super().solve(columns, operator, *more)
 
-    monkeypatch.setattr(compliance, "Refinement", Watched)
+    monkeypatch.setattr(refinement, "Refinement", Watched)
     engine = ComplianceEngine(build_network(loosened(chain(16), 1e-9, only_turning=True)))
     for bricks in (16, 16, 14, 14, 16):
         engine.solve(bricks, [[2 * bricks - 1, 2 * bricks - 3, 4]])
@@ -218,7 +219,7 @@ def test_what_is_only_to_be_compared_is_corrected_less(monkeypatch):
     columns = grip_columns(net, 100, sets)
     assert not solve_batch(operator, columns)[1].any()
     assert solve_batch(operator, columns, accuracy=compliance._SCREEN)[1].all()
-    monkeypatch.setattr(compliance, "Refinement", None)
+    monkeypatch.setattr(refinement, "Refinement", None)
     engine.solve(100, sets, Want.RESPONSES | Want.SCREEN)
     with pytest.raises(TypeError):
         engine.solve(100, sets)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from seqopt.contact.mortar import Mortar
-from seqopt.engines.discrete._system import BedStiffness
+from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine

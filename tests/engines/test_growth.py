@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from experiments.harness.scenes import grip_sets, half_circle, running_bond
 from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.rigid import _growth as growth
+from seqopt.engines.rigid import _refinement as refinement
 from seqopt.engines.rigid import compliance
 from seqopt.engines.rigid import compliance as trial
 from seqopt.engines.rigid._growth import grow_tree
@@ -159,7 +160,7 @@ def test_a_screen_is_not_corrected_where_six_digits_are_enough(monkeypatch):
     tip = [[net.node_name[i] for i in net.inner.ravel()[[197, 195, 193]]]]
     exact = ComplianceEngine(net).solve(99, tip)
     strict = ComplianceEngine(net, accuracy=1e-13).solve(99, tip, Want.RESPONSES | Want.SCREEN)
-    monkeypatch.setattr(compliance, "Refinement", None)  # nothing is corrected
+    monkeypatch.setattr(refinement, "Refinement", None)  # nothing is corrected
     screened = ComplianceEngine(net).solve(99, tip, Want.RESPONSES | Want.SCREEN)
     assert 0 < error(screened, exact).max() <= 1e-6
     assert error(strict, exact).max() <= 1e-6

@@ -56,8 +56,8 @@ def test_it_ends_where_a_loop_is_closed(name, bricks):
 def test_corrected_answers_are_those_of_a_factor_for_every_count(chain, monkeypatch):
     monkeypatch.setattr(compliance, "_UNSEEN", 1.0)  # no answer is trusted: all are corrected
     found = [seqopt.make_engine("compliance", chain) for _ in range(2)]
-    assert found[0]._hanging.bricks
-    found[1]._hanging.bricks = 0
+    assert found[0]._refinements.hanging.bricks
+    found[1]._refinements.hanging.bricks = 0
     a, b = (engine.solve(11, [[20, 21], [2, 19]], Want.ALL) for engine in found)
     for name in ("edge_force", "displacement", "grip_force", "joint_wrench"):
         one, other = getattr(a, name), getattr(b, name)

@@ -14,7 +14,6 @@ from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.rigid import _refinement as refinement
-from seqopt.engines.rigid import compliance
 from seqopt.engines.rigid._grip_equations import _solve_positive
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mechanism import require_resistance, ungripped_system
@@ -75,7 +74,7 @@ def together(monkeypatch):
 
 
 def test_a_torsion_free_joint_matters_only_where_it_acts(arch25, engine25, monkeypatch):
-    monkeypatch.setattr(compliance, "Refinement", None)  # nothing is corrected
+    monkeypatch.setattr(refinement, "Refinement", None)  # nothing is corrected
     engine = ComplianceEngine(build_network(torsion_free(arch25, TWISTED)))
     for bricks in (1, 7, TWISTED + 1):
         sets = grip_sets(engine.network, bricks, 20) if bricks > 1 else NONE

@@ -31,7 +31,7 @@ from experiments.discrete.parts.arches_lmgc90 import (
     witness,
 )
 from experiments.harness.lmgc90 import python_with_lmgc90
-from seqopt.engines.discrete._system import BedStiffness
+from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.engines.discrete.engine import Across, Pinch
 from seqopt.network.network import GROUND
 from seqopt.sequence.two_robots import sequential

@@ -9,8 +9,9 @@ import pytest
 
 from experiments.discrete.parts.arch_pads import AtCorners
 from seqopt.contact.mortar import DRY, Mortar
+from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.engines.discrete._equilibrium_path import settle
-from seqopt.engines.discrete._system import BedStiffness, build_system
+from seqopt.engines.discrete._system import build_system
 from seqopt.engines.discrete.engine import DiscreteEngine, _held_nodes
 from seqopt.engines.interface import Want
 from seqopt.errors import MechanismError

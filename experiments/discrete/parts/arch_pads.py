@@ -23,7 +23,8 @@ from seqopt.arrays import Floats
 from seqopt.contact._elastic_limits import opening_maps
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import bare_assembly, step_assembly
-from seqopt.engines.discrete._system import BedStiffness, System, build_system
+from seqopt.engines.discrete._bed import BedStiffness
+from seqopt.engines.discrete._system import System, build_system
 from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.interface import Fields, Want
 from seqopt.network.network import GROUND, Network

@@ -22,7 +22,7 @@ from experiments.harness.lmgc90 import python_with_lmgc90
 from seqopt import EPOXY, Step
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
-from seqopt.engines.discrete._system import BedStiffness
+from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network._mechanics import node_motion

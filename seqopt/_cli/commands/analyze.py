@@ -39,7 +39,7 @@ from seqopt._cli.values import length_word, parse_time_limit
 from seqopt._files import write_bytes
 from seqopt._interrupts import ending
 from seqopt.arms.reach import find_postures
-from seqopt.engines._auto import AutoEngine, Level
+from seqopt.engines._kinds import ChoosingEngine, Level
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.registry import provenance
 from seqopt.errors import SceneError
@@ -171,7 +171,7 @@ def _late(
     if computed == steps:
         return (), Status.DONE
     so_far = f"{computed} of {steps} steps computed" if computed else "no step computed"
-    levels = engine.tally if isinstance(engine, AutoEngine) else {}
+    levels = engine.tally if isinstance(engine, ChoosingEngine) else {}
     dear = sum(sets for choice, sets in levels.items() if choice.level is Level.DISCRETE)
     if dear:
         so_far += f", {dear} by discrete elements, which are what takes long"

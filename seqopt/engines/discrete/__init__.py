@@ -4,7 +4,15 @@
 carries), holds nodes or pinches bricks between pads (`Pinch`), and follows the structure to rest.
 """
 
-from seqopt.engines.discrete._system import BedStiffness
-from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
+from typing import TYPE_CHECKING
+
+from seqopt._later import later
+from seqopt.engines.discrete._bed import BedStiffness
+
+if TYPE_CHECKING:
+    from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 
 __all__ = ["Across", "BedStiffness", "DiscreteEngine", "Pinch"]
+__getattr__, __dir__ = later(
+    __name__, dict.fromkeys(("Across", "DiscreteEngine", "Pinch"), "engine")
+)

@@ -10,6 +10,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from seqopt.arrays import Bools, Floats, FrozenValue, frozen
+from seqopt.engines._kinds import FAR
 from seqopt.engines.discrete._system import System
 
 _ITERATIONS = 60
@@ -19,7 +20,6 @@ LARGEST_STEP, SMALLEST_STEP = 0.1, 1e-3  # of the load, once a bond breaks
 _FIRST_RESISTANCE = 1.0  # resistance to motion at first, over the stiffness
 _MOVES = 120  # against a resistance
 _HALVINGS = 4
-FAR = 0.1  # motion over a brick's length beyond which a structure has gone
 _LENT_STIFFNESS = 1e-12  # lent to every motion, over its own: a loose body can come to rest
 
 

@@ -20,7 +20,7 @@ from seqopt.contact._elastic_limits import Quadrature, face_quadrature, first_po
 from seqopt.contact._elastic_limits import quadrature_stiffness as bed_stiffness
 from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import Mortar
-from seqopt.errors import SceneError
+from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.network._mechanics import deformation, spring_stiffness
 from seqopt.network.network import Network
 
@@ -76,22 +76,6 @@ class _Points(FrozenValue):
 
 
 _BED_OVER_JOINT = 10.0  # how much stiffer a bed is than its joint, whichever way it moves
-
-
-@dataclass(frozen=True)
-class BedStiffness:
-    """Stiffness of a joint or pad per area.
-
-    ``normal``, ``tangential``: N/m³. Raises `SceneError` if one is not a positive number.
-    """
-
-    normal: float
-    tangential: float
-
-    def __post_init__(self) -> None:
-        for name in ("normal", "tangential"):
-            if not 0 < getattr(self, name) < np.inf:
-                raise SceneError(f"bed: {name} is {getattr(self, name)}; give a positive number")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -25,9 +25,11 @@ from scipy import linalg, sparse
 from seqopt.arrays import Floats, Ints
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines._hands import Hands, invertible
+from seqopt.engines._kinds import OpeningEngine
+from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.engines.discrete._equilibrium_path import Held, Settled, settle
-from seqopt.engines.discrete._system import BedStiffness, System, build_system
-from seqopt.engines.interface import Fields, SerialEngine
+from seqopt.engines.discrete._system import System, build_system
+from seqopt.engines.interface import Fields
 from seqopt.engines.rigid._mechanism import mechanism_error, require_resistance
 from seqopt.engines.rigid._mixed import Solution, respond
 from seqopt.errors import SceneError, SeqoptError, SolverError
@@ -70,7 +72,7 @@ def _pad_stiffness(network: Network, index: int, node: Floats, pinch: Pinch) -> 
     return total
 
 
-class DiscreteEngine(SerialEngine):
+class DiscreteEngine(OpeningEngine):
     """Solves each grip set by discrete elements.
 
     Raises `MechanismError`: also if the structure moves a tenth of a brick's length and is not

@@ -34,7 +34,13 @@ from seqopt.engines._hands import Hands, _lever_of
 from seqopt.engines.interface import SPACE, Basis, Fields, join_sets, merge_sets, no_sets
 from seqopt.engines.rigid._grip_equations import grip_forces, still_forces
 from seqopt.engines.rigid._hanging import Hanging, HangingSystem
-from seqopt.engines.rigid._mechanism import Shared, Ungripped, require_resistance, ungripped_system
+from seqopt.engines.rigid._mechanism import (
+    Shared,
+    Ungripped,
+    require_resistance,
+    share,
+    ungripped_system,
+)
 from seqopt.engines.rigid._mixed import (
     LAST_CORRECTION,
     Solution,
@@ -277,6 +283,23 @@ class Refinement:
         own = [None if hands is None else hands.of(part) for part in every]
         parts = (corrector.together(columns[p], h) for p, h in zip(every, own, strict=True))
         return join_sets([no_sets(self.network, self.bricks, columns.shape[1]), *parts])
+
+
+class Refinements:
+    """Makes the refinements of a network, and keeps that of the brick count asked last."""
+
+    largest = LAST_CORRECTION  # after which an answer needs no other
+
+    def __init__(self, network: Network) -> None:
+        self._network, self._shared, self.hanging = network, share(network), Hanging(network)
+        self._last: Refinement | None = None
+
+    def of(self, bricks: int, *, tied: bool) -> Refinement:
+        """Return that of a brick count."""
+        if self._last is None or self._last.bricks != bricks:
+            asked = self._network, bricks, self._shared
+            self._last = Refinement(*asked, tied=tied, hanging=self.hanging)
+        return self._last
 
 
 def _loaded(parts: Ungripped) -> sparse.csr_array:

@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache, cached_property
 from math import isfinite, prod
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,17 +44,16 @@ from seqopt.engines.rigid._extremes import (
     solve_compiled,
 )
 from seqopt.engines.rigid._grip_equations import _GripForces, grip_forces, share_pairs, trusted
-from seqopt.engines.rigid._grown import GrownExtremes
 from seqopt.engines.rigid._growth import grow_tree
-from seqopt.engines.rigid._hanging import Hanging
-from seqopt.engines.rigid._mechanism import Shared, share
-from seqopt.engines.rigid._mixed import LAST_CORRECTION
 from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder, are_few, load_rows
 from seqopt.engines.rigid._pairs import Pairs, _by_grip, pairs_of
-from seqopt.engines.rigid._refinement import Refinement
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.work._threads import one_thread
+
+if TYPE_CHECKING:
+    from seqopt.engines.rigid._grown import GrownExtremes
+    from seqopt.engines.rigid._refinement import Refinements
 
 _CHUNK = 4096  # grip sets per pass: keeps the work arrays in the processor's cache
 ACCURACY = 1e-9  # largest error of fields over the largest of each
@@ -67,7 +67,7 @@ def _is_screen(want: Want) -> bool:
     return Want.SCREEN in want
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class _Tried:
     """What an operator alone says about grip sets."""
 
@@ -207,7 +207,6 @@ class ComplianceEngine(NamedEngine):
         self._kept: dict[int, ComplianceOperator] = {}  # the one that was asked last comes last
         self._bytes: dict[int, int] = {}  # of them, when they were counted last
         self._asked: set[int] = set()  # brick counts since then
-        self._refinement: Refinement | None = None  # of the brick count that was asked last
 
     @failing_in_a_line
     def solve(
@@ -306,14 +305,11 @@ class ComplianceEngine(NamedEngine):
             del self._kept[first], self._bytes[first]
 
     @cached_property
-    def _shared(self) -> Shared:
-        """What the systems that correct answers are cut from, whatever the brick count."""
-        return share(self._network)
+    def _refinements(self) -> Refinements:
+        """What corrects answers."""
+        from seqopt.engines.rigid._refinement import Refinements  # noqa: PLC0415  # few need any
 
-    @cached_property
-    def _hanging(self) -> Hanging:
-        """The bricks with which no loop is closed yet."""
-        return Hanging(self._network)
+        return Refinements(self._network)
 
     @cached_property
     def _builder(self) -> OperatorBuilder:
@@ -325,19 +321,20 @@ class ComplianceEngine(NamedEngine):
         """What answers few grip sets of large structures, where loops are made for the scene."""
         rests = not self._network.springs.movement.any()
         plain = self._basis is SPACE and rests and not self._builder.moments
-        return GrownExtremes(self._builder) if plain else None
+        if not plain:
+            return None
+        from seqopt.engines.rigid._grown import GrownExtremes  # noqa: PLC0415  # of large scenes
+
+        return GrownExtremes(self._builder)
 
     def _refined(self, bricks: int, columns: Ints, hands: Hands | None, want: Want) -> Fields:
         """Return what is wanted of grip sets that the operator alone answers not well enough."""
-        largest = _SCREEN if _is_screen(want) else LAST_CORRECTION
         operator = self._operator(bricks, columns) if bricks <= len(self._tree.spring) else None
         with one_thread():
-            if self._refinement is None or self._refinement.bricks != bricks:
-                tied = operator is not None  # the tree that it grew on reaches them all
-                self._refinement = Refinement(
-                    self._network, bricks, self._shared, tied=tied, hanging=self._hanging
-                )
-            answer = self._refinement.solve(columns, operator, largest, self._basis, hands)
+            tied = operator is not None  # the tree that it grew on reaches them all
+            refinement = self._refinements.of(bricks, tied=tied)
+            largest = _SCREEN if _is_screen(want) else self._refinements.largest
+            answer = refinement.solve(columns, operator, largest, self._basis, hands)
         return keep_wanted(answer, want)
 
 

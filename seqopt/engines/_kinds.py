@@ -1,0 +1,51 @@
+"""Kinds of engines that others tell apart, without what these compute with."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from enum import Enum
+
+from seqopt.contact._elastic_limits import ElasticLimits
+from seqopt.engines.interface import Engine, NamedEngine, SerialEngine
+
+FAR = 0.1  # motion over a brick's length beyond which a structure has gone
+
+
+class Level(Enum):
+    """Levels of detail of a model, cheapest first; values are the engines' names."""
+
+    PLANAR = "planar"
+    RIGID = "compliance"
+    DISCRETE = "discrete"
+
+
+@dataclass(frozen=True)
+class LevelChoice:
+    """A level and why it was taken."""
+
+    level: Level
+    reason: str  # a clause that goes into a sentence
+
+
+class ChoosingEngine(NamedEngine):
+    """Base of the engine that chooses a level for every grip set.
+
+    ``tally``: how many grip sets of all calls were answered at which level, and why. ``unchecked``:
+    why elastic limits are not checked; empty if they are. ``limits``: those; none if they are not
+    known. ``rigid``: the engine of rigid bricks on springs that never break: for what need not be
+    the last word.
+    """
+
+    rigid: Engine
+    limits: ElasticLimits | None
+    tally: Counter[LevelChoice]
+    unchecked: str
+
+
+class FlatEngine(NamedEngine):
+    """Base of the engine whose bricks stay in a plane."""
+
+
+class OpeningEngine(SerialEngine):
+    """Base of the engine whose joints open, slip and break."""
