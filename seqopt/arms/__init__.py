@@ -17,6 +17,13 @@ Where no robot has an arm there is no table:
 True
 """
 
-from seqopt.arms.reach import PostureTable, find_postures
+from typing import TYPE_CHECKING
+
+from seqopt._later import later
+from seqopt.arms.reach import find_postures
+
+if TYPE_CHECKING:
+    from seqopt.arms._postures import PostureTable
 
 __all__ = ["PostureTable", "find_postures"]
+__getattr__, __dir__ = later(__name__, {"PostureTable": "_postures"})

@@ -9,17 +9,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from seqopt.arms._held import held_postures
-from seqopt.arms._reached import choose
-from seqopt.arms.reach import PostureTable, find_postures
+from seqopt.arms.reach import find_postures
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from seqopt.arms._postures import PostureTable
 
 _SCENES = 32  # of which it is kept, the last ones that were asked for
 _WAYS = 8_000_000  # of holding that are looked at together
@@ -123,6 +126,8 @@ def _chosen(table: PostureTable, at: Ints, ends: Floats, nodes: int) -> Ints:
 
     ``at`` (P,): places of postures; ``ends`` (P,): from which brick count on they hit something.
     """
+    from seqopt.arms._reached import choose  # noqa: PLC0415  # few scenes have arms
+
     first = (at + 1) // 2  # the count at which the brick of a place is placed
     last = nodes // 2 + 1
     usable = (np.minimum(ends, last) - first).clip(min=0) / (last - first)

@@ -11,13 +11,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 from seqopt.arms._held import held_postures
-from seqopt.arms.reach import PostureTable, find_postures
+from seqopt.arms.reach import find_postures
 from seqopt.arrays import Terse
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.steps import Step
+
+if TYPE_CHECKING:
+    from seqopt.arms._postures import PostureTable
 
 _Way = tuple[int, ...]  # a posture for every hold of a step, as rows of the table
 _MOST_WAYS = 20_000  # of one step that are kept

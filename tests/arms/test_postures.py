@@ -11,7 +11,7 @@ import seqopt
 from seqopt.arms import find_postures
 from seqopt.arms._permits import permits, reach_table, reachable, within_reach
 from seqopt.arms._reached import Site, reached_alone
-from seqopt.arms.reach import _compute_table, _stored_table
+from seqopt.arms._tables import _compute_table, _stored_table
 from seqopt.errors import InfeasibleError, SceneError, StepError
 from seqopt.plan.judge._posture_rules import PostureRules, check_postures
 from seqopt.scene.scene import in_order

@@ -11,7 +11,8 @@ import pytest
 import seqopt
 from seqopt.arms._model import ArmModel
 from seqopt.arms._reached import WAY, Site, reached_alone, targets, way
-from seqopt.arms.reach import _stored_table, find_postures
+from seqopt.arms._tables import _stored_table
+from seqopt.arms.reach import find_postures
 from seqopt.errors import SceneError
 from seqopt.scene.arm import MOST, Arm
 from tests.arms.scenes import TOOL, two_arms

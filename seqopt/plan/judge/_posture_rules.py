@@ -9,11 +9,11 @@ props hold and bear nothing is shared but the engine.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from seqopt.arms._held import held_postures
-from seqopt.arms._model import ArmModel
 from seqopt.arms._permits import permits
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Bools, Floats, Ints
@@ -22,6 +22,9 @@ from seqopt.errors import SolverError, StepError
 from seqopt.scene._props import Prop
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
+
+if TYPE_CHECKING:
+    from seqopt.arms._model import ArmModel
 
 _UNFELT = 1e-3  # of the mean weight of a brick, far more than forces err
 
@@ -157,6 +160,8 @@ def _check_grips(scene: Scene) -> None:
     held, table = held_postures(scene), find_postures(scene)
     if held is None or table is None:
         return
+    from seqopt.arms._model import ArmModel  # noqa: PLC0415  # few scenes have arms
+
     for own, robot in enumerate(held.robots.tolist()):
         arm, name = scene.robots[robot].arm, scene.robots[robot].name
         assert arm is not None

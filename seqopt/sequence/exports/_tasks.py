@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt._files import csv_text
-from seqopt.arms.reach import PostureTable
+from seqopt.arms._postures import PostureTable
 from seqopt.arrays import Floats
 from seqopt.errors import StepError
 from seqopt.scene._checks import finite, positive, rows, short

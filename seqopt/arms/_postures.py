@@ -1,0 +1,120 @@
+"""Postures of arms as values: the table of all, and the ones in which arms hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.scene.scene import Scene
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PostureTable(FrozenValue):
+    """The postures of all arms of a scene, one a row, those of a robot at a node side by side.
+
+    Attributes
+    ----------
+    robots : tuple of str
+        Names of the robots that have arms.
+    nodes : tuple of int
+    bricks : tuple of int
+        Names of the bricks, ascending.
+    robot, node : (P,) int
+        Whose posture it is, and at which node: places in ``robots`` and ``nodes``.
+    joints : (P, J) float
+        Joint by joint, rad or m; NaN for joints that an arm does not have.
+    axes : (P, 3, 3) float
+        Directions of the flange as columns; the third one is that from which the tool comes.
+    place : (P, 3) float
+        Where the flange is, m.
+    tools : (P,) float
+        How long the body of the tool is that may hit something, from the flange, m.
+    hits : (P, B) bool
+        Which bricks an arm hits in it: it is usable while none of these stands.
+    collide : (P, P) bool
+        Which pairs of postures, of different robots, are in each other's way.
+    compliance : (P, 6, 6) float
+        How a grip gives way in it by the joints of the arm, m/N and rad/(N m); NaN if not known.
+    found : (R, N) int
+        How many postures were found, of which at most `MOST` are kept.
+    """
+
+    robots: tuple[str, ...]
+    nodes: tuple[int, ...]
+    bricks: tuple[int, ...]
+    robot: Ints
+    node: Ints
+    joints: Floats
+    axes: Floats
+    place: Floats
+    tools: Floats
+    hits: Bools
+    collide: Bools
+    compliance: Floats
+    found: Ints
+
+    def rows(self, robot: str, node: int) -> Ints:
+        """Return the postures of a robot at a node."""
+        return self._rows.get((robot, node), np.zeros(0, dtype=np.int64))
+
+    def table(self) -> pd.DataFrame:
+        """Return every posture: joints, flange, and the bricks that the arm hits in it.
+
+        Result: a row for every posture: ``robot``, ``node``; ``joint_1`` and so on, rad or m;
+        ``flange_x`` and so on, where the flange is, m; ``toward_x`` and so on, where the tool
+        points; ``hits``, names of bricks with semicolons between.
+        """
+        columns: dict[str, object] = {
+            "robot": [self.robots[r] for r in self.robot],
+            "node": [self.nodes[n] for n in self.node],
+        }
+        columns |= {f"joint_{k}": joint for k, joint in enumerate(self.joints.T, start=1)}
+        columns |= {f"flange_{name}": self.place[:, i] for i, name in enumerate("xyz")}
+        columns |= {f"toward_{name}": self.axes[:, i, 2] for i, name in enumerate("xyz")}
+        names = np.array(self.bricks)
+        columns["hits"] = [";".join(map(str, names[hit].tolist())) for hit in self.hits]
+        return pd.DataFrame(columns)
+
+    @cached_property
+    def _rows(self) -> dict[tuple[str, int], Ints]:
+        keys = [(self.robots[r], self.nodes[n]) for r, n in zip(self.robot, self.node, strict=True)]
+        out: dict[tuple[str, int], list[int]] = {}
+        for row, key in enumerate(keys):
+            out.setdefault(key, []).append(row)
+        return {key: np.array(rows) for key, rows in out.items()}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HeldPostures(FrozenValue):
+    """The postures of A arms whose joints give way, at N nodes, one of each arm at each node.
+
+    ``robots`` (A,): indices of the scene's robots; ``nodes`` (N,): ascending; ``rows`` (A, N):
+    postures of the table, -1 for none; ``jacobians``: by arm (N, 6, J), how a node moves with
+    joints, m and rad, in the axes of the scene; NaN where there is no posture.
+    """
+
+    robots: Ints
+    nodes: Ints
+    rows: Ints
+    jacobians: tuple[Floats, ...]
+
+    def row(self, robot: int, node: int) -> int | None:
+        """Return the posture of a robot at a node, -1 if there is none; None if any will do."""
+        own = np.flatnonzero(self.robots == robot)
+        if not len(own):
+            return None
+        return int(self.rows[own[0], np.searchsorted(self.nodes, node)])
+
+    def compliance(self, scene: Scene) -> Floats:
+        """Return how grips give way by the joints alone, (A, N, 6, 6); m and rad, N and N m."""
+        out = []
+        for robot, jacobian in zip(self.robots.tolist(), self.jacobians, strict=True):
+            arm = scene.robots[robot].arm
+            assert arm is not None
+            stiffness = np.array(arm.joint_stiffness)
+            out.append(np.einsum("nij,nkj->nik", jacobian / stiffness, jacobian))
+        return np.array(out)

@@ -1,0 +1,243 @@
+"""How postures are found, kept in a folder, and chosen for arms whose joints give way."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import re
+import zipfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import fields, replace
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from seqopt._files import make_folder, read_bytes, write_bytes
+from seqopt.arms._collisions import collide_pairs
+from seqopt.arms._model import UP, ArmModel, model_path
+from seqopt.arms._postures import HeldPostures, PostureTable
+from seqopt.arms._reached import Reached, Site, beside_others, choose, reached_alone
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import SceneError
+from seqopt.scene.arm import MOST, Arm
+from seqopt.scene.scene import Scene
+from seqopt.work.progress import Tell
+
+_MOST_ROWS = 6000  # postures that are kept in all, where that leaves one for every node
+_STIFFER = 1e-6  # share of a posture's use that counts as much as how stiff it is
+
+
+def _compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
+    """Return the posture table of a site, if its models can be read and bases stand clear."""
+    kept = max(1, min(MOST, _MOST_ROWS // max(1, len(site.robots) * len(site.nodes))))
+    alone = []
+    for number, robot in enumerate(site.robots):
+        tell(f"postures of {robot.name}")
+        try:
+            alone.append(reached_alone(site.alone(number), kept))
+        except SceneError as error:
+            why = str(error).removeprefix("robot alone: ").removeprefix("arm: ")
+            raise SceneError(f"robot {robot.name}: {why}") from error
+    reached = beside_others(site, alone)
+    tell("postures that are in each other's way")
+    robot_of = np.repeat(np.arange(len(reached)), [len(each.node) for each in reached])
+    node = np.concatenate([each.node for each in reached])
+    found = np.array([each.found for each in reached])
+    return PostureTable(
+        robots=tuple(robot.name for robot in site.robots),
+        nodes=site.nodes,
+        bricks=tuple(brick.name for brick in site.bricks),
+        robot=robot_of,
+        node=node,
+        joints=_padded([each.joints for each in reached]),
+        axes=np.concatenate([each.axes for each in reached]),
+        place=np.concatenate([each.place for each in reached]),
+        tools=np.concatenate([each.placed.tools for each in reached]),
+        hits=np.concatenate([each.hits for each in reached]),
+        collide=_collisions(site, reached, robot_of),
+        compliance=np.full((len(node), 6, 6), np.nan),
+        found=found,
+    )
+
+
+def _padded(joints: list[Floats]) -> Floats:
+    """Return the joints of several arms below each other, NaN where an arm has fewer."""
+    most = max(each.shape[1] for each in joints)
+    wide = [(0, 0), (0, 0)]
+    out = []
+    for each in joints:
+        wide[1] = (0, most - each.shape[1])
+        out.append(np.pad(each, wide, constant_values=np.nan))
+    return np.concatenate(out)
+
+
+def _collisions(site: Site, reached: list[Reached], robot: Ints) -> Bools:
+    """Return which pairs of postures of different robots collide, (P, P)."""
+    out = np.zeros((len(robot), len(robot)), dtype=bool)
+    for i, one in enumerate(reached):
+        for j, two in ((j, reached[j]) for j in range(i) if site.together(i, j)):
+            rows, columns = np.flatnonzero(robot == i), np.flatnonzero(robot == j)
+            grid = np.meshgrid(np.arange(len(rows)), np.arange(len(columns)), indexing="ij")
+            pairs = grid[0].ravel(), grid[1].ravel()
+            found = collide_pairs((one.model, two.model), one.placed, two.placed, pairs)
+            block = found.reshape(len(rows), len(columns))
+            out[np.ix_(rows, columns)] = block
+            out[np.ix_(columns, rows)] = block.T
+    return out
+
+
+def _with_compliance(table: PostureTable, arms: Sequence[tuple[str, Arm]]) -> PostureTable:
+    """Return a table with how grips give way by the joints of the arms, as far as it is known.
+
+    Raises `SceneError` if an arm does not give a stiffness for every joint.
+    """
+    found = table.compliance.copy()
+    for name, arm in arms:
+        if arm.joint_stiffness:
+            rows = np.flatnonzero(table.robot == table.robots.index(name))
+            try:
+                model = ArmModel(arm)
+            except SceneError as error:
+                raise SceneError(f"robot {name}: {str(error).removeprefix('arm: ')}") from error
+            for row in rows.tolist():
+                found[row] = model.grip_compliance(table.joints[row, : model.joints])
+    return replace(table, compliance=found)
+
+
+_VERSION = 1  # of what is computed: tables of another one are not taken
+_NAMES = ("robots", "nodes", "bricks")
+_MESH = re.compile(rb'filename="(?:package://|file://)?([^"]+)"')
+
+
+def _stored_table(folder: Path, site: Site, compute: Callable[[], PostureTable]) -> PostureTable:
+    """Return the table of a site from a folder, or compute it and keep it there."""
+    make_folder(folder)
+    path = folder / f"postures-{_key(site)}.npz"
+    if path.exists() and (found := _read(path)) is not None:
+        return found
+    table = compute()
+    write_bytes(path, _content(table))
+    return table
+
+
+def _key(site: Site) -> str:
+    """Return the content that postures depend on, condensed: robots, bricks, models, meshes."""
+    found = hashlib.sha256(repr((_VERSION, site.up, site.blocked)).encode())
+    for brick in site.bricks:
+        shape = None if brick.shape is None else brick.shape.vertices
+        own = (brick.name, brick.position, brick.length_axis, brick.width_axis, brick.dimensions)
+        found.update(repr((*own, brick.nodes, brick.node_offsets, shape)).encode())
+    for robot in site.robots:
+        arm = robot.arm
+        assert arm is not None
+        own = tuple(getattr(arm, each.name) for each in fields(arm) if each.name != "urdf")
+        found.update(repr((robot.name, robot.reach, own)).encode())
+        for content in _model(model_path(arm)):
+            found.update(hashlib.sha256(content).digest())
+    return found.hexdigest()[:32]
+
+
+def _model(path: Path) -> Iterator[bytes]:
+    """Yield the content of a URDF and of the meshes that it names, as far as they are found."""
+    text = read_bytes(path)
+    yield text
+    folders = [*path.resolve().parents][:UP]
+    for name in sorted({*_MESH.findall(text)}):
+        for each in folders:
+            mesh = each / name.decode("utf-8", "replace")
+            if mesh.is_file():
+                yield read_bytes(mesh)
+                break
+
+
+def _content(table: PostureTable) -> bytes:
+    """Return a table as the bytes of a NumPy archive."""
+    out = io.BytesIO()
+    arrays = {each.name: np.asarray(getattr(table, each.name)) for each in fields(table)}
+    np.savez_compressed(out, **arrays)  # type: ignore[arg-type]
+    return out.getvalue()
+
+
+def _read(path: Path) -> PostureTable | None:
+    """Return the table of a file; None if it is none, or damaged."""
+    try:
+        with np.load(io.BytesIO(read_bytes(path)), allow_pickle=False) as archive:
+            content: dict[str, Any] = {n.name: archive[n.name] for n in fields(PostureTable)}
+    except (KeyError, ValueError, OSError, EOFError, zipfile.BadZipFile):
+        return None
+    return PostureTable(**content | {name: tuple(content[name].tolist()) for name in _NAMES})
+
+
+_SITES = 16  # of which tables are kept, the last ones that were asked for
+
+
+def known_table(scene: Scene, cache: Path | str | None, progress: Tell | None) -> PostureTable:
+    """Return the posture table of a scene in which a robot has an arm, computed once."""
+    site = Site.of(scene)
+    known = _known(site)
+    compute = partial(_compute_table, site, progress or (lambda _: None))
+    if cache is not None and Path(cache) not in known:
+        known[Path(cache)] = _stored_table(Path(cache), site, lambda: known.get(None) or compute())
+        known.setdefault(None, known[Path(cache)])
+    if None not in known:
+        known[None] = compute()
+    arms = tuple((robot.name, robot.arm) for robot in scene.robots if robot.arm is not None)
+    if any(arm.joint_stiffness for _, arm in arms) and arms not in known:
+        known[arms] = _with_compliance(known[None], arms)
+    return known.get(arms, known[None])
+
+
+_Arms = tuple[tuple[str, Arm], ...]
+
+
+@lru_cache(maxsize=_SITES)
+def _known(site: Site) -> dict[Path | _Arms | None, PostureTable]:  # noqa: ARG001  # kept by site
+    """Return the table of a site, if it is known, under the folders and soft arms that have it."""
+    return {}
+
+
+def held_by(scene: Scene, table: PostureTable) -> HeldPostures:
+    """Return the postures in which arms of a scene hold whose joints give way."""
+    arms = tuple((robot.name, robot.arm) for robot in scene.robots)
+    return _held(Site.of(scene), table, arms)
+
+
+@lru_cache(maxsize=_SITES)
+def _held(
+    site: Site, table: PostureTable, arms: tuple[tuple[str, Arm | None], ...]
+) -> HeldPostures:
+    order = np.argsort(table.nodes)
+    chosen, robots, rows, found = _chosen(site, table)[:, order], [], [], []
+    for robot, (name, arm) in enumerate(arms):
+        if arm is None or not arm.joint_stiffness:
+            continue
+        model, own = ArmModel(arm), chosen[table.robots.index(name)]
+        jacobian = np.full((len(own), 6, model.joints), np.nan)
+        for place in np.flatnonzero(own >= 0).tolist():
+            jacobian[place] = model.jacobian(table.joints[own[place], : model.joints])
+        robots.append(robot)
+        rows.append(own)
+        found.append(jacobian)
+    return HeldPostures(
+        np.array(robots), np.array(table.nodes)[order], np.array(rows), tuple(found)
+    )
+
+
+def _chosen(site: Site, table: PostureTable) -> Ints:
+    """Return the posture of every arm at every node, (R, N), -1 where there is none.
+
+    What is near counts most: bricks near the node, which stand when it is held, and postures at
+    nodes near by, which are held with it. The build order does not count.
+    """
+    at = np.array([b.node_position(n) for b in site.bricks for n in b.nodes])
+    middle = np.array([brick.position for brick in site.bricks])
+    size = np.mean([max(brick.dimensions) for brick in site.bricks])
+    near = 1 / (1 + np.linalg.norm(at[:, None] - middle, axis=2) / size)
+    together = 1 / (1 + np.linalg.norm(at[:, None] - at, axis=2) / size)
+    own = near[table.node]
+    usable = 1 - (table.hits * own).sum(axis=1) / own.sum(axis=1)
+    give = np.nan_to_num(np.trace(table.compliance[:, :3, :3], axis1=1, axis2=2))
+    usable -= _STIFFER * give / max(give.max(initial=0.0), np.finfo(float).tiny)
+    return choose((table.robot, table.node), usable, table.collide, together, len(table.robots))
