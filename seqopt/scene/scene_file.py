@@ -13,7 +13,7 @@ import os
 import shlex
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, fields, replace
 from functools import partial
 from importlib import resources
 from pathlib import Path
@@ -28,17 +28,6 @@ from seqopt.scene._checks import cut, reading_json, short, which_fit
 from seqopt.scene._durations import Durations
 from seqopt.scene._props import Prop
 from seqopt.scene.arm import Arm
-from seqopt.scene.library.arch_form import (
-    ArchForm,
-    _barrel,
-    _BarrelShape,
-    arch,
-    barrel_vault,
-    chain,
-)
-from seqopt.scene.library.dome import DomeShape, dome
-from seqopt.scene.library.vault import VaultShape, herringbone_vault
-from seqopt.scene.library.wall import WallShape, wall
 from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Load, Reach, Robot, Side, Sphere
 from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.shape import Polyhedron
@@ -148,32 +137,19 @@ _VAULT = (
 
 def _vault338() -> Scene:
     """Return the vault of Bruun et al. as we reconstruct it around their arch."""
-    shape = VaultShape(
-        bricks=338, spacing=0.1327, plan_angle=math.radians(5.1), skew=1.74, widening=0.0234
-    )
-    return replace(herringbone_vault(_load_stored("arch25"), shape, "vault338"), provenance=_VAULT)
+    angle = math.radians(5.1)
+    given = {"bricks": 338, "spacing": 0.1327, "plan_angle": angle, "skew": 1.74}
+    vault = _made_of_words("herringbone", {**given, "widening": 0.0234})
+    return replace(vault, name="vault338", provenance=_VAULT)
 
 
-# of the size at which benchmarks of domes are taken
-_DOME = DomeShape(courses=10, around=22, rise=0.7, opening=0.6, thickness=0.06)
-_GENERATED: dict[str, Callable[[], Scene]] = {
-    "dome163": partial(dome, _DOME, "dome163"),
-    "vault338": _vault338,
-}
+def _dome163() -> Scene:
+    """Return a dome of the size at which benchmarks of domes are taken."""
+    given = {"courses": 10, "around": 22, "rise": 0.7, "opening": 0.6, "thickness": 0.06}
+    return replace(_made_of_words("dome", given), name="dome163")
 
 
-@dataclass(frozen=True)
-class _Kind:
-    """A kind of scene: what it is with an example, what makes it, and the shape that this takes."""
-
-    about: str
-    make: Callable[..., Scene]
-    shape: type | None = None
-
-    def numbers(self) -> dict[str, inspect.Parameter]:
-        """Return the numbers that it takes, by name."""
-        given = inspect.signature(self.shape or self.make, eval_str=True).parameters
-        return {name: number for name, number in given.items() if number.annotation in _READ}
+_GENERATED: dict[str, Callable[[], Scene]] = {"dome163": _dome163, "vault338": _vault338}
 
 
 _MESHES = {".obj": True, ".off": True, ".ply": True, ".stl": True} | dict.fromkeys(
@@ -181,30 +157,38 @@ _MESHES = {".obj": True, ".off": True, ".ply": True, ".stl": True} | dict.fromke
 )  # and whether one has to say its unit
 
 
-def _herringbone(shape: VaultShape) -> Scene:
-    """Return a herringbone vault around the arch of Bruun et al."""
-    return herringbone_vault(_load_stored("arch25"), shape)
-
-
 KINDS = {
-    "arch": _Kind("an arch by span and rise: arch:span=2,rise=0.7,curve=catenary", arch, ArchForm),
-    "barrel": _Kind("one of the eight tested barrel vaults: barrel:test=3", barrel_vault),
-    "chain": _Kind("an arch of any number of bricks that turn evenly: chain:bricks=40", chain),
-    "dome": _Kind("a dome: dome:courses=6,around=20,bond=herringbone", dome, DomeShape),
-    "herringbone": _Kind(
-        "a herringbone vault that grows from arch25: herringbone:bricks=100",
-        _herringbone,
-        VaultShape,
-    ),
-    "vault": _Kind(
-        "a barrel vault in running bond: vault:span=2,rise=0.8,columns=3", _barrel, _BarrelShape
-    ),
-    "wall": _Kind(
-        "a wall in running bond: wall:columns=6,courses=4,corbel=0.02, or wall:length=2,height=0.6",
-        wall,
-        WallShape,
+    "arch": "an arch by span and rise: arch:span=2,rise=0.7,curve=catenary",
+    "barrel": "one of the eight tested barrel vaults: barrel:test=3",
+    "chain": "an arch of any number of bricks that turn evenly: chain:bricks=40",
+    "dome": "a dome: dome:courses=6,around=20,bond=herringbone",
+    "herringbone": "a herringbone vault that grows from arch25: herringbone:bricks=100",
+    "vault": "a barrel vault in running bond: vault:span=2,rise=0.8,columns=3",
+    "wall": (
+        "a wall in running bond: wall:columns=6,courses=4,corbel=0.02, or wall:length=2,height=0.6"
     ),
 }
+"""What each kind of scene is, with an example."""
+
+
+def _maker(kind: str) -> tuple[Callable[..., Scene], type | None]:
+    """Return what makes a kind of scene, and the shape that this takes, if it takes one."""
+    from seqopt.scene import library as of  # noqa: PLC0415  # a scene from a file needs none
+    from seqopt.scene.library.arch_form import _barrel, _BarrelShape  # noqa: PLC0415
+
+    makers: dict[str, tuple[Callable[..., Scene], type | None]] = {
+        "arch": (of.arch, of.ArchForm),
+        "barrel": (of.barrel_vault, None),
+        "chain": (of.chain, None),
+        "dome": (of.dome, of.DomeShape),
+        "herringbone": (
+            lambda shape: of.herringbone_vault(_load_stored("arch25"), shape),
+            of.VaultShape,
+        ),
+        "vault": (_barrel, _BarrelShape),
+        "wall": (of.wall, of.WallShape),
+    }
+    return makers[kind]
 
 
 def _vector(text: str) -> Vector:
@@ -239,8 +223,15 @@ def _scene_by_words(words: str) -> Scene:
 
 def _made_of_words(name: str, given: Mapping[str, Any]) -> Scene:
     """Return the scene of a key of `KINDS` with the numbers that it takes."""
-    kind = KINDS[name]
-    return kind.make(kind.shape(**given)) if kind.shape else kind.make(**given)
+    make, shape = _maker(name)
+    return make(shape(**given)) if shape else make(**given)
+
+
+def _numbers(kind: str) -> dict[str, inspect.Parameter]:
+    """Return the numbers that a kind of scene takes, by name."""
+    make, shape = _maker(kind)
+    given = inspect.signature(shape or make, eval_str=True).parameters
+    return {name: number for name, number in given.items() if number.annotation in _READ}
 
 
 def _in_words(words: str) -> dict[str, Any]:
@@ -249,9 +240,9 @@ def _in_words(words: str) -> dict[str, Any]:
     Three lengths are ``0.2x0.1x0.06``; lengths in m, angles in rad, densities in kg/m³.
     """
     name, _, rest = words.partition(":")
-    if (kind := KINDS.get(name)) is None:
+    if name not in KINDS:
         raise SceneError(f"scene {words}: {name!r} is not known; give one of {', '.join(KINDS)}")
-    numbers = kind.numbers()
+    numbers = _numbers(name)
     given: dict[str, Any] = {}
     for part in filter(None, rest.split(",")):
         key, _, text = part.partition("=")
@@ -267,7 +258,7 @@ def _in_words(words: str) -> dict[str, Any]:
             raise SceneError(message) from None
     needed = {name for name, number in numbers.items() if number.default is number.empty}
     if lacking := ", ".join(needed - given.keys()):
-        raise SceneError(f"scene {words}: {lacking} is missing; {kind.about}")
+        raise SceneError(f"scene {words}: {lacking} is missing; {KINDS[name]}")
     return given
 
 

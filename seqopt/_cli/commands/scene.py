@@ -104,10 +104,10 @@ def _list(options: argparse.Namespace) -> Answer:
         f"{name}: {len(scene.bricks)} bricks, {len(scene.joints)} joints; {ABOUT[name]}"
         for name, scene in found.items()
     ]
-    lines += [kind.about for kind in KINDS.values()]
+    lines += KINDS.values()
     facts = {
         "scenes": [{**scene_facts(scene), "about": ABOUT[name]} for name, scene in found.items()],
-        "kinds": {name: kind.about for name, kind in KINDS.items()},
+        "kinds": KINDS,
     }
     return Answer(facts=facts, text="\n".join(lines))
 

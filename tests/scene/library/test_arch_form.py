@@ -174,4 +174,4 @@ def test_words_on_the_command_line(capsys, tmp_path):
     assert "rise is missing" in capsys.readouterr().err
     assert main(["scene", "--list"]) == 0
     out = capsys.readouterr().out
-    assert all(kind.about in out for kind in KINDS.values())
+    assert all(about in out for about in KINDS.values())
