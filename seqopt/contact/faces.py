@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from seqopt.arrays import Floats
+from seqopt.arrays import Floats, frozen
 from seqopt.contact._prop_grips import PropGrips, added, prop_grips
 from seqopt.contact.assembly import Assembly
 from seqopt.errors import SceneError
@@ -65,16 +65,27 @@ def _distance_beside(polygon: Floats) -> float:
     return float((out / size[real]).max())
 
 
+_KEY = "_contacts"
 _SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
 
 
 class Contacts(dict[int, tuple[str, Floats, Floats]]):
-    """Names, normals (3,) and corners (m, 3) of contacts by springs, found when first asked for."""
+    """Names, normals (3,) and corners (m, 3) of contacts by springs, found when first asked for.
+
+    They stay with the network: all that are made for it share them.
+    """
 
     def __init__(self, network: Network) -> None:
         self._network = network
+        self._kept: dict[int, tuple[str, Floats, Floats]] = vars(network).setdefault(_KEY, {})
 
     def __missing__(self, spring: int) -> tuple[str, Floats, Floats]:
+        if spring not in self._kept:
+            self._kept[spring] = self._found(spring)
+        self[spring] = self._kept[spring]
+        return self[spring]
+
+    def _found(self, spring: int) -> tuple[str, Floats, Floats]:
         springs, placed = self._network.springs, self._network.scene.placed
         first, second = springs.bodies[spring]
         name = f"{'ground' if first == GROUND else placed[first].name}-{placed[second].name}"
@@ -83,8 +94,7 @@ class Contacts(dict[int, tuple[str, Floats, Floats]]):
             between = [placed[b] for b in (first, second) if b != GROUND]
             where, thickness = springs.position[spring], float(springs.thickness[spring])
             axes, corners = _contact(name, between, axes, where, thickness)
-        self[spring] = name, axes[0], corners
-        return self[spring]
+        return frozen((name, axes[0], corners))
 
 
 def step_assembly(
