@@ -60,7 +60,7 @@ def status_of(error: BaseException) -> Status:
     return Status.NO_ANSWER if none else Status.BAD_INPUT
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Answer:
     """What a command answers, as facts for scripts and as text for people."""
 

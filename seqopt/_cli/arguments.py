@@ -72,7 +72,7 @@ def _layout(prog: str) -> argparse.HelpFormatter:
     return argparse.RawDescriptionHelpFormatter(prog, width=columns())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class _Command:
     """A command in a few words, and its module of `seqopt._cli`, loaded when it is asked for.
 
@@ -138,6 +138,14 @@ class _Parser(argparse.ArgumentParser):
         self.exit(Status.BAD_INPUT)
 
 
+class _Version(argparse.Action):
+    """The option that prints the version, which is looked up then alone."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        show(f"seqopt {version('seqopt')}\n")
+        parser.exit()
+
+
 def parser(asked: str | None = None) -> argparse.ArgumentParser:
     """Return the parser of the command line, or of the one command that is asked for.
 
@@ -150,7 +158,8 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
         epilog="seqopt COMMAND --help has what a first use of a command needs, and examples;\n"
         "seqopt COMMAND --help-all has all of its options.",
     )
-    whole.add_argument("--version", action="version", version=f"seqopt {version('seqopt')}")
+    about = "show program's version number and exit"
+    whole.add_argument("--version", action=_Version, nargs=0, default=argparse.SUPPRESS, help=about)
     whole.color = False  # signs of color would be printed as codes
     whole.set_defaults(quiet=False, json=False)
     commands = whole.add_subparsers(

@@ -96,7 +96,7 @@ class ScenarioCosts(FrozenValue):
     seconds: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class _ScenarioTask:
     """One scenario, as it is sent to a worker.
 

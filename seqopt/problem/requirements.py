@@ -52,7 +52,7 @@ choices speak for such a rounding.
 """
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Units:
     """A force, a moment and a displacement that grow as a scene's responses do."""
 
@@ -105,7 +105,7 @@ def crown(scene: Scene) -> float:
     return top + 1 if low[0] and low[top:].any() else NEVER
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class SceneFacts:
     """What criteria may ask of a scene, each computed when it is first asked for."""
 

@@ -61,7 +61,7 @@ _PREPARED = 0.15  # of all work, that every process does for itself on the vault
 _PORTIONS = 32  # tasks for every worker: one that is slow, or dies, leaves little to the others
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class _Portion:
     """Blocks that are answered together."""
 
@@ -165,7 +165,7 @@ def _share_out(
         yield _Portion(tuple(mine))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class _Course:
     """What happens to answers as soon as they are there: kept, counted, told of."""
 
@@ -292,7 +292,7 @@ class Evaluation(Terse):
         return self._found.seconds
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class _Found(Terse):
     """What is kept of an evaluation; no steps where there is not the memory."""
 

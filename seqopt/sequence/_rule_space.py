@@ -100,7 +100,7 @@ class StateRows(Terse):
         return np.asarray((states[:, : self.robots] > 0).sum(axis=1))
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FreeSpace(StateRows):
     """The states of a free schedule and the moves between them."""
 
@@ -345,7 +345,7 @@ class FreeSpace(StateRows):
         return Moves(moves.source[ok], moves.states[ok], moves.way[ok])
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class _TakeDownSpace(FreeSpace):
     """The states of a take-down: those of building, and moves that take bricks away."""
 

@@ -24,7 +24,7 @@ from seqopt.sequence.site import _begin_step
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ScheduleSpace(StateRows):
     """The states of a schedule and the moves between them; a level for every step."""
 

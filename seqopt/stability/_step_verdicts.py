@@ -119,7 +119,7 @@ def find_margins(asked: Collection[str] | str) -> tuple[str, ...]:
     return MARGINS if "all" in names else names
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class _Portion:
     """Neighboring steps of a build, and the numbers of those whose margins are asked for."""
 

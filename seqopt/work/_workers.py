@@ -234,7 +234,7 @@ class Crew(Protocol):
         """
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class _Given:
     """An executor of the caller, who also ends it."""
 
@@ -375,7 +375,7 @@ def map_ordered(
         yield result
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class _Course(Generic[_Task, _Result]):
     """What was given out, what came back, and what is to be given out again."""
 

@@ -19,7 +19,7 @@ from seqopt.sequence.steps import Step
 FORMS = "PLAN:STEP (a plan's folder or CSV file), a STATE.json, or a number of bricks"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Place:
     """Where a build begins or ends, and the steps that led there, where they are known."""
 

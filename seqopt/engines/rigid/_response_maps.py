@@ -139,7 +139,7 @@ def _leading(
 _GATHERED = 2**16  # numbers up to which gathering rows takes less than making a sparse matrix
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Loads:
     """Forces at the loads of an operator, and the weight: few of hundreds, for each of S sets."""
 
