@@ -28,8 +28,8 @@ from formulations.times._labels import (
 from seqopt.arrays import Bools
 from seqopt.errors import InfeasibleError
 from seqopt.graph._explore import Visited
-from seqopt.graph._timed import LabelProof, TimedGraph
-from seqopt.graph.graph import Graph
+from seqopt.graph._timed import TimedGraph
+from seqopt.graph.graph import Graph, LabelProof
 from seqopt.graph.paths import distances, keep_best, reached, tied
 from seqopt.plan.calling.formulation import Watch
 from seqopt.problem.problem import Goal, Measure

@@ -18,12 +18,12 @@ from seqopt.graph.layers.layers import Layers
 from seqopt.graph.states.states import States
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.calling.formulation import trace_rows
-from seqopt.plan.out_of_sample import Trial
 from seqopt.plan.plan import Plan
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
 from seqopt.stability._builds import BuildProver
 
 if TYPE_CHECKING:
+    from seqopt.plan.out_of_sample import Trial
     from seqopt.report._speed._table import SpeedTable
     from seqopt.report.comparison import Comparison
 

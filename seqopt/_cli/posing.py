@@ -25,7 +25,6 @@ from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.plan._other.bases import without_arms
 from seqopt.plan.calling.formulation import On, find_formulation
 from seqopt.problem.problem import (
     Orders,
@@ -64,7 +63,7 @@ _WRONG = {
 }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Asked:
     """What a command is asked for: the problem, the scenarios, and those that judge the plan."""
 
@@ -109,6 +108,8 @@ def asked_problem(options: argparse.Namespace) -> Asked:
     if getattr(options, "bases", None) is not None:
         if options.schedule != FREE or options.order is not None or sought:
             raise ProblemError(f"--bases: it goes with --schedule {FREE} in the scene's own order")
+        from seqopt.plan._other.bases import without_arms  # noqa: PLC0415  # few ask for bases
+
         scene = without_arms(scene)  # bases are chosen afterwards
     scene, begin, end = _asked_ends(options, scene)
     fewest = fewest_asked(options, scene)

@@ -89,23 +89,6 @@ class TimedGraph(FrozenValue):
         return np.array([1, *np.bincount(self.kinds)])
 
 
-class LabelProof(NamedTuple):
-    """Labels of a build in time that show that no path is better in one goal.
-
-    Whatever follows from a label by one act is a label of which another one of these is nowhere
-    above it, or prices and sums to go say that it is no better.
-
-    ``states`` (N, 1 + c): how many bricks stand, and entries of a state; ``labels`` (N,
-    1 + c + q): when the last step ended, since when robots of columns are free, zero where they
-    hold, and sums of budgets and of goals before; ``prices`` (L, 1 + c): of the time of all, and of
-    the robots of columns.
-    """
-
-    states: Ints
-    labels: Floats
-    prices: Floats
-
-
 class _Moves(NamedTuple):
     """What moves do, by column of the state before or after."""
 

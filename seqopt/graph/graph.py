@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from seqopt.arrays import Bools, Floats, FrozenValue
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import ProblemError
 
 Rows = NDArray[np.int32]
@@ -85,3 +86,20 @@ class Graph(FrozenValue):
         starts = np.searchsorted(source, np.arange(self.states + 1, dtype=source.dtype))
         shape = (self.states, self.states)
         return sparse.csr_array((costs, target, starts.astype(np.int32)), shape=shape)
+
+
+class LabelProof(NamedTuple):
+    """Labels of a build in time that show that no path is better in one goal.
+
+    Whatever follows from a label by one act is a label of which another one of these is nowhere
+    above it, or prices and sums to go say that it is no better.
+
+    ``states`` (N, 1 + c): how many bricks stand, and entries of a state; ``labels`` (N,
+    1 + c + q): when the last step ended, since when robots of columns are free, zero where they
+    hold, and sums of budgets and of goals before; ``prices`` (L, 1 + c): of the time of all, and of
+    the robots of columns.
+    """
+
+    states: Ints
+    labels: Floats
+    prices: Floats

@@ -27,7 +27,6 @@ from seqopt.plan.calling.formulation import (
 from seqopt.plan.judge._posture_rules import check_postures
 from seqopt.plan.judge.certificate import _require_anew, certify_partial, judge
 from seqopt.plan.plan import Plan
-from seqopt.plan.search._window_search import search_pairs, search_windows
 from seqopt.problem.criteria import Among
 from seqopt.problem.problem import Aim, AskedBudget
 from seqopt.sequence.steps import Step
@@ -131,6 +130,8 @@ def _solve_windows(graph: PlacementProblem, formulation: Formulation, run: Run) 
         raise ProblemError(
             "ranks among possible candidates need all models: rank among all, or ask for the proof"
         )
+    from seqopt.plan.search._window_search import search_windows  # noqa: PLC0415  # few ask for it
+
     seconds: dict[str, float] = {}
     with timed(seconds, "search"):
         found = search_windows(graph, Watch(run.time_limit))
@@ -149,6 +150,8 @@ def _solve_lazily(graph: PlacementProblem, formulation: Formulation, run: Run) -
         raise ProblemError("the costs of all choices are needed or given; leave out lazy")
     if run.options:
         raise ProblemError(f"option {min(run.options)}: a lazy search has no options; leave it out")
+    from seqopt.plan.search._window_search import search_pairs  # noqa: PLC0415  # few ask for it
+
     seconds: dict[str, float] = {}
     with timed(seconds, "search"):
         found = search_pairs(graph, formulation, Watch(run.time_limit, run.progress))

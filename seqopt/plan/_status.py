@@ -5,16 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from seqopt.arrays import Terse
-from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.plan.calling.formulation import End
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.problem._arms import faults_in_words
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import length_text
-from seqopt.sequence._postures import PlanPostures
+
+if TYPE_CHECKING:
+    from seqopt.graph.orders import AllOrders, OrderSelection
+    from seqopt.sequence._postures import PlanPostures
 
 ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
 

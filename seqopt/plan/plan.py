@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf, isfinite, nan
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -16,17 +17,9 @@ from seqopt.errors import ProblemError
 from seqopt.graph.instances.instance import Instance
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.layers.layers import Layers
-from seqopt.graph.orders import AllOrders
 from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.graph.states.states import States
 from seqopt.plan._status import ENDS, FoundOrder, KeptPostures, Status, bare_summary
-from seqopt.plan._tables import (
-    Objectives,
-    alternatives,
-    chosen_table,
-    moves_table,
-    split_objectives,
-)
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.calling.formulation import (
@@ -37,9 +30,7 @@ from seqopt.plan.calling.formulation import (
     Reads,
     Selection,
 )
-from seqopt.plan.judge._standing_proof import certified
 from seqopt.plan.judge.certificate import TOLERANCE, Certificate
-from seqopt.plan.search._window_search import WindowSearch
 from seqopt.problem.problem import Aim, Problem, judged_by
 from seqopt.problem.requirements import Excess, overloads
 from seqopt.problem.standing import Standing
@@ -51,6 +42,11 @@ from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, StepKind, idle_robots
 from seqopt.stability.steps import stability_table
+
+if TYPE_CHECKING:
+    from seqopt.graph.orders import AllOrders
+    from seqopt.plan._tables import Objectives
+    from seqopt.plan.search._window_search import WindowSearch
 
 COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stability of states
 
@@ -343,10 +339,12 @@ class Plan(ShownBuild):
         """
         if isinstance(self.selection, StatePath):
             return self.grips()
+        from seqopt.plan import _tables  # noqa: PLC0415  # only where files are written
+
         aim = self.formulation.aim
         if aim is None or isinstance(self.graph, ScenarioLayers):
-            return moves_table(self.layers, self.choice, self.grips())
-        return chosen_table(self.layers, self.selection, aim, self.search, self.grips())
+            return _tables.moves_table(self.layers, self.choice, self.grips())
+        return _tables.chosen_table(self.layers, self.selection, aim, self.search, self.grips())
 
     def alternatives(self) -> pd.DataFrame:
         """Return the responses and the cost of every choice that was evaluated.
@@ -354,7 +352,9 @@ class Plan(ShownBuild):
         Result: a row per choice, by step; ``second_node`` where two moves are open. SI units. Where
         the responses of all choices are not kept, those that go with the plan's choices before.
         """
-        return alternatives(self.layers, self.choice, self.search)
+        from seqopt.plan import _tables  # noqa: PLC0415  # few ask for it
+
+        return _tables.alternatives(self.layers, self.choice, self.search)
 
     def objectives(self) -> Objectives:
         """Return the sum of ranks under both objectives, and the two parts of a heuristic's gap.
@@ -369,6 +369,8 @@ class Plan(ShownBuild):
             or not isinstance(self.graph, Layers)
         ):
             return {"objectives": None, "gap_parts": None}
+        from seqopt.plan._tables import split_objectives  # noqa: PLC0415  # only in summaries
+
         heuristic = self.formulation.kind is FormulationKind.HEURISTIC
         return split_objectives(self.graph, self.choice, heuristic=heuristic)
 
@@ -379,6 +381,8 @@ class Plan(ShownBuild):
         `seqopt.stability.steps.stability_table`.
         """
         if mortar is None and isinstance(self.graph, States):
+            from seqopt.plan.judge._standing_proof import certified  # noqa: PLC0415  # of states
+
             return stability_table(self.steps, certified(self.graph, self.steps))
         return super().stability("dry" if mortar is None else mortar)
 

@@ -11,20 +11,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import recipe_of
 from seqopt.errors import ProblemError
-from seqopt.graph.instances.instance import Instance
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.graph.orders import AllOrders
 from seqopt.graph.scenarios import ScenarioLayers, engine_for, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
 from seqopt.plan._layers import solve_layers, with_budgets
-from seqopt.plan._states import solve_instance, solve_orders, solve_states
 from seqopt.plan._status import KeptPostures
 from seqopt.plan.calling.formulation import Formulation, On, Run, as_formulation
 from seqopt.plan.plan import Plan
@@ -44,11 +41,17 @@ from seqopt.problem.standing import Standing
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
-from seqopt.sequence._postures import PlanPostures, plan_postures
-from seqopt.sequence._rule_space import FreeSpace
-from seqopt.sequence._schedule_space import ScheduleSpace
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
+
+if TYPE_CHECKING:
+    from seqopt.graph.instances.instance import Instance
+    from seqopt.graph.orders import AllOrders
+    from seqopt.sequence._postures import PlanPostures
+    from seqopt.sequence._rule_space import FreeSpace
+    from seqopt.sequence._schedule_space import ScheduleSpace
+
+    Graph = Layers | ScenarioLayers | States | AllOrders
 
 _FEWER = (4, 2, 1)  # postures at each node, where plans with more of them do not keep theirs
 _SAME = 1e-9  # over the size of a value
@@ -78,6 +81,8 @@ def _with_postures(problem: Problem, plan: Plan, solved: Callable[[Problem], Pla
 
 
 def _found(plan: Plan) -> PlanPostures:
+    from seqopt.sequence._postures import plan_postures  # noqa: PLC0415  # few scenes have arms
+
     found = plan_postures(plan.engine.network.scene, plan.steps)
     assert found is not None
     return found
@@ -132,8 +137,6 @@ def _criterion(plan: Plan) -> Criterion:
     return plan._of_scene.criterion
 
 
-Graph = Layers | ScenarioLayers | States | AllOrders
-GRAPHS = {States: On.STATES, AllOrders: On.ORDERS, ScenarioLayers: On.SCENARIOS}
 AIMS = {Aim.SUM: Goal(Measure.SUM), Aim.PEAK: Goal(Measure.PEAK)}
 USUAL = {
     On.LAYERS: "overlap_dp",
@@ -253,7 +256,7 @@ def states_of(problem: Problem) -> States:
     """Return the states and moves of a problem; where its order is sought, in the scene's own."""
     on = natural(problem)
     found = graph_of(problem, on if on in (On.ORDERS, On.TIMES) else On.STATES)
-    states = found.states if isinstance(found, AllOrders) else found
+    states = getattr(found, "states", found)  # of all orders, or themselves
     assert isinstance(states, States)
     return states
 
@@ -333,6 +336,8 @@ def _states(problem: Problem) -> States:
 
 
 def _require_moves_left(space: FreeSpace | ScheduleSpace) -> None:
+    from seqopt.sequence._rule_space import FreeSpace  # noqa: PLC0415  # of states alone
+
     ends = isinstance(space, FreeSpace) and space.first == space.levels
     if ends and space.ended(space.start()).all():
         raise ProblemError("nothing is left to plan: the build begins as it may end")
@@ -352,6 +357,8 @@ def _all_orders(problem: Problem) -> AllOrders:
         raise ProblemError("an order is given; pose with orders='tied' to seek one")
     if problem.is_timed:
         raise ProblemError("makespan: it is found in one order; give an order, or leave it out")
+    from seqopt.graph.orders import AllOrders  # noqa: PLC0415  # few problems seek an order
+
     return AllOrders(_states(problem), problem.orders)
 
 
@@ -364,13 +371,13 @@ MADE: dict[On, Callable[[Problem], Graph]] = {
 }
 
 
-SOLVE: dict[On, Callable[[Any, Formulation, Run], Plan]] = {
-    On.LAYERS: solve_layers,
-    On.SCENARIOS: solve_layers,
-    On.STATES: solve_states,
-    On.TIMES: solve_states,
-    On.ORDERS: solve_orders,
-}
+def _solver(on: On) -> Callable[[Any, Formulation, Run], Plan]:
+    """Return what makes the plan of a formulation of some graph."""
+    if on in (On.LAYERS, On.SCENARIOS):
+        return solve_layers
+    from seqopt.plan._states import solve_orders, solve_states  # noqa: PLC0415  # with their proofs
+
+    return solve_orders if on is On.ORDERS else solve_states
 
 
 def solve(
@@ -425,12 +432,8 @@ def solve(
 
 def _solved(problem: Any, formulation: Formulation | str | None, run: Run) -> Plan:
     """Return the plan of a problem, or of a graph of choices that is given."""
-    if isinstance(problem, Instance):
-        return solve_instance(problem, formulation, run)
     if not isinstance(problem, Problem):
-        found = _of_graph(problem, formulation)
-        on = On.ORDERS if isinstance(problem, AllOrders) else found.on
-        return SOLVE[on](problem, found, run)
+        return _of_graph(problem, formulation, run)
     found = as_formulation(formulation or usual(problem), *_able(problem))
     on = natural(problem) if natural(problem) in found.also else found.on
     if found.aim is not None and problem.goals not in ((), (AIMS[found.aim],)):
@@ -441,7 +444,7 @@ def _solved(problem: Any, formulation: Formulation | str | None, run: Run) -> Pl
         )
 
     def solved(asked: Problem) -> Plan:
-        return SOLVE[on](graph_of(asked, on), found, run)
+        return _solver(on)(graph_of(asked, on), found, run)
 
     plan = _with_postures(problem, solved(problem), solved)
     return replace(plan, problem=problem)
@@ -456,14 +459,22 @@ def _able(problem: Problem) -> tuple[On, ...]:
     return (first, On.LAYERS) if first is On.STATES and of_candidates else (first,)
 
 
-def _of_graph(problem: object, formulation: Formulation | str | None) -> Formulation:
-    """Return the formulation of a graph of choices that is given."""
-    on = next((on for kind, on in GRAPHS.items() if isinstance(problem, kind)), On.LAYERS)
-    name = USUAL[on]
+def _of_graph(problem: Any, formulation: Formulation | str | None, run: Run) -> Plan:
+    """Return the plan of a graph of choices that is given, or of an instance."""
+    from seqopt.graph.instances.instance import Instance  # noqa: PLC0415  # few are given
+    from seqopt.graph.orders import AllOrders  # noqa: PLC0415
+    from seqopt.plan._states import solve_instance  # noqa: PLC0415
+
+    if isinstance(problem, Instance):
+        return solve_instance(problem, formulation, run)
+    graphs = {States: On.STATES, AllOrders: On.ORDERS, ScenarioLayers: On.SCENARIOS}
+    on = next((on for kind, on in graphs.items() if isinstance(problem, kind)), On.LAYERS)
+    sought, name = on is On.ORDERS, USUAL[on]
     if isinstance(problem, States) and problem.is_timed:
         on, name = On.TIMES, USUAL[On.TIMES]
     elif isinstance(problem, ScenarioLayers) and problem.aim.aim is Aim.PEAK:
         on, name = On.LAYERS, "minimax"
     elif on is On.LAYERS and getattr(problem, "budgets", None):
         name = "labels"
-    return as_formulation(formulation or name, on)
+    found = as_formulation(formulation or name, on)
+    return _solver(On.ORDERS if sought else found.on)(problem, found, run)

@@ -117,7 +117,13 @@ HEAVY = ("numpy", "pandas", "scipy", "networkx", "tqdm", "shtab")
 LOADED = f"print(*[name for name in {HEAVY} if name in sys.modules], file=sys.stderr)"
 
 
-SELDOM = ("networkx", "scipy.optimize", "scipy.spatial", "cvxpy", "highspy", "numba", "matplotlib")
+SELDOM = (
+    *("networkx", "scipy.optimize", "scipy.spatial", "cvxpy", "highspy", "numba", "matplotlib"),
+    *("seqopt.arms._tables", "seqopt.engines.discrete.engine", "seqopt.engines.frame"),
+    *("seqopt.engines.rigid._refinement", "seqopt.graph.orders", "seqopt.plan._other.bases"),
+    *("seqopt.plan._states", "seqopt.plan.judge._proof", "seqopt.scene.library"),
+    *("seqopt.responses._calibration", "seqopt.sequence._rule_space"),
+)
 
 
 def test_a_command_loads_what_it_needs():

@@ -10,7 +10,7 @@ import pytest
 import seqopt
 from formulations.times._search import in_time
 from seqopt.errors import SolverError
-from seqopt.graph._timed import LabelProof
+from seqopt.graph.graph import LabelProof
 from seqopt.plan._status import Status
 from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, find_formulation
 from seqopt.plan.judge.schedules import judge_schedule

@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil, isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import (
@@ -49,7 +49,6 @@ from seqopt._cli.posing import Asked, asked_problem
 from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import parse_options, parse_size, parse_time_limit
-from seqopt._cli.words.bases import asked_places
 from seqopt._cli.words.optimizing import (
     AIM,
     BASES,
@@ -73,11 +72,8 @@ from seqopt._cli.words.optimizing import (
 from seqopt._files import csv_text
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.states.states import States
-from seqopt.plan._other.bases import FoundBases, choose_bases
-from seqopt.plan._other.fewest_props import FoundProps, fewest_props
 from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation
 from seqopt.plan.judge.certificate import TOLERANCE
-from seqopt.plan.out_of_sample import Trial, judge_unseen, worst_values
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve, usual
 from seqopt.problem._arms import faults_in_words
@@ -91,6 +87,11 @@ from seqopt.sequence.steps import StepKind
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.study.published import paper_models
 from seqopt.work.progress import within
+
+if TYPE_CHECKING:
+    from seqopt.plan._other.bases import FoundBases
+    from seqopt.plan._other.fewest_props import FoundProps
+    from seqopt.plan.out_of_sample import Trial
 
 DESCRIPTION = (
     "Choose where robots hold, over all steps of a sequence, by one formulation; or, with "
@@ -135,7 +136,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     form_options(command, strict=True, builds=True)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Found:
     """A plan, what was asked, and how the plan does in scenarios that it was not chosen by."""
 
@@ -152,6 +153,8 @@ class Found:
         """Beside other plans, where candidates were chosen over scenarios."""
         if self.asked.unseen is None or isinstance(self.plan.graph, States):
             return None
+        from seqopt.plan.out_of_sample import judge_unseen  # noqa: PLC0415  # few plans are robust
+
         return judge_unseen(self.plan, self.asked.unseen)
 
     @cached_property
@@ -186,6 +189,8 @@ class Found:
             return out
         out |= {"robust": str(self.asked.aim), "scenarios": known.settings}
         if self.trial is None:
+            from seqopt.plan.out_of_sample import worst_values  # noqa: PLC0415
+
             worst = worst_values(self.plan, unseen)
             return out | {"unseen": {**unseen.settings, "worst": worst}}
         return out | {"unseen": unseen.settings, "worth": self.trial.summary()}
@@ -267,6 +272,8 @@ def _props(
     """Return the best plan of the fewest props."""
     if options.no_proof:
         raise ProblemError("--no-proof: props are compared by proven plans; leave it out")
+    from seqopt.plan._other.fewest_props import fewest_props  # noqa: PLC0415  # few ask for it
+
     assert asked.fewest is not None
     return fewest_props(asked.problem, asked.fewest, choose, options.tell)
 
@@ -277,6 +284,9 @@ def _bases(
     """Return the best plan over the bases that are asked for."""
     if options.no_proof:
         raise ProblemError("--no-proof: bases are compared by proven plans; leave it out")
+    from seqopt._cli.words.bases import asked_places  # noqa: PLC0415  # few ask for it
+    from seqopt.plan._other.bases import choose_bases  # noqa: PLC0415
+
     scene = in_seconds(options, asked_scene(options))
     places = asked_places(scene, options.bases)
     return choose_bases(problem, scene, places, choose, options.tell)

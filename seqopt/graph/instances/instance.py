@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from seqopt._showing import Shown
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import ProblemError
-from seqopt.graph._timed import TimedGraph
 from seqopt.graph.graph import Graph, Rows
+
+if TYPE_CHECKING:
+    from seqopt.graph._timed import TimedGraph
 
 SUM, PEAK, TAIL, TIME = "sum", "peak", "tail", "time"
 KINDS = (SUM, PEAK, TAIL, TIME)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -35,13 +36,15 @@ from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene._checks import as_float, short
 from seqopt.scene.scene import Scene
-from seqopt.sequence._rule_space import FreeSpace, free_space
-from seqopt.sequence._schedule_space import ScheduleSpace
 from seqopt.sequence._timing import has_speeds, require_for_makespan
 from seqopt.sequence.rules import FREE, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import Grips
 from seqopt.stability.assessment import Stability
+
+if TYPE_CHECKING:
+    from seqopt.sequence._rule_space import FreeSpace
+    from seqopt.sequence._schedule_space import ScheduleSpace
 
 FREE_TITLE = "free schedule"
 
@@ -139,6 +142,9 @@ class States(Shown):
     @cached_property
     def space(self) -> FreeSpace | ScheduleSpace:
         """Its states and moves."""
+        from seqopt.sequence._rule_space import free_space  # noqa: PLC0415  # candidates need none
+        from seqopt.sequence._schedule_space import ScheduleSpace  # noqa: PLC0415
+
         if isinstance(self.rules, Schedule):
             return ScheduleSpace(self.network, self.rules, self.caps, self.parks)
         return free_space(

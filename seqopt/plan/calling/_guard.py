@@ -21,7 +21,7 @@ import numpy as np
 from seqopt._interrupts import answered
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, SolverError, message_of
-from seqopt.graph._timed import LabelProof
+from seqopt.graph.graph import LabelProof
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.scenarios import ScenarioLayers, largest_of
@@ -34,7 +34,6 @@ from seqopt.plan.calling.formulation import (
     as_formulation,
     formulations,
 )
-from seqopt.plan.judge._infeasible import refusal
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.problem.problem import Aim
 from seqopt.scene._checks import short
@@ -330,6 +329,8 @@ def _infeasible_confirmed(problem: PlacementProblem, formulation: Formulation) -
         if not np.isfinite(least_sum(costs)):
             costs.continuable()  # names the move
         if problem.budgets:
+            from seqopt.plan.judge._infeasible import refusal  # noqa: PLC0415  # seldom needed
+
             raise refusal(problem, formulation.name) from None
         raise SolverError(
             f"formulation {formulation.name} says that no choice is allowed, and some are: {error}"

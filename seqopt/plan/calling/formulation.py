@@ -19,7 +19,7 @@ from seqopt.errors import ProblemError, did_you_mean, message_of, plugins
 from seqopt.problem.problem import Aim
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Run:
     """How long a formulation may take, who is told what it finds, and which models it is given.
 

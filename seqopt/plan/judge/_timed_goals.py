@@ -10,9 +10,8 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SolverError
-from seqopt.graph._timed import LabelProof
 from seqopt.graph.duality import cut, potentials
-from seqopt.graph.graph import Graph
+from seqopt.graph.graph import Graph, LabelProof
 from seqopt.graph.paths import tied
 from seqopt.graph.states.states import States
 from seqopt.plan.judge._mortar_floors import CuredRows

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import FileError, SolverError
-from seqopt.graph.layers._partial_costs import PartialCosts, least_possible
 from seqopt.graph.layers.costs import TINY, LayeredCosts, _array_by_array
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers
@@ -23,11 +23,13 @@ from seqopt.plan.calling.formulation import (
     Selection,
     as_formulation,
 )
-from seqopt.plan.judge._budget_proof import least_within
 from seqopt.problem.problem import Aim
 from seqopt.responses._blocks import pack
 from seqopt.responses._choices import Evaluation
 from seqopt.responses.quantities import CHOSEN_BY
+
+if TYPE_CHECKING:
+    from seqopt.graph.layers._partial_costs import PartialCosts
 
 SAME = 1e-5  # over its largest, that a response may differ: ten times what a screen may err
 
@@ -171,6 +173,8 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
     if not selection.bound <= highest + TOLERANCE * scale:  # NaN is no bound
         raise SolverError(f"the claimed bound {selection.bound:.9g} exceeds {highest:.9g}")
     if problem.budgets and aim is Aim.SUM:
+        from seqopt.plan.judge._budget_proof import least_within  # noqa: PLC0415  # few have any
+
         bound = max(bound, least_within(problem, value, selection.prices, scale))
     gap, claimed = (max(0.0, value - b) / scale for b in (bound, max(bound, selection.bound)))
     return Certificate((value,), (bound,), gap, claimed, spent)
@@ -183,6 +187,8 @@ def certify_partial(costs: PartialCosts, selection: Selection, objective: float)
     steps that the selection meets, solved again. Raises `SolverError` if the selection is not worth
     what was claimed, or its bound is not that of the pairs.
     """
+    from seqopt.graph.layers._partial_costs import least_possible  # noqa: PLC0415  # few are lazy
+
     scale = max(abs(objective), TINY)
     _require_claimed(objective, selection, scale)
     bound = least_possible(costs)
