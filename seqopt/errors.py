@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import sys
 from collections.abc import Iterable
@@ -128,6 +127,8 @@ def did_you_mean(given: object, known: Iterable[str]) -> str:
     meant = {name.lower(): name for name in known}
     if not isinstance(given, str) or given in meant.values():
         return ""
+    import difflib  # noqa: PLC0415  # for errors only
+
     near = difflib.get_close_matches(given.lower(), meant, 2)
     tied = len({_likeness(name, given) for name in near}) < len(near)
     return f" (did you mean {meant[near[0]]}?)" if near and not tied else ""
@@ -135,7 +136,9 @@ def did_you_mean(given: object, known: Iterable[str]) -> str:
 
 def _likeness(one: str, other: str) -> float:
     """Return how much one word is like another, from 0 to 1."""
-    return difflib.SequenceMatcher(None, one.lower(), other.lower()).ratio()
+    from difflib import SequenceMatcher  # noqa: PLC0415  # for errors only
+
+    return SequenceMatcher(None, one.lower(), other.lower()).ratio()
 
 
 def message_of(error: BaseException) -> str:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import webbrowser
 from importlib import import_module
 
 import pytest
 
 import seqopt
-from seqopt import _showing as showing
 from seqopt._showing import DISPLAYS, Page, display
 from seqopt.errors import ExtraError
 
@@ -61,7 +61,7 @@ def test_a_page_is_framed_saved_and_opened(tmp_path, monkeypatch):
     assert "&lt;p title=&quot;a &amp; b&quot;&gt;step" in page._repr_html_()
     assert page.save(tmp_path / "page.html").read_text("utf-8") == page.text
     opened = []
-    monkeypatch.setattr(showing.webbrowser, "open", opened.append)
+    monkeypatch.setattr(webbrowser, "open", opened.append)
     assert page.open(tmp_path / "other.html").exists()
     assert opened == [(tmp_path / "other.html").as_uri()]
     with pytest.raises(seqopt.SeqoptError, match="cannot write"):
