@@ -12,7 +12,7 @@ from seqopt.arrays import Terse
 from seqopt.engines._kinds import ChoosingEngine, FlatEngine, OpeningEngine
 from seqopt.engines.registry import recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.responses._tolerance import each_tolerance, is_linear
+from seqopt.responses._tolerance import each_tolerance, is_linear, is_tied
 from seqopt.responses.quantities import RESPONSES, _plain, length_text
 from seqopt.responses.table import LinearRange, _Columns, _node, force_column, held_in_table
 from seqopt.scene.scene import Scene
@@ -128,7 +128,10 @@ def _off(within: LinearRange, builds: Mapping[str, _Columns]) -> str:
     if not is_linear(within.engine) or len(scene.bricks) > _FEW or _overloaded(scene, builds):
         return ""
     held = {name: held_in_table(scene, table) for name, table in builds.items()}
-    found = each_tolerance(within.engine, [*chain.from_iterable(held.values())])
+    every = [*chain.from_iterable(held.values())]
+    if is_tied(within.engine, every):  # then none may be off, and the rest need not be asked
+        return ""
+    found = each_tolerance(within.engine, every)
     at = int(found.argmin())
     if not 0 < found[at] < np.inf:
         return ""

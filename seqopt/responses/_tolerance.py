@@ -248,6 +248,12 @@ def is_linear(engine: Engine) -> bool:
     return isinstance(engine, ChoosingEngine | ComplianceEngine)
 
 
+def is_tied(engine: Engine, steps: Sequence[_Held]) -> bool:
+    """Return whether a step holds one brick with two rigid grips: these fit in one place alone."""
+    several = {(bricks, held) for _, bricks, held in steps if len(held) > 1}
+    return any(bool(_tied(engine, bricks, np.array([held]))[0]) for bricks, held in several)
+
+
 def each_tolerance(engine: Engine, steps: Sequence[_Held]) -> Floats:
     """Return how far grips may be off in every step, m.
 
