@@ -124,7 +124,7 @@ class SharedVerdicts:
         self._parts = PartialAssemblies(network, _most(step for _, each in asked for step in each))
         self._portions = [part for mortar, steps in asked for part in _cut(steps, mortar)]
         self._crew, self._task = crew, partial(_sent, pickle.dumps(self._parts))
-        first = self._portions[: len(self._portions) // 2]
+        first = self._portions[: len(self._portions) // 3]  # the rest by whoever is free
         self._begun = [given_out(crew, self._task, portion) for portion in first]
 
     def __iter__(self) -> Iterator[Verdict]:

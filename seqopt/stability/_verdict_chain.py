@@ -156,11 +156,11 @@ class VerdictChain:
         """Yield what is proven by what is sought for it, what takes least first."""
         forces = len(assembly.corner) + len(held)
         force, level = np.zeros((forces, 3)), np.ones((forces, 3))
-        if case.tension[0] > 0 or case.cohesion[0] > 0:
-            for answer in islice(approach(Sought(assembly, case, force, level)), 1):
-                yield _labeled(judged(assembly, case, answer), Way.FORCES)
         if self._near:
             yield from self._sought_near(assembly, case, held)
+        if _bonded(case):
+            for answer in islice(approach(Sought(assembly, case, force, level)), 1):
+                yield _labeled(judged(assembly, case, answer), Way.FORCES)
         way = Way.FORCES
         if self._corner_force is not None:
             force, level = self._earlier(assembly, held)
@@ -178,7 +178,8 @@ class VerdictChain:
         force, level = self._earlier(assembly, held) if self._stood else _none_yet(len(forces))
         way = Way.EARLIER_FORCES if self._stood else Way.FORCES
         answers = approach(Sought(assembly, case, force[forces], level[forces], part))
-        for answer in islice(answers, 1, None):  # the first is near what was before
+        # the first is near what was before: mostly enough with a bond, seldom without one
+        for answer in islice(answers, 1) if _bonded(case) else islice(answers, 1, None):
             if not self._stood and answer.value <= _TIGHT:
                 return  # others may fall
             proven = judged(assembly, case, answer)
@@ -250,6 +251,10 @@ class VerdictChain:
             self._kept = [*same, (self._corner_force, self._grip_force)][-_KEPT:]
         if proven.bound > EXACT and np.isfinite(answer.motion).all():
             self._motion = answer.motion / np.repeat([1.0, length], 3)
+
+
+def _bonded(case: Case) -> bool:
+    return case.tension[0] > 0 or case.cohesion[0] > 0
 
 
 def _none_yet(count: int) -> tuple[Floats, Floats]:
