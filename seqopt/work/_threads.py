@@ -45,10 +45,12 @@ def cores() -> int:
 
 def in_threads(function: Callable[[_Task], _Result], tasks: Sequence[_Task]) -> list[_Result]:
     """Return what a function that leaves Python's lock alone makes of tasks, one a thread."""
-    if len(tasks) == 1:
-        return [function(tasks[0])]
-    with ThreadPoolExecutor(len(tasks)) as pool:
-        return [*pool.map(function, tasks)]
+    first, *others = tasks
+    if not others:
+        return [function(first)]
+    with ThreadPoolExecutor(len(others)) as pool:
+        found = pool.map(function, others)  # begun at once
+        return [function(first), *found]
 
 
 @cache
