@@ -134,7 +134,7 @@ def _solve_windows(graph: PlacementProblem, formulation: Formulation, run: Run) 
 
     seconds: dict[str, float] = {}
     with timed(seconds, "search"):
-        found = search_windows(graph, Watch(run.time_limit))
+        found = search_windows(graph, Watch(run.time_limit), fields=True)
     respond = sum(part.evaluation.seconds for part in (found.alone, *found.shared))
     with timed(seconds, "verify"):
         steps = _checked(graph.steps(found.choice), graph)

@@ -318,10 +318,10 @@ class Plan(ShownBuild):
 
     @cached_property
     def _columns(self) -> _Columns:
-        answers = (  # of all fields, which what steps leave is judged by too
-            (step, self._within.seen(step, step_fields(self.engine, step, Want.ALL)))
-            for step in self.steps
-        )
+        met = {} if self.search is None else self.search.fields
+        fields = (met.get(s.number) or step_fields(self.engine, s, Want.ALL) for s in self.steps)
+        # of all fields, which what steps leave is judged by too
+        answers = ((s, self._within.seen(s, f)) for s, f in zip(self.steps, fields, strict=True))
         columns = _response_columns(self.engine.network, answers)
         if not isinstance(self.graph, States):
             moves, steps = self.layers.schedule.moves, self.layers.schedule.steps

@@ -114,7 +114,7 @@ def test_a_wrong_growth_is_seen():
     engine = ComplianceEngine(network)
     sets = sets_of(network, 40, 3, 100)
     true = engine._extremes(40, sets, Want.RESPONSES, compiled=True)
-    engine._builder.growth.wrench *= 1 + 1e-9
+    engine._builder.growth.wrench[0][:] *= 1 + 1e-9
     found = engine._extremes(40, sets, Want.RESPONSES, compiled=True)
     assert apart(found, true) > CLOSE
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.rigid._compiled import _SIDE_BY_SIDE, _brace, _compiled, _undo
-from seqopt.engines.rigid._grown_maps import Edges, Ends, Grown, Motion, Part
+from seqopt.engines.rigid._grown_maps import Edges, Ends, Grown, Kept, Motion, Part
 
 _ROUNDED = 1 + 1e-9  # a bound is as much larger than what rounding may leave
 
@@ -74,68 +74,73 @@ def _add_six(out: Floats, rows: Floats, first: int, much: Floats) -> None:
 
 
 @_compiled()
-def _sum_up(moved: Floats, carried: Floats, grown: Grown, at: Ints, force: Floats) -> None:
+def _sum_up(
+    moved: Floats, carried: Floats, grown: Grown, kept: Kept, at: Ints, force: Floats
+) -> None:
     """Find the twists and wrenches under the weight and forces at nodes."""
-    pull = np.empty(6)
+    pull, shares = np.empty(6), np.zeros(len(kept.twist))
     moved[:] = grown.twist[0, : len(moved)]
-    carried[:] = grown.wrench[0, : len(carried)]
+    carried[:] = grown.borne[0, : len(carried)]
     for i in range(len(at)):
+        known = False
+        for k in range(len(kept.node)):
+            if at[i] == kept.node[k]:
+                shares[3 * k : 3 * k + 3] = force[3 * i : 3 * i + 3]
+                known = True
+        if known:
+            continue
         brick, first = at[i] // 2, 3 * (at[i] % 2)
         for p in range(6):
             pull[p] = 0.0
             for a in range(3):
                 pull[p] += grown.nodes[brick, first + a, p] * force[3 * i + a]
         _add_six(moved, grown.twist, 1 + 6 * brick, pull)
-        _add_six(carried, grown.wrench, 1 + 6 * brick, pull)
+        _add_six(carried, grown.borne, 1 + 6 * brick, pull)
+    for row in range(0, len(shares), 6):
+        _add_six(moved, kept.twist, row, shares[row : row + 6])
+        _add_six(carried, kept.borne, row, shares[row : row + 6])
+
+
+@_compiled("nnan", "nsz")
+def _extremes_outside(carried: Floats, edges: Edges, part: Part) -> tuple[float, float]:
+    """Return the least and the largest force of all edges but inner ones."""
+    least, most = np.inf, -np.inf
+    for e in range(part.edges - part.bricks):
+        j = edges.first[e]
+        x, y, z = edges.along[0, e], edges.along[1, e], edges.along[2, e]
+        tension = x * carried[j] + y * carried[j + 1] + z * carried[j + 2]
+        least, most = min(least, tension), max(most, tension)
+    return least, most
 
 
 @_compiled()
-def _pull_edges(
+def _pull_bricks(
     tension: Floats, carried: Floats, edges: Edges, part: Part, at: Ints, force: Floats
 ) -> None:
-    """Find the forces of all edges."""
-    for e in range(len(tension)):
-        j = 6 * edges.spring[e]
-        x, y, z = edges.along[0, e], edges.along[1, e], edges.along[2, e]
-        tension[e] = x * carried[j] + y * carried[j + 1] + z * carried[j + 2]
+    """Find the forces of inner edges (b,)."""
     for b in range(part.bricks):
         total = part.at_second[b]
         for k in range(edges.start[b], edges.start[b + 1]):
             total += edges.much[k] * carried[edges.at[k]]
-        tension[edges.inner[b]] = total
+        tension[b] = total
     for i in range(len(at)):
         for a in range(3):
             along = part.axis[at[i] // 2, a] * (at[i] % 2)
-            tension[edges.inner[at[i] // 2]] += along * force[3 * i + a]
+            tension[at[i] // 2] += along * force[3 * i + a]
 
 
 @_compiled()
-def _share_pairs(tension: Floats, edges: Edges, part: Part, at: Ints, force: Floats) -> None:
+def _share_pairs(tension: Floats, part: Part, at: Ints, force: Floats) -> None:
     """Let each of two grips on one brick take what reaches its own node, in place."""
     for second in range(1, len(at)):
         for first in range(second):
             brick = at[first] // 2
             if at[second] // 2 == brick:
-                between = tension[edges.inner[brick]] * (1.0 - 2.0 * (at[first] % 2))
-                tension[edges.inner[brick]] = 0.0
+                between = tension[brick] * (1.0 - 2.0 * (at[first] % 2))
+                tension[brick] = 0.0
                 for a in range(3):
                     force[3 * first + a] += between * part.axis[brick, a]
                     force[3 * second + a] -= between * part.axis[brick, a]
-
-
-@_compiled("nnan", "nsz")
-def _reaches(size: Floats, moved: Floats, reach: Floats) -> int:
-    """Find how far no node of a brick moves farther than; return for which that is farthest."""
-    far = 0
-    for b in range(len(size)):
-        shift = turn = 0.0
-        for p in range(6 * b, 6 * b + 3):
-            shift += moved[p] * moved[p]
-            turn += moved[p + 3] * moved[p + 3]
-        size[b] = (np.sqrt(shift) + reach[b] * np.sqrt(turn)) * _ROUNDED
-        if size[b] > size[far]:
-            far = b
-    return far
 
 
 @_compiled("nnan", "nsz")
@@ -153,25 +158,34 @@ def _square(moved: Floats, motion: Motion, node: int) -> float:
 
 
 @_compiled("nnan", "nsz")
-def _farthest(moved: Floats, size: Floats, motion: Motion, nodes: int) -> float:
-    """Return the square of how far any node moves: first of the brick that reaches farthest."""
-    far, best = _reaches(size, moved, motion.reach), 0.0
-    for after in range(len(size)):
-        brick = (far + after) % len(size)
-        if size[brick] * size[brick] <= best:
+def _farthest(moved: Floats, motion: Motion, nodes: int, first: int) -> tuple[float, int]:
+    """Return the square of how far any node moves, and its brick: one that may be it is first."""
+    best, far = 0.0, first
+    for after in range(-1, len(moved) // 6):
+        brick = first if after < 0 else after
+        shift = turn = 0.0
+        for p in range(6 * brick, 6 * brick + 3):
+            shift += moved[p] * moved[p]
+            turn += moved[p + 3] * moved[p + 3]
+        turn *= motion.reach[brick] * motion.reach[brick]
+        if 2 * (shift + turn) * _ROUNDED <= best:  # as the square of a sum is no more than that
+            continue
+        if (shift + turn + 2 * np.sqrt(shift * turn)) * _ROUNDED <= best:
             continue
         for k in range(motion.first[brick], motion.first[brick + 1]):
             if motion.node[k] < nodes:
-                best = max(best, _square(moved, motion, motion.node[k]))
-    return best
+                square = _square(moved, motion, motion.node[k])
+                if square > best:
+                    best, far = square, brick
+    return best, far
 
 
 @_compiled("nnan", "nsz")
 def _most_moment(carried: Floats, ends: Ends) -> float:
     """Return the square of the largest moment at any ground end that acts."""
     most = 0.0
-    for g in range(len(ends.spring)):
-        first, square = 6 * ends.spring[g], 0.0
+    for g in range(len(ends.first)):
+        first, square = ends.first[g], 0.0
         if first >= len(carried):
             continue
         for c in range(3):
@@ -185,25 +199,30 @@ def _most_moment(carried: Floats, ends: Ends) -> float:
 
 @_compiled("nnan", "nsz")
 def reduce_grown(
-    grown: Grown, maps: tuple[Edges, Motion, Ends], part: Part, columns: Ints, force: Floats
+    grown: Grown,
+    kept: Kept,
+    maps: tuple[Edges, Motion, Ends],
+    part: Part,
+    columns: Ints,
+    force: Floats,
 ) -> Floats:
     """Return squares of extremes of sets, (4, S), and let grips on one brick share, in place.
 
     Of edge forces they are no squares. ``force`` (S, k): of rigid grips at nodes (S, r).
     """
     edges, motion, ends = maps
-    found, tension = np.zeros((4, len(columns))), np.empty(part.edges)
-    whole, moved = np.zeros(grown.wrench.shape[1]), np.empty(6 * part.bricks)
-    carried, size = whole[: 6 * part.springs], np.empty(part.bricks)  # the rest carries nothing yet
+    found, tension = np.zeros((4, len(columns))), np.empty(part.bricks)
+    whole, moved = np.zeros(grown.borne.shape[1]), np.empty(6 * part.bricks)
+    carried, far = whole[: part.borne], 0  # the rest carries nothing yet
     for s in range(len(columns)):
-        _sum_up(moved, carried, grown, columns[s], force[s])
+        _sum_up(moved, carried, grown, kept, columns[s], force[s])
         if part.nodes:
-            found[2, s] = _farthest(moved, size, motion, part.nodes)
+            found[2, s], far = _farthest(moved, motion, part.nodes, far)
         found[3, s] = _most_moment(carried, ends)
-        _pull_edges(tension, whole, edges, part, columns[s], force[s])
-        _share_pairs(tension, edges, part, columns[s], force[s])
-        least, most = np.inf, -np.inf
-        for e in range(len(tension)):
-            least, most = min(least, tension[e]), max(most, tension[e])
+        least, most = _extremes_outside(carried, edges, part)
+        _pull_bricks(tension, whole, edges, part, columns[s], force[s])
+        _share_pairs(tension, part, columns[s], force[s])
+        for b in range(part.bricks):
+            least, most = min(least, tension[b]), max(most, tension[b])
         found[0, s], found[1, s] = least, most
     return found

@@ -15,7 +15,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Want
-from seqopt.engines.rigid._grown_maps import Grown, Part, maps_by_entry
+from seqopt.engines.rigid._grown_maps import Grown, Kept, Part, maps_by_entry
 from seqopt.engines.rigid._operator import Doubts, OperatorBuilder
 from seqopt.engines.rigid._response_maps import inner_edges
 from seqopt.work._threads import cores, in_threads, one_thread
@@ -32,9 +32,11 @@ class GrownExtremes:
     def __init__(self, builder: OperatorBuilder) -> None:
         growth = builder.growth
         self.bricks = 0  # that were noted
-        self._grown = Grown(growth.twist, growth.wrench, builder.nodes)
-        self._network, self._maps = builder.network, maps_by_entry(builder.maps)
+        self._grown = Grown(growth.twist, growth.wrench[0], builder.nodes)
+        self._network = builder.network
+        self._maps = maps_by_entry(builder.maps, growth.columns[0])
         self._growth = growth
+        growth.remembers = True
 
     def reach(self, bricks: int) -> None:
         """Let a number of bricks stand."""
@@ -43,8 +45,8 @@ class GrownExtremes:
         with one_thread():
             self._growth.reach(bricks)
         network, (twist, _, nodes) = self._network, self._grown
-        springs = int(np.searchsorted(network.springs.since, bricks, side="right"))
-        counts = bricks, springs, network.count_edges(bricks), network.count_nodes(bricks)
+        borne = self._growth.borne
+        counts = bricks, borne, network.count_edges(bricks), network.count_nodes(bricks)
         _, axis, at_second = inner_edges(network, bricks)
         self._part = Part(*counts, at_second, axis)
         own, every = twist[1 : 1 + 6 * bricks, : 6 * bricks], np.arange(bricks)
@@ -66,16 +68,29 @@ class GrownExtremes:
     def extremes(self, columns: Ints, force: Floats, want: Want) -> Floats:
         """Return extremes (4, S) as of `Extremes`; two grips on one brick share, in place."""
         part = self._part if want & Want.DISPLACEMENTS else self._part._replace(nodes=0)
-        grown, maps, loops = self._grown, self._maps, _loops()
+        grown, maps, loops, kept = self._grown, self._maps, _loops(), self._kept(columns)
 
         def reduce(own: slice) -> Floats:
-            return loops.reduce_grown(grown, maps, part, columns[own], force[own])
+            return loops.reduce_grown(grown, kept, maps, part, columns[own], force[own])
 
         step = max(_SETS, -(-len(columns) // cores()))
         parts = [slice(start, start + step) for start in range(0, max(len(columns), 1), step)]
         found = np.concatenate(in_threads(reduce, parts), axis=1)
         np.sqrt(found[2:], out=found[2:])
         return found
+
+    def _kept(self, columns: Ints) -> Kept:
+        """Return what forces mean at the nodes that all sets (S, r) hold."""
+        (twist, borne, nodes), part = self._grown, self._part
+        held = [n for n in columns[0].tolist() if (columns == n).any(axis=1).all()]
+        found, count = [], -(-len(held) // 2) * 6
+        for answers, width in ((twist, 6 * part.bricks), (borne, part.borne)):
+            rows = np.zeros((count, width))
+            for i, node in enumerate(held):
+                turned = nodes[node // 2, 3 * (node % 2) : 3 * (node % 2) + 3]
+                rows[3 * i : 3 * i + 3] = turned @ answers[1 + 6 * (node // 2) :][:6, :width]
+            found.append(rows)
+        return Kept(np.array(held, dtype=np.int64), *found)
 
 
 class _Loops(NamedTuple):

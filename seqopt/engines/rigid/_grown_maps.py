@@ -14,24 +14,36 @@ from seqopt.engines.rigid._response_maps import SceneMaps
 
 
 class Grown(NamedTuple):
-    """What unit wrenches on bricks mean, and how inner nodes (B, 6, 6) follow their bricks."""
+    """What unit wrenches on bricks mean, and how inner nodes (B, 6, 6) follow their bricks.
+
+    ``borne``: what edges and ground ends bear, of `Growth.wrench`.
+    """
 
     twist: Floats
-    wrench: Floats
+    borne: Floats
     nodes: Floats
+
+
+class Kept(NamedTuple):
+    """What forces at nodes (q,) mean that all grip sets hold: three rows each, and rows of zeros.
+
+    So many that they are a multiple of six: as many as of a brick.
+    """
+
+    node: Ints
+    twist: Floats
+    borne: Floats
 
 
 class Edges(NamedTuple):
     """What edges carry of the forces of springs.
 
-    ``spring`` (E,), ``along`` (3, E): of all but inner edges, which spring, and how much of its
-    force. ``inner`` (B,): the inner edge of each brick, of whose rows ``start``, ``at`` and
-    ``much`` are the entries.
+    ``first`` (E - B,), ``along`` (3, E - B): of all but inner edges, where the force of its spring
+    is, and how much of it. ``start``, ``at``, ``much``: the entries of rows of inner ones (B,).
     """
 
-    spring: Ints
+    first: Ints
     along: Floats
-    inner: Ints
     start: Ints
     at: Ints
     much: Floats
@@ -54,9 +66,9 @@ class Motion(NamedTuple):
 
 
 class Ends(NamedTuple):
-    """The springs (G,) of ground ends, and the moments (G, 6, 3) for unit wrenches of these."""
+    """Where wrenches are of ground ends (G,), and the moments (G, 6, 3) for unit ones."""
 
-    spring: Ints
+    first: Ints
     moment: Floats
 
 
@@ -64,23 +76,28 @@ class Part(NamedTuple):
     """A partial structure: counts, and what `inner_edges` says of its bricks."""
 
     bricks: int
-    springs: int
+    borne: int
     edges: int
     nodes: int  # none where nobody asks how far they move
     at_second: Floats
     axis: Floats
 
 
-def maps_by_entry(scene: SceneMaps) -> tuple[Edges, Motion, Ends]:
-    """Return what wrenches and twists of a whole scene mean, in space."""
-    network, edge = scene.network, scene.edge.tocoo()
-    inner = np.flatnonzero(network.edge_spring < 0)
-    along, outer = np.zeros((3, edge.shape[0])), network.edge_spring[edge.row] >= 0
-    along[edge.col[outer] % 6, edge.row[outer]] = edge.data[outer]
-    through = scene.edge[inner]
-    rows = through.indptr.astype(np.int64), through.indices.astype(np.int64), through.data
-    edges = Edges(np.maximum(network.edge_spring, 0), along, inner, *rows)
-    ends = Ends(network.springs.support, np.ascontiguousarray(scene.support[:, :, 3:]))
+def maps_by_entry(scene: SceneMaps, columns: Ints) -> tuple[Edges, Motion, Ends]:
+    """Return what wrenches and twists of a whole scene mean, in space.
+
+    ``columns``: which numbers of wrenches are kept.
+    """
+    place = np.full(scene.edge.shape[1], scene.edge.shape[1])  # of others behind all
+    place[columns] = np.arange(len(columns))
+    spring = scene.network.edge_spring
+    through, outer = scene.edge[spring < 0], scene.edge[spring >= 0].tocoo()
+    along = np.zeros((3, outer.shape[0]))
+    along[outer.col % 6, outer.row] = outer.data
+    rows = through.indptr.astype(np.int64), place[through.indices], through.data
+    edges = Edges(place[6 * spring[spring >= 0]], along, *rows)
+    moment = np.ascontiguousarray(scene.support[:, :, 3:])
+    ends = Ends(place[6 * scene.network.springs.support], moment)
     return edges, _motion_of(scene), ends
 
 

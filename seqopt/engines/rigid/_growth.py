@@ -15,8 +15,9 @@ motions would lose digits.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy import linalg
@@ -80,6 +81,18 @@ _SAMPLE = 600  # motions that are compared with each other, about
 _MOST = 0.95  # share of all pairs of motions in space whose asymmetry counts as rounding
 
 
+class _Before(NamedTuple):
+    """The last brick count but one: its weight's answers, its loss, and what has changed since.
+
+    ``closing`` (1 + kb, n), ``changes`` of n rows: what loops added to twists and wrenches.
+    """
+
+    weighed: list[Floats]
+    loss: Floats
+    closing: Floats
+    changes: list[Floats]
+
+
 class Growth:
     """The answers of a growing structure to its weight and to unit wrenches on its bricks.
 
@@ -89,12 +102,19 @@ class Growth:
     count.
 
     ``tree``: on which the bricks hang. ``basis``: k directions in which bricks are loaded and move;
-    all by default. ``twist`` (1 + kB, kB): of the bricks, m and rad; ``wrench`` (1 + kB, kS): of
-    every spring on its second body, N and N m; ``loss`` (B,): how much more than the last digit of
-    a brick's motions is rounding, as what moved it further before is gone.
+    all by default. ``twist`` (1 + kB, kB): of the bricks, m and rad; ``wrench``: of every spring
+    on its second body, N and N m, in two arrays: if ``apart``, what edges and ground ends bear,
+    which is read most, and all other moments; else all, and none; ``columns``: which of the kS
+    numbers each array has; ``loss`` (B,): how much more than the last digit of a brick's motions is
+    rounding, as what moved it further before is gone; ``remembers``: whether `answers` takes the
+    last brick count but one from the last, which differs in rounding.
     """
 
-    def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
+    remembers = False
+
+    def __init__(
+        self, network: Network, tree: SpanningTree, basis: Basis = SPACE, *, apart: bool = False
+    ) -> None:
         self._network, self._tree, self._basis = network, tree, basis
         self._size = len(basis.wrench)
         most = self._size * len(tree.spring)
@@ -108,9 +128,17 @@ class Growth:
         self._along = self._carried(center - center[tree.parent])
         self.loss = np.ones(len(tree.spring))
         self.twist = np.empty((1 + most, most))
-        self.wrench = np.zeros((1 + most, self._size * self._acting[-1]))
+        borne = np.full((self._acting[-1], 1), len(basis.force) if apart else self._size)
+        borne[network.springs.support[network.springs.support < len(borne)]] = self._size
+        self._parts = [(slice(n), slice(n, self._size)) for n in borne.ravel().tolist()]
+        first = np.arange(self._size) < borne
+        self.columns = np.flatnonzero(first), np.flatnonzero(~first)
+        ends = (np.cumsum(part.sum(axis=1)).tolist() for part in (first, ~first))
+        self._ends = [[0, *each] for each in ends]  # where the columns of springs end
+        self.wrench = tuple(np.zeros((1 + most, each[-1])) for each in self._ends)
         self.bricks = self._closed = 0
-        self._weighed: list[tuple[Floats, Floats]] = []
+        self._weighed: list[list[Floats]] = []
+        self._before: _Before | None = None
         self._start()
 
     def reach(self, bricks: int) -> None:
@@ -125,38 +153,82 @@ class Growth:
             self.bricks = bricks
             self._tie(np.arange(self._acting[bricks]))
             del self._weighed[bricks - self._closed + 1 :]
-            twist, wrench = self._weighed[-1]
-            self.twist[0, : len(twist)], self.wrench[0, : len(wrench)] = twist, wrench
+            self._before = None
+            for array, row in zip((self.twist, *self.wrench), self._weighed[-1], strict=True):
+                array[0, : len(row)] = row
         while self.bricks < bricks:
+            weighed, loss = self._weighed[-1], self.loss[: self.bricks].copy()
             self._add()
+            closing, changes = np.empty((1 + self._moves, 0)), [np.empty((0, 1))] * 3
             mine = np.arange(*self._acting[self.bricks - 1 : self.bricks + 1])
             others = mine[mine != self._tree.spring[self.bricks - 1]]
             if others.size:
-                self._close(others)
+                closing, changes = self._close(others)
                 self._closed, self._weighed = self.bricks, []
-            self._weighed.append((self.twist[0, : self._moves].copy(), self._stressed(0).copy()))
+            self._before = _Before(weighed, loss, closing, changes)
+            self._weighed.append([each.copy() for each in self._answers(0)])
+
+    def recalls(self, bricks: int) -> bool:
+        """Return whether `answers` of a brick count are there, or nearly so."""
+        last = self.remembers and self._before is not None
+        return self.bricks - last <= bricks <= self.bricks
+
+    def answers(self, bricks: int, held: Ints) -> tuple[list[Floats], Floats]:
+        """Return what so many bricks do under the weight, and unit wrenches on some bricks (h,).
+
+        Results: twists and both arrays of wrenches, 1 + kh rows; the loss (h,).
+        """
+        if not self.recalls(bricks):
+            self.reach(bricks)
+        k, before = self._size, self._before
+        rows: slice | Ints = slice(1 + k * bricks)
+        if len(held) < bricks:
+            rows = np.concatenate([[0], (1 + k * held[:, None] + np.arange(k)).ravel()])
+        found = self._answers(rows)
+        if bricks == self.bricks or before is None:
+            return found, self.loss[held]
+        for i, (change, row) in enumerate(zip(before.changes, before.weighed, strict=True)):
+            found[i] = (found[i] - before.closing[rows] @ change)[:, : len(row)]
+            found[i][0] = row
+        return found, before.loss[held]
 
     @property
     def nbytes(self) -> int:
         """Bytes of the arrays for all bricks."""
-        return self.twist.nbytes + self.wrench.nbytes
+        return self.twist.nbytes + sum(each.nbytes for each in self.wrench)
+
+    @property
+    def borne(self) -> int:
+        """How many of the first columns of the first array of wrenches count."""
+        return int(self._ends[0][self._acting[self.bricks]])
 
     @property
     def _moves(self) -> int:
         return self._size * self.bricks
 
-    def _stressed(self, rows: slice | int) -> Floats:
-        """Return the wrenches of the springs that act, of some rows."""
-        return self.wrench[rows, : self._size * self._acting[self.bricks]]
+    def _of(self, first: int, after: int, rows: slice | Ints | int) -> list[Floats]:
+        """Return what springs from one to before another transmit, of some rows."""
+        pairs = zip(self.wrench, self._ends, strict=True)
+        return [each[:, ends[first] : ends[after]][rows] for each, ends in pairs]
+
+    def _answers(self, rows: slice | Ints | int) -> list[Floats]:
+        """Return the twists of bricks that stand, and what springs that act transmit."""
+        return [self.twist[:, : self._moves][rows], *self._stressed(rows)]
+
+    def _stressed(self, rows: slice | Ints | int) -> list[Floats]:
+        return self._of(0, self._acting[self.bricks], rows)
 
     def _start(self) -> None:
         if self._closed:
-            self.wrench[:] = 0.0  # springs not of the tree act on all rows
+            for each in self.wrench:
+                each[:] = 0.0  # springs not of the tree act on all rows
         self.bricks = self._closed = 0
         self._left = 1.0  # rounding when the twists were summed anew
-        self._weighed = [(np.empty(0), np.empty(0))]
+        self._weighed = [[np.empty(0)] * 3]
+        self._before = None
         self._tie(np.arange(0))
-        self.twist[0], self.wrench[0] = 0.0, 0.0
+        for each in (self.twist, *self.wrench):
+            each[0] = 0.0
 
     def _add(self) -> None:
         """Hang the next brick on its spring."""
@@ -165,7 +237,8 @@ class Growth:
         old, after = slice(0, 1 + k * brick), 1 + k * brick
         mine, rows = slice(k * brick, k * brick + k), slice(after, after + k)
         self.bricks += 1
-        self._stressed(0)[k * self._acting[brick] :] = 0.0  # as in all old rows, never written yet
+        for each in self._of(self._acting[brick], self._acting[self.bricks], 0):
+            each[:] = 0.0  # as in all old rows, never written yet
         own, along = self._own_arm[brick], self._along[brick]
         flexibility = own @ self._compliance[spring] @ own.T
         if parent != GROUND:
@@ -173,17 +246,19 @@ class Growth:
             theirs = slice(1 + moved.start, 1 + moved.stop)
             self.twist[rows, : k * brick] = along @ self.twist[theirs, : k * brick]
             self.twist[old, mine] = self.twist[old, moved] @ along.T
-            self._stressed(rows)[:] = along @ self._stressed(theirs)
+            for row, from_it in zip(self._stressed(rows), self._stressed(theirs), strict=True):
+                row[:] = along @ from_it
             flexibility = flexibility + along @ self.twist[theirs, moved] @ along.T
             self.loss[brick] = self.loss[parent]
         else:
             self.twist[rows, : k * brick], self.twist[old, mine] = 0.0, 0.0
-            self._stressed(rows)[:] = 0.0
+            for each in self._stressed(rows):
+                each[:] = 0.0
             self.loss[brick] = 1.0
             if self._shift[spring].any():
                 self.twist[0, mine] = own @ self._shift[spring]
         self.twist[rows, mine] = flexibility
-        self.wrench[rows, k * spring : k * spring + k] = -own
+        self._transmit(spring, rows, -own)
         weight = self._basis.force @ self._network.weight[brick]
         forces = slice(after, after + len(weight))
         self._load(weight, forces)
@@ -195,30 +270,41 @@ class Growth:
 
     def _load(self, pull: Floats, rows: slice) -> None:
         """Add what a pull at some rows does to what the weight does."""
-        self.twist[0, : self._moves] += pull @ self.twist[rows, : self._moves]
-        self._stressed(0)[:] += pull @ self._stressed(rows)
+        for each, other in zip(self._answers(0), self._answers(rows), strict=True):
+            each[:] += pull @ other
 
-    def _close(self, springs: Ints) -> None:
-        """Let springs act that close loops."""
+    def _transmit(self, spring: int, rows: slice, wrench: Floats) -> None:
+        """Set what a spring transmits (n, k), of some rows."""
+        for each, part in zip(self._of(spring, spring + 1, rows), self._parts[spring], strict=True):
+            each[:] = wrench[:, part]
+
+    def _gives(self, spring: int, rows: slice, given: Floats) -> Floats:
+        """Return what a spring transmits (n, k), of some rows, times a matrix (k, k)."""
+        return np.hstack(self._of(spring, spring + 1, rows)) @ given
+
+    def _close(self, springs: Ints) -> tuple[Floats, list[Floats]]:
+        """Let springs act that close loops; return what is added, as of `_Before`."""
         k, rows = self._size, slice(0, 1 + self._moves)
         gaps = np.concatenate([self._gap(s) for s in springs], axis=1)
-        pulled = np.concatenate([self._pulled(self._stressed(rows), s) for s in springs])
+        changes = [
+            np.concatenate([self._pulled(each, s) for s in springs])
+            for each in self._stressed(rows)
+        ]
         own = linalg.block_diag(*self._compliance[springs])
         system = own + np.concatenate([self._pulled(gaps, s) for s in springs])
         factors = linalg.lu_factor(0.5 * (system + system.T))
         closing = -linalg.lu_solve(factors, gaps.T).T
         closing -= linalg.lu_solve(factors, (gaps + closing @ system).T).T
-        moved = np.ascontiguousarray(gaps[1:].T)
-        stressed, before = self._stressed(rows), self._own().copy()
-        _add_product(self.twist[rows, : self._moves], closing, moved)
-        _add_product(stressed, closing, pulled)
-        by_spring = self.wrench[rows].reshape(1 + self._moves, -1, k)
-        by_spring[:, springs] = closing.reshape(1 + self._moves, -1, k)
+        changes, before = [np.ascontiguousarray(gaps[1:].T), *changes], self._own().copy()
+        _add_products(self._answers(rows), closing, changes)
+        for i, spring in enumerate(springs.tolist()):
+            self._transmit(spring, rows, closing[:, k * i : k * i + k])
         self._tie(springs, self._ties)
         lost = (before / np.maximum(self._own(), TINY)).reshape(self.bricks, k).max(axis=1)
         self.loss[: self.bricks] *= np.maximum(lost, 1.0)
         if self.loss[: self.bricks].max() > max(_TAKEN, _WORSE * self._left):
             self._sum_again()
+        return closing, changes
 
     def _own(self) -> Floats:
         """Return how far unit wrenches move their own bricks, (kb,)."""
@@ -238,9 +324,8 @@ class Growth:
         for start in range(0, 1 + self._moves, step):
             part = slice(start, min(start + step, 1 + self._moves))
             twist = self.twist[part].reshape(part.stop - start, -1, k)
-            wrench = self.wrench[part].reshape(part.stop - start, -1, k)
             for brick, parent, spring, given, along in ways:
-                twist[:, brick] = wrench[:, spring] @ given
+                twist[:, brick] = self._gives(spring, part, given)
                 if parent != GROUND:
                     twist[:, brick] += twist[:, parent] @ along
                 elif start == 0:
@@ -255,7 +340,7 @@ class Growth:
 
     def _gap(self, spring: int) -> Floats:
         """Return how far the bodies of a spring part at it under every load, (1 + kb, k)."""
-        springs, k = self._network.springs, self._size
+        springs = self._network.springs
         at, out = springs.position[spring], np.zeros((1 + self._moves, self._size))
         first, body = springs.bodies[spring].tolist()
         trail = {}
@@ -267,7 +352,7 @@ class Growth:
             body, s, sign = trail[body]
             carried = self._carried(at - springs.position[s])
             turn = self._compliance[s] @ carried.T
-            out -= self.wrench[: len(out), k * s : k * s + k] @ (sign * turn)
+            out -= self._gives(s, slice(len(out)), sign * turn)
             out[0] += sign * carried @ self._shift[s]
         out[0] -= self._shift[spring]
         return out
@@ -313,16 +398,18 @@ class Growth:
         return out
 
 
-def _add_product(target: Floats, left: Floats, right: Floats) -> None:
-    """Add the product of matrices (n, p) and (p, m) to one (n, m), a few rows at a time."""
-    step = max(1, _AT_ONCE // target.shape[1])
-    starts = range(0, len(target), step)
+def _add_products(targets: Sequence[Floats], left: Floats, changes: Sequence[Floats]) -> None:
+    """Add to matrices (n, m) products of one (n, p) with others (p, m), a few rows at a time."""
+    step = max(1, _AT_ONCE // max(target.shape[1] for target in targets))
+    starts = range(0, len(left), step)
     threads = min(cores(), len(starts) // _LEAST)
 
     def add(first: int) -> None:
-        room = np.empty((step, target.shape[1]))
+        rooms = np.empty(step * max(target.shape[1] for target in targets))
         for start in starts[first :: max(threads, 1)]:
-            part = target[start : start + step]
-            part += np.matmul(left[start : start + step], right, out=room[: len(part)])
+            some = left[start : start + step]
+            for target, change in zip(targets, changes, strict=True):
+                part = target[start : start + step]
+                part += np.matmul(some, change, out=rooms[: part.size].reshape(part.shape))
 
     in_threads(add, range(max(threads, 1)))

@@ -273,9 +273,11 @@ def load_rows(nodes: Ints, directions: int, moments: int) -> Ints:
 class OperatorBuilder:
     """Makes the operator of any brick count of a tree from what grows with it."""
 
-    def __init__(self, network: Network, tree: SpanningTree, basis: Basis = SPACE) -> None:
+    def __init__(
+        self, network: Network, tree: SpanningTree, basis: Basis = SPACE, *, apart: bool = False
+    ) -> None:
         self.network, self.basis = network, basis
-        self.growth = Growth(network, tree, basis)
+        self.growth = Growth(network, tree, basis, apart=apart)
         self.maps = scene_maps(network, basis)
         self.nodes = inner_motions(network, basis)
         self.moments = len(basis.moment) if network.scene.grip_kinds.turns.any() else 0
@@ -289,20 +291,13 @@ class OperatorBuilder:
 
         ``held`` (h,): the bricks at whose nodes loads act, ascending; all by default.
         """
-        self.growth.reach(bricks)
-        held = np.arange(bricks) if held is None else held
+        held = np.arange(bricks) if held is None else np.asarray(held)
         which = slice(bricks) if len(held) == bricks else held
         nodes = self.nodes[which]
         k, loads = nodes.shape[2], nodes.shape[0] * nodes.shape[1]
-        springs = int(np.searchsorted(self.network.springs.since, bricks, side="right"))
-        found = []  # twists and wrenches under unit loads at nodes, and under the weight
-        for answers, width in ((self.growth.twist, k * bricks), (self.growth.wrench, k * springs)):
-            by_brick = answers[1 : 1 + k * bricks, :width].reshape(bricks, k, width)
-            rows = np.empty((loads + 1, width))
-            np.matmul(nodes, by_brick[which], out=rows[:-1].reshape(*nodes.shape[:2], width))
-            rows[-1] = answers[0, :width]
-            found.append(rows)
-        twist, wrench = found
+        (moved, *carried), loss = self.growth.answers(bricks, held)
+        twist = _at_nodes(nodes, [moved], [held])
+        wrench = _at_nodes(nodes, carried, self.growth.columns)
         turned = twist.reshape(len(twist), bricks, k)[:, which].transpose(1, 0, 2)
         at_nodes = np.empty((len(twist), *nodes.shape[:2]))  # displacements
         np.matmul(turned, nodes.swapaxes(1, 2), out=at_nodes.transpose(1, 0, 2))
@@ -318,6 +313,33 @@ class OperatorBuilder:
             at_second=at_second,
             axis=axis @ self.basis.force.T,
             inner_edge=inner_edge,
-            loss=np.repeat(self.growth.loss[held], nodes.shape[1]),
+            loss=np.repeat(loss, nodes.shape[1]),
             moments=self.moments,
         )
+
+
+_MAPPED = 2**14  # numbers mapped at a time, about: they stay in the processor's cache
+
+
+def _at_nodes(nodes: Floats, answers: Sequence[Floats], columns: Sequence[Ints]) -> Floats:
+    """Return what unit loads at nodes of bricks (h, w, k) mean, and the weight last.
+
+    ``answers``: of the weight and unit wrenches on these bricks, (1 + kh, n); of which columns.
+    """
+    h, w, k = nodes.shape
+    out = np.empty((h * w + 1, sum(each.shape[1] for each in answers)))
+    for each, some in zip(answers, columns, strict=True):
+        width = each.shape[1]
+        if width == out.shape[1]:
+            rows = each[1:].reshape(h, k, width)
+            np.matmul(nodes, rows, out=out[:-1].reshape(h, w, width))
+            out[-1] = each[0]
+            continue
+        step = max(1, _MAPPED // max(1, w * width))
+        for start in range(0, h if width else 0, step):  # to other columns, part by part
+            part = nodes[start : start + step]
+            rows = each[1 + k * start :][: k * len(part)].reshape(len(part), k, width)
+            mine = slice(w * start, w * (start + len(part)))
+            out[mine, some[:width]] = (part @ rows).reshape(-1, width)
+        out[-1, some[:width]] = each[0]
+    return out

@@ -276,6 +276,11 @@ class ComplianceEngine(NamedEngine):
             found[:, apart], size[apart] = rest[:4], rest.force
         return Extremes(found[0], found[1], found[2], found[3], size)
 
+    def _recalls(self, bricks: int) -> bool:
+        """Return whether fields of a brick count are had from what grew for extremes."""
+        grown: GrownExtremes | None = vars(self).get("_grown")
+        return grown is not None and grown.bricks > 0 and self._builder.growth.recalls(bricks)
+
     def _accepted(self, want: Want) -> float:
         """Return the largest error of fields that is accepted, over the largest entry of each."""
         return max(_SCREEN, self._accuracy) if _is_screen(want) else self._accuracy
@@ -314,7 +319,9 @@ class ComplianceEngine(NamedEngine):
     @cached_property
     def _builder(self) -> OperatorBuilder:
         """Made when the first operator is: a scene that is loose from the start has none."""
-        return OperatorBuilder(self._network, self._tree, self._basis)
+        loads = len(self._network.inner) * len(self._basis.force)
+        apart = can_compile() and not are_few(loads, 0)  # for extremes of few grip sets
+        return OperatorBuilder(self._network, self._tree, self._basis, apart=apart)
 
     @cached_property
     def _grown(self) -> GrownExtremes | None:
