@@ -45,11 +45,11 @@ class _Later(ModuleType):
 
 
 def _put_off() -> None:
-    """Let libraries wait that few commands need, or that only SciPy's start would load."""
+    """Let libraries wait that few commands need, or only the start of SciPy looks at."""
     import numpy as np  # noqa: PLC0415  # of which help needs nothing
 
     sys.modules.setdefault("pandas", _Later("pandas"))
-    for part in ("f2py", "testing"):
+    for part in ("ctypeslib", "f2py", "fft", "polynomial", "testing"):
         if part not in vars(np):
             vars(np)[part] = sys.modules.setdefault(f"numpy.{part}", _Later(f"numpy.{part}"))
 
