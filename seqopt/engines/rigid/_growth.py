@@ -280,7 +280,9 @@ class Growth:
 
     def _gives(self, spring: int, rows: slice, given: Floats) -> Floats:
         """Return what a spring transmits (n, k), of some rows, times a matrix (k, k)."""
-        return np.hstack(self._of(spring, spring + 1, rows)) @ given
+        (one, other), (first, rest) = self._of(spring, spring + 1, rows), self._parts[spring]
+        out = one @ given[first]
+        return out + other @ given[rest] if other.shape[1] else out
 
     def _close(self, springs: Ints) -> tuple[Floats, list[Floats]]:
         """Let springs act that close loops; return what is added, as of `_Before`."""
