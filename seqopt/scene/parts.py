@@ -14,7 +14,7 @@ from numbers import Real
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse, Vector
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse, Vector, frozen
 from seqopt.errors import SceneError
 from seqopt.scene._checks import (
     check,
@@ -314,10 +314,10 @@ class Brick(Terse):
                 f"{[float(f'{e:.6g}') for e in extents]} along its axes; give these"
             )
 
-    @property
+    @cached_property
     def frame(self) -> Floats:
         """Unit vectors along length, width and thickness, (3, 3), as rows."""
-        return frames(np.array(self.length_axis), np.array(self.width_axis))
+        return frozen(frames(np.array(self.length_axis), np.array(self.width_axis)))
 
     @property
     def volume(self) -> float:
