@@ -26,7 +26,6 @@ gc.disable()
 
 
 def pytest_collection_finish():
-    gc.collect()
     gc.freeze()
     gc.enable()
 

@@ -48,13 +48,14 @@ def shown(figure: Figure, size: float) -> float:
 
 def flaws(figure: Figure) -> list[str]:
     """Return what a reader would trip over."""
+    seen = texts(figure)
     out = [
         f"{text.get_text()!r} is shown at {shown(figure, text.get_fontsize()):.1f} points"
-        for text in texts(figure)
+        for text in seen
         if shown(figure, text.get_fontsize()) < SMALL - ROUNDING
     ]
     names = {name for name in formulations() if "_" in name}
-    for text in texts(figure):
+    for text in seen:
         words = re.sub(r"\(.*?\)|the same plan: .*", "", text.get_text())
         if CODE.search(words) or any(name in words for name in names):
             out.append(f"{text.get_text()!r} is a name of the code")

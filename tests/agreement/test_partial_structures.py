@@ -79,7 +79,7 @@ def marks(name: str) -> list[pytest.MarkDecorator]:
     """Return whether a scene is for every day, or for a release."""
     if name == WORDS[0]:
         return []
-    large = name in ("vault338", ARMADILLO)
+    large = name in ("vault338", "dome163", ARMADILLO)
     return [pytest.mark.slow, *[pytest.mark.long] * large]
 
 

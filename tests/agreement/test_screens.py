@@ -92,7 +92,10 @@ def test_verdicts_of_either_kind_are_compared(arch25):
     assert {1, -1} <= set(found.tolist())
 
 
-@pytest.mark.parametrize(("bricks", "sets"), [(5, 5), pytest.param(24, 2, marks=pytest.mark.slow)])
+LONG = (pytest.mark.slow, pytest.mark.long)
+
+
+@pytest.mark.parametrize(("bricks", "sets"), [(5, 5), pytest.param(24, 2, marks=LONG)])
 def test_margins_are_the_certificates(arch25, bricks, sets):
     network = build_network(arch25)
     held = some_sets(arch25, bricks, sets)

@@ -176,11 +176,14 @@ def brute_force(scene, aim):
     return shortest(graph, start, lambda _, after, __: 0.0 if after == "end" else costs[after])[0]
 
 
+LONG = (pytest.mark.slow, pytest.mark.long)
+
+
 @pytest.mark.parametrize(
     ("aim", "size"),
     [("minmax", (3, 2)), ("sum", (3, 2))]
-    + [pytest.param(aim, (5, 2), marks=pytest.mark.slow) for aim in ("minmax", "sum")]
-    + [pytest.param("minmax", (4, 3), marks=pytest.mark.slow)],
+    + [pytest.param(aim, (5, 2), marks=LONG) for aim in ("minmax", "sum")]
+    + [pytest.param("minmax", (4, 3), marks=LONG)],
 )
 def test_free_schedules_agree_with_brute_force(aim, size):
     scene = soft(*size)

@@ -85,6 +85,7 @@ def test_a_dense_solver_agrees(arch25, i):
     assert agree_with_dense(arch25, i) <= 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_a_dense_solver_agrees_on_all_states(arch25):
     assert max(agree_with_dense(arch25, i) for i in range(STATES)) <= 1e-9

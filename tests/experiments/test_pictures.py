@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import combinations
 
+import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -65,11 +66,11 @@ def covered(figure: Figure) -> list[str]:
         for text, box in boxes
         if min(box.x0, box.y0, wide - box.x1, high - box.y1) < -TOUCHING
     ]
-    for (text, box), (other, room) in combinations(boxes, 2):
-        shared = box.intersection(box, room)
-        if shared is not None and min(shared.width, shared.height) > TOUCHING:
-            out.append(f"{text!r} covers {other!r}")
-    return out
+    low, high = np.split(np.array([box.extents for _, box in boxes]).reshape(-1, 4), 2, axis=1)
+    shared = np.minimum(high[:, None], high) - np.maximum(low[:, None], low)
+    meet = (shared > TOUCHING).all(axis=2)
+    pairs = combinations(enumerate(text for text, _ in boxes), 2)
+    return out + [f"{text!r} covers {other!r}" for (i, text), (k, other) in pairs if meet[i, k]]
 
 
 def test_stored_figures_are_of_this_style():

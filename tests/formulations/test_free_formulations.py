@@ -40,13 +40,13 @@ from tests.strategies import free_builds
 ALL = {name: find_formulation(name) for name in formulation_names(On.STATES)}
 EXACT = [name for name, found in ALL.items() if found.kind is FormulationKind.EXACT]
 AIMS = ("minmax", "minmax,steps", "sum", "steps,minmax", "regrips,sum(T_max)", "travel")
-slow = pytest.mark.slow
+slow, long = pytest.mark.slow, (pytest.mark.slow, pytest.mark.long)
 every = pytest.mark.parametrize("name", ALL)
 CASES = [
     *(((4, 2), aim) for aim in AIMS[1::2]),
     *(((4, 3), aim) for aim in AIMS[::2]),
-    *(pytest.param((7, 2), aim, marks=slow) for aim in AIMS[::2]),
-    *(pytest.param((6, 3), aim, marks=slow) for aim in AIMS[1::2]),
+    *(pytest.param((7, 2), aim, marks=long) for aim in AIMS[::2]),
+    *(pytest.param((6, 3), aim, marks=long) for aim in AIMS[1::2]),
 ]
 
 

@@ -33,6 +33,7 @@ from seqopt.work.progress import Stage
 from tests.builders import from_both_sides, small_arch
 from tests.strategies import free_builds
 
+LONG = (pytest.mark.slow, pytest.mark.long)
 TWO = FreeRules(robots=("rob1", "rob2"), least_grips=1)
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0), ("T_max", 30.0), ("D_max", 1e-5)))
 
@@ -95,8 +96,8 @@ def test_it_equals_brute_force(build):
     ("aim", "bricks", "robots"),
     [
         *((aim, 3, 2) for aim in ("steps", "regrips,minmax", "travel", "sum", "sum(T_max)")),
-        pytest.param("regrips,minmax", 4, 2, marks=pytest.mark.slow),
-        pytest.param("travel", 4, 3, marks=pytest.mark.slow),
+        pytest.param("regrips,minmax", 4, 2, marks=LONG),
+        pytest.param("travel", 4, 3, marks=LONG),
     ],
 )
 def test_what_adds_up_equals_brute_force(aim, bricks, robots):
@@ -147,9 +148,7 @@ def test_another_order_is_found_where_the_own_one_has_no_plan():
 
 
 @once
-@pytest.mark.parametrize(
-    ("workers", "bricks"), [(1, 3), pytest.param(2, 4, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("workers", "bricks"), [(1, 3), (2, 3), pytest.param(2, 4, marks=LONG)])
 def test_the_worst_of_scenarios_equals_brute_force(workers, bricks):
     """Another order is the best where the worst of some scenarios counts, and it is found."""
     scene = small_arch(bricks)
@@ -284,7 +283,8 @@ def test_it_equals_brute_force_on_walls(columns, courses):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [4, pytest.param(5, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("count", [4, 5])
 def test_it_equals_brute_force_on_arches(count):
     check_against_brute_force(small_arch(count), FreeRules())
 
@@ -307,12 +307,12 @@ def test_a_heuristic_order_is_on_the_right_side(seed):
 def test_who_tries_orders_changes_nothing():
     """Two processes of our own, or two threads of an executor."""
     problem = posed(small_arch(6), aim="F_largest")
-    alone = seqopt.solve(problem, FORMULATION, most=6, tries=25)
+    alone = seqopt.solve(problem, FORMULATION, most=6, tries=10)
     assert alone.order != problem.scene.build_order  # something was found
     with ThreadPoolExecutor(2) as executor:
         for hired in (None, executor):
             means = Resources(workers=2, executor=hired)
-            shared = seqopt.solve(sharing(problem, means), FORMULATION, most=6, tries=25)
+            shared = seqopt.solve(sharing(problem, means), FORMULATION, most=6, tries=10)
             assert shared.selection == alone.selection
 
 

@@ -17,7 +17,7 @@ from seqopt.responses.table import Departure, analyze
 from seqopt.sequence.two_robots import sequential
 from seqopt.stability._builds import BuildVerdicts
 from seqopt.stability.assessment import Verdict
-from tests.browser import BROWSER, PLAIN, WORDS, browsed, browses
+from tests.browser import BROWSER, PLAIN, browsed, browses
 
 STANDS, FALLS, OPEN = Verdict.STANDS, Verdict.FALLS, Verdict.UNDECIDED
 browser = pytest.mark.skipif(BROWSER is None, reason="there is no Chromium")
@@ -141,7 +141,7 @@ def test_a_browser_opens_the_step_that_decides_and_shows_every_verdict(page, tmp
 def test_a_summary_is_one_sheet(page, tmp_path):
     def sheets(path):
         out = tmp_path / "summary.pdf"
-        words = [word for word in WORDS.split() if word != "--dump-dom"]
+        words = [word for word in PLAIN.split() if word != "--dump-dom"]
         words += [f"--print-to-pdf={out}", f"--user-data-dir={tmp_path / 'profile'}"]
         subprocess.run(
             [BROWSER, *words, f"file://{path}"], check=True, capture_output=True, timeout=120

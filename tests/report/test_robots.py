@@ -23,7 +23,7 @@ from seqopt.responses.table import analyze
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.sequence.exports import export_plan
 from seqopt.sequence.two_robots import sequential
-from tests.browser import BROWSER, browsed
+from tests.browser import BROWSER, PLAIN, WORDS, browsed
 from tests.strategies import builds
 
 FRONT, BACK = (Side(toward=(0.0, y, 0.0), point=(0.0, -9.0 * y, 0.0)) for y in (-1.0, 1.0))
@@ -110,8 +110,8 @@ def test_a_page_has_arms_and_tasks(text):
 def test_a_browser_names_the_robots_that_it_draws(text, tmp_path):
     (path := tmp_path / "report.html").write_text(text, "utf-8")
     seen = {}
-    for state in ("step=5", "step=5&robots=off"):
-        page, said = browsed(tmp_path, f"file://{path}#{state}")
+    for state, words in (("step=5", WORDS), ("step=5&robots=off", PLAIN)):
+        page, said = browsed(tmp_path, f"file://{path}#{state}", words)
         if 'data-ready="true"' not in page:
             pytest.skip("Chromium does not run here")
         assert not [line for line in said.splitlines() if "CONSOLE" in line and "rror" in line]

@@ -133,7 +133,7 @@ def all_of_book(network, rules):
 
 @pytest.mark.slow
 @given(build=free_builds(most_bricks=4, most_robots=3))
-@settings(max_examples=25)
+@settings(max_examples=12)
 def test_many_at_a_time_and_one_after_the_other_agree(build):
     scene, rules = build
     network = build_network(scene)

@@ -167,7 +167,9 @@ def test_verdicts_of_random_scenes_are_those_of_the_cone_program(scene, seed, mo
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("mortar", MORTARS)
+@pytest.mark.parametrize(
+    "mortar", [pytest.param(name, marks=[pytest.mark.long] * (name != "dry")) for name in MORTARS]
+)
 def test_verdicts_of_larger_structures_too(mortar):
     scenes = load_scene("arch25"), without_joint(leaning_chain(25)).scene, running_bond(4, 4)
     for seed, scene in enumerate(scenes):
@@ -406,6 +408,7 @@ def test_arches_fall_dry_where_a_program_of_its_own_finds_no_forces(name):
             assert feasible(assembly, DRY.friction, 16, around=falls) is not falls
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*ARCHES][1:])
 def test_longer_arches_fall_dry_as_the_cone_program_says(name):

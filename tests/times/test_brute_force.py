@@ -11,6 +11,7 @@ from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES
 from tests.times.builders import RULES, engine_of, least_makespan
 
+LONG = (pytest.mark.slow, pytest.mark.long)
 CASES = [
     (3, 2, (), FreeRules(ending="held", least_grips=1)),
     (3, 3, ("rob3:slower=2.5",), RULES),
@@ -25,10 +26,8 @@ CASES = [
         FreeRules(ending="one-by-one", regrips=1),
         marks=pytest.mark.slow,
     ),
-    pytest.param(6, 3, ("rob3:slower=2.5",), RULES, marks=pytest.mark.slow),
-    pytest.param(
-        *(6, 4, ("rob4:fetch=75,approach=25",), RULES), marks=(pytest.mark.slow, pytest.mark.long)
-    ),
+    pytest.param(6, 3, ("rob3:slower=2.5",), RULES, marks=LONG),
+    pytest.param(6, 4, ("rob4:fetch=75,approach=25",), RULES, marks=LONG),
 ]
 
 

@@ -24,6 +24,7 @@ from tests.times.curing import least_cured_makespan
 
 ALONE = FreeRules(least_grips=1)
 CRITERION = seqopt.CRITERIA["worst-ratio-published"]
+LONG = (pytest.mark.slow, pytest.mark.long)
 TACK = "0s=0.005,1min=0.02,5min=0.4,15min=1"
 
 
@@ -43,10 +44,8 @@ CASES = [
         *(3, 2, ("rob2:slower=2.5",), ALONE, "0s=0.002,10min=1 2-3:0s=0.002,1h=1"),
         marks=pytest.mark.slow,
     ),
-    pytest.param(4, 2, (), ALONE, "5min=1", marks=pytest.mark.slow),
-    pytest.param(
-        *(4, 2, (), ALONE, "1min=0.001,10min=1"), marks=[pytest.mark.slow, pytest.mark.long]
-    ),
+    pytest.param(4, 2, (), ALONE, "5min=1", marks=LONG),
+    pytest.param(4, 2, (), ALONE, "1min=0.001,10min=1", marks=LONG),
 ]
 
 
@@ -78,7 +77,7 @@ def test_instant_bond_takes_as_long_as_ever_and_none_as_dry():
         assert plan.status is Status.OPTIMAL
 
 
-@pytest.mark.parametrize("robots", [2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("robots", [2, pytest.param(3, marks=LONG)])
 def test_slower_mortar_makes_no_build_shorter(robots):
     engine = engine_of(4 if robots == 2 else 6, robots)
     rules = FreeRules(least_grips=robots - 1)
@@ -228,6 +227,7 @@ def test_what_is_not_modeled_says_so():
         seqopt.solve(problem, "makespan_flow")
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_the_dry_arch_takes_two_more_steps_and_is_the_limit_of_no_bond():
     """52 steps for 50, where the worst ratio counts first; proven, with as little on both sides."""

@@ -122,7 +122,9 @@ TRIAL = {  # bricks, words: planned with the fewest steps, least; both with the 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("words", TRIAL)
+@pytest.mark.parametrize(
+    "words", [pytest.param(words, marks=[pytest.mark.long] * bool(words)) for words in TRIAL]
+)
 def test_eleven_bricks_by_four_robots(words):
     """Found first by an exact label search of its own, without bounds."""
     scene = with_robots(seqopt.load_scene("chain:bricks=11"), 4).with_durations(WORDS, *words)

@@ -17,6 +17,7 @@ from matplotlib.patches import Ellipse
 from matplotlib.text import Annotation
 from matplotlib.transforms import Bbox
 
+from seqopt.arrays import Floats
 from seqopt.report._speed._table import CUT, DONE, FAILED, SpeedTable, error_text, seconds_text
 from seqopt.report._style import (
     GRAY,
@@ -109,13 +110,13 @@ def _spot(text: Annotation, label: Label, boxes: Sequence[Bbox], scale: float) -
     own = text.get_window_extent()
     wide, high = own.width, own.height
     x, y = label.axes.transData.transform(label.at)
+    others = np.array([other.extents for other in boxes]).reshape(-1, 4)
     best, least = None, np.inf
     for dx, dy in _spots():
         left = x + dx * scale - wide * _share(dx)
         low = y + dy * scale - high * _share(dy)
         box = Bbox.from_bounds(left, low, wide, high)
-        out = _outside(box, inside)
-        covered = out + sum(_shared(box, other, AIR * scale) for other in boxes)
+        covered = _outside(box, inside) + _shared(box.padded(AIR * scale), others)
         if covered < least:
             best, least = (dx, dy, box), covered
         if not covered:
@@ -144,9 +145,10 @@ def _outside(box: Bbox, room: Bbox) -> float:
     return area - (shared.width * shared.height if shared is not None else 0.0)
 
 
-def _shared(box: Bbox, other: Bbox, air: float) -> float:
-    found = Bbox.intersection(box.padded(air), other)
-    return 0.0 if found is None else found.width * found.height
+def _shared(box: Bbox, others: Floats) -> float:
+    """Return how much of a box others cover, each by itself, pixels squared."""
+    low, high = np.maximum(others[:, :2], box.min), np.minimum(others[:, 2:], box.max)
+    return float((high - low).clip(min=0.0).prod(axis=1).sum())
 
 
 ENGINES = ("compliance", "frame", "auto", "discrete", "planar")  # in the order of their looks
