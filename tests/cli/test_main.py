@@ -34,16 +34,20 @@ def summary(capsys, *words):
 
 
 @pytest.mark.slow
-def test_compare(capsys):
-    status, out, _ = run(capsys, "compare")
+def test_compare(capsys, monkeypatch):
+    """With what each robot does, in 80 columns."""
+    monkeypatch.setenv("COLUMNS", "80")
+    status, out, _ = run(capsys, "compare", "--details")
     assert status == 0
     assert "three-robot" in out
     assert "paper" in out
-    assert "406.0" in out  # the paper's F_rob2 of the sequential method
+    assert "406.1 (406.0)!" in out  # of the sequential method, the paper's beside; over the payload
+    assert "114.6 (114.4)" in out
     assert "step 47" in out
     assert "22" in out
     assert "- sequential: rob3 never grips\n" in out
     assert "the sequential method here" not in out
+    assert [line for line in out.splitlines() if len(line) > 80] == []
 
 
 @pytest.mark.slow

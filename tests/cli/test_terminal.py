@@ -11,7 +11,6 @@ import threading
 import pytest
 
 from seqopt._cli import watcher
-from seqopt._cli.main import main
 from seqopt._cli.terminal import colored, columns, complain, note, painted, show_text, wrapped
 from seqopt._cli.watcher import Watcher
 from seqopt.work.progress import Stage, with_progress, within
@@ -172,17 +171,6 @@ def test_columns_are_those_of_the_terminal_within_reason(monkeypatch, width, fou
     lines = wrapped("word " * 100, first="- ").splitlines()
     assert max(map(len, lines)) <= found
     assert all(line.startswith("  ") for line in lines[1:])
-
-
-@pytest.mark.slow
-def test_what_is_compared_fits_eighty_columns(capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "80")
-    assert main(["compare", "--details"]) == 0
-    out = capsys.readouterr().out
-    wide = [line for line in out.splitlines() if len(line) > 80]
-    assert wide == []
-    assert "406.1 (406.0)!" in out  # the paper's figure beside, and a payload exceeded
-    assert "114.6 (114.4)" in out
 
 
 class Cell(io.StringIO):
