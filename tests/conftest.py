@@ -41,6 +41,7 @@ settings.load_profile("seqopt")
 
 
 LONGEST = "test_the_site_builds_strictly"
+LARGE = ("docs", "experiments", "times", "validation")  # folders with others that take long
 
 
 def pytest_ignore_collect(collection_path, config):
@@ -52,8 +53,8 @@ def pytest_ignore_collect(collection_path, config):
 
 
 def pytest_collection_modifyitems(items):
-    """Start with the test that takes longest, so that no worker waits for it at the end."""
-    items.sort(key=lambda item: item.name != LONGEST)
+    """Start with the tests that take longest, so that no worker waits for them at the end."""
+    items.sort(key=lambda item: (item.name != LONGEST, item.path.parent.name not in LARGE))
 
 
 @pytest.fixture(scope="session")

@@ -24,8 +24,8 @@ def mutator():
 
 @pytest.mark.slow
 def test_a_small_run_of_the_command_finds_no_fault(capsys):
-    assert main(["--cases", "20", "--kills", "2"]) == 0
-    assert capsys.readouterr().out.splitlines()[-1] == "no fault: 20 cases, 2 kills"
+    assert main(["--cases", "5", "--kills", "2"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == "no fault: 5 cases, 2 kills"
 
 
 @pytest.mark.slow
@@ -114,6 +114,8 @@ def test_a_part_of_a_folder_is_seen(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize(
+    "number", [0, 1, 2, *(pytest.param(number, marks=pytest.mark.long) for number in (3, 4, 5))]
+)
 def test_a_program_that_is_killed_leaves_nothing_or_a_whole(number):
     assert is_clean(killed("optimize" if number % 2 else "write", number))
