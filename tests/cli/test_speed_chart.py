@@ -24,7 +24,7 @@ def test_what_is_no_time_is_refused_in_a_line(words, capsys):
 def test_a_comparison_with_speed(tmp_path, capsys):
     out = tmp_path / "speed"
     words = ["compare", WALL, "--no-stability"]
-    assert main([*words, "--speed", "30", "--out", str(out)]) == 0
+    assert main([*words, "--speed", "3", "--out", str(out)]) == 0
     said = capsys.readouterr().out
     block = said.split("Speed against accuracy\n")[1].split("written to")[0]
     assert all(len(line) <= 80 for line in block.splitlines())

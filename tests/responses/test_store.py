@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import pytest
 
+from seqopt._cli.main import main
 from seqopt.engines.registry import make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import FileError, SceneError
@@ -272,8 +273,8 @@ def test_a_run_that_was_killed_goes_on(tmp_path, workers):
     runs = [start("one", workers), start("other")]
     assert [run.wait() for run in runs] == [0, 0]
     assert {path: path.stat().st_mtime_ns for path in kept} == kept  # used as they were
-    plain = ["arch25", str(tmp_path / "plain"), str(tmp_path / "new"), "--no-proof"]
-    subprocess.run([sys.executable, str(script), *plain], env=environment, check=True)
+    plain = ["arch25", "--formulation", "cascade", "--no-stability", "--no-proof"]
+    assert main(["optimize", *plain, "--out", str(tmp_path / "plain")]) == 0
     for name in ("plan.csv", "selection.csv"):
         texts = {(tmp_path / out / name).read_text("utf-8") for out in ("one", "other", "plain")}
         assert len(texts) == 1
