@@ -24,7 +24,7 @@ from seqopt.report._style import GRAY, dress, look, plain, styled
 
 SOME = (7, 13, 25, 37, 49, 73)
 SIZES = {3: (7, 13, 25, 49, 73, 97, 145), 4: SOME, 5: (7, 13, 19, *SOME[2:])}
-QUICK = {3: (7, 13), 4: (7,)}
+QUICK = {3: (7,), 4: (7,)}
 SOLVED = {3: 145, 4: 49, 5: 49}  # bricks up to which a plan is proven, by robots
 STEEPEST = {3: 3.5}  # exponents of time that are claimed
 FROM = 25  # bricks from which on exponents are fitted

@@ -182,7 +182,7 @@ def best_of(plans, aims, caps):
 
 @pytest.mark.slow
 @given(data=st.data())
-@settings(max_examples=12)
+@settings(max_examples=8)
 @pytest.mark.parametrize("name", ["free", "three-robot", "modified-sequential", "own"])
 def test_everything_goes_with_everything(name, data):
     def pick(*some):

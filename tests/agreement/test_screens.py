@@ -72,6 +72,7 @@ def test_small_arches(scene, mortar, multiple, bricks):
     compare(with_payload(scene, multiple), min(bricks, len(scene.bricks)), mortar)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @settings(max_examples=20)
 @given(arches(), st.sampled_from(MORTARS), st.floats(0.5, 6.0), st.integers(1, 7))

@@ -186,11 +186,11 @@ def test_a_browser_shows_the_numbers_of_the_step_that_is_asked_for(
 ):
     path = tmp_path / "report.html"
     path.write_text(report_page(engine25, list(builds.values()), "Two ways."), "utf-8")
-    for state, name, number in (
-        ("step=12&build=sequential", "sequential", 12),
-        ("step=30&build=cantilever&forces&magnify=1000", "cantilever", 30),
+    for state, name, number, words in (
+        ("step=12&build=sequential", "sequential", 12, PLAIN),
+        ("step=30&build=cantilever&forces&magnify=1000", "cantilever", 30, WORDS),
     ):
-        text, errors = shown(path, state)
+        text, errors = shown(path, state, words)
         assert errors == []
         assert 'data-ready="true"' in text
         assert f"{name}, step {number} of 49" in text
