@@ -175,12 +175,15 @@ def divide(jordan: Floats, factor: Floats) -> Floats:
 
 
 def product(first: Floats, second: Floats) -> Floats:
+    """Return the inner products (C,) of vectors (n, C)."""
     return np.asarray(np.einsum("ic,ic->c", first, second))
 
 
 def apply(matrices: Floats, vectors: Floats) -> Floats:
+    """Return products (n, C) of matrices (n, m, C) with vectors (m, C)."""
     return np.asarray(np.einsum("ijc,jc->ic", matrices, vectors))
 
 
 def times(first: Floats, second: Floats) -> Floats:
+    """Return products (n, k, C) of matrices (n, m, C) and (m, k, C)."""
     return np.asarray(np.einsum("ijc,jkc->ikc", first, second))
