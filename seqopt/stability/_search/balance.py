@@ -49,10 +49,9 @@ class Balance:
         place = number[first] * bodies + number[second]
         order = np.argsort(place, kind="stable")
         self._first, self._right = first[order], blocks.data[second[order]]
+        # written again and again: new pages cost more
         self._half, self._left = np.empty((len(own), 6, 3)), np.empty((len(order), 6, 3))
-        self._products = np.empty(
-            (len(order), 6, 6)
-        )  # written again and again: new pages cost more
+        self._products = np.empty((len(order), 6, 6))
         places, starts = np.unique(place[order], return_index=True)
         terms = np.ones(len(order)), np.arange(len(order)), np.append(starts, len(order))
         self._sum = sparse.csr_array(terms, shape=(len(places), len(order)))
