@@ -245,7 +245,7 @@ def held_in_steps(scene: Scene, steps: Sequence[Step]) -> list[_Held]:
 
 def is_linear(engine: Engine) -> bool:
     """Return whether an engine is known to be linear in where grips are, in all directions."""
-    return isinstance(engine, ChoosingEngine | ComplianceEngine)
+    return isinstance(engine, ChoosingEngine) or type(engine) is ComplianceEngine
 
 
 def is_tied(engine: Engine, steps: Sequence[_Held]) -> bool:
