@@ -129,11 +129,11 @@ def test_what_is_sought_for_many_beside_each_other_is_as_for_each_alone(mortar):
     assert done.all()
     for each, answers in zip(sought, together, strict=True):
         for alone, beside in zip(approach(each), answers, strict=False):
-            assert alone.value == pytest.approx(beside.value, abs=1e-6)
+            assert alone.value == pytest.approx(beside.value, abs=1e-9)
             for name in ("contact_force", "grip_force", "motion"):
                 mine, other = getattr(alone, name), getattr(beside, name)
                 np.testing.assert_allclose(
-                    mine, other, atol=1e-6 * (1 + np.abs(other).max(initial=0))
+                    mine, other, atol=1e-9 * (1 + np.abs(other).max(initial=0))
                 )
 
 
