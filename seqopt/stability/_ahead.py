@@ -25,7 +25,7 @@ from seqopt.stability.limit_analysis import compile_equilibrium
 from seqopt.work._workers import Crew
 
 _DEAR = 50  # bricks from which on a proof takes much longer than trying others
-_BESIDE = 1500  # bricks in all steps that are sought for beside each other, where it is not dear
+_TOGETHER = 1500  # bricks in all steps that are sought for beside each other, where it is not dear
 _SPAN = 8  # brick counts whose grips hold a structure that is to fall all the same
 _MOST = 16  # brick counts for which nothing is sought at most after it was of no use
 _PORTIONS = 6  # of the steps with one mortar: what is found for one does not prove the next one
@@ -73,17 +73,17 @@ def _each_small(prove: VerdictChain, steps: Sequence[Step]) -> Iterator[Verdict]
     """Yield verdicts of which those that earlier proofs leave open are sought beside each other."""
     for number, step in enumerate(steps):
         if step.bricks:
-            before = partial(_search, prove, steps, number)
+            before = partial(_seek, prove, steps, number)
             yield _verdict_of(prove(step.bricks, step.grips, before)[1])
         else:
             yield Verdict.STANDS
 
 
-def _search(prove: VerdictChain, steps: Sequence[Step], number: int) -> None:
+def _seek(prove: VerdictChain, steps: Sequence[Step], number: int) -> None:
     """Seek what proves a step and those that follow."""
-    near = [*islice(steps, number, number + _BESIDE)]
+    near = [*islice(steps, number, number + _TOGETHER)]
     total = accumulate(step.bricks for step in near)
-    few = [step for step, bricks in zip(near, total, strict=True) if bricks <= _BESIDE]
+    few = [step for step, bricks in zip(near, total, strict=True) if bricks <= _TOGETHER]
     prove.search([*dict.fromkeys((step.bricks, step.grips) for step in few if step.bricks)])
 
 

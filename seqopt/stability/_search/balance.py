@@ -15,7 +15,7 @@ _REGULAR = 1e-13  # of the largest entry, added to all on the diagonal: blocks m
 Solve = Callable[[Floats], Floats]
 
 
-def beside(maps: Sequence[sparse.csr_array]) -> sparse.csr_array:
+def apart(maps: Sequence[sparse.csr_array]) -> sparse.csr_array:
     """Return maps that have neither rows nor columns in common."""
     rows, columns = zip(*(each.shape for each in maps), strict=True)
     before = np.cumsum([0, *columns])

@@ -28,7 +28,7 @@ from scipy import sparse
 
 from seqopt.arrays import Bools, Floats
 from seqopt.contact.assembly import Assembly
-from seqopt.stability._search.balance import Balance, beside
+from seqopt.stability._search.balance import Balance, apart
 from seqopt.stability._search.cones import (
     FLIP,
     Changing,
@@ -80,7 +80,7 @@ class _Search:
         pairs = [*zip(sought, self._parts, strict=True)]
         self._load = np.concatenate([_load(each, part) for each, part in pairs])
         maps = zip(*(_cut(each.assembly, part) for each, part in pairs), strict=True)
-        self._balance = Balance([beside(each) for each in maps])
+        self._balance = Balance([apart(each) for each in maps])
         self._cones = Cones(sought, self._parts)
         self._bodies = numbered([6 * int(np.count_nonzero(part.blocks)) for part in self._parts])
 
