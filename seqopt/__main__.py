@@ -47,7 +47,7 @@ def run() -> int:
             with contextlib.suppress(OSError, AttributeError):
                 stream.flush()
         os._exit(INTERRUPTED)
-    gc.freeze()  # all ends together
+    gc.freeze()  # else Python would look through all once more before it ends
     return status
 
 

@@ -57,8 +57,8 @@ def _put_off() -> None:
 def load(words: Sequence[str]) -> None:
     """Load the libraries of the command that words ask for, if they ask for one.
 
-    They would meet its interrupts if they came later. What is loaded stays, so that nobody need
-    look through it for what could be thrown away.
+    They would meet its interrupts if they came later. Memory is not collected meanwhile, nor from
+    what is loaded later on: all of it stays.
     """
     gc.disable()
     asked = asked_command(words)
