@@ -105,6 +105,7 @@ class BuildProver:
         self._network, self._mortars, self._progress = network, mortars, progress
         self._known: dict[str, dict[_State, Verdict]] = {name: {} for name in mortars}
         self._parts: Network | PartialAssemblies = network
+        self._most = 1  # bricks of any step so far: what is known of one may be asked again
         self._shared: tuple[_Asked, SharedVerdicts] | None = None
         self.refusal = ""
 
@@ -170,11 +171,11 @@ class BuildProver:
 
     def _ways(self, asked: _Asked) -> Callable[[Sequence[Step]], _Way]:
         """Return what proves most quickly which of some steps stand."""
+        self._most = max(self._most, *(step.bricks for new in asked.values() for step in new))
         if self._shared is not None and self._shared[0] == asked:
             found = partial(_as_found, iter(self._shared[1]))
             return lambda _: found
-        most = max(step.bricks for new in asked.values() for step in new) or 1
-        self._parts = PartialAssemblies(self._network, most)
+        self._parts = PartialAssemblies(self._network, self._most)
         one, many = (partial(way, self._parts) for way in (_one_by_one, _screened))
         return lambda new: many if self._many(new) else one
 

@@ -149,6 +149,19 @@ def test_equal_structures_are_asked_once(flat, builds, found, monkeypatch):
     assert prover.of_builds(builds) == found
 
 
+@pytest.mark.parametrize("shared", [False, True])
+def test_what_was_asked_before_fails_alike_after_lower_builds(flat, builds, monkeypatch, shared):
+    if shared:
+        monkeypatch.setattr(_builds, "_SHARED", 0)
+    late = [step for step in builds["sequential"] if step.bricks >= 15]
+    early = [step for step in builds["sequential"] if step.bricks <= 6]
+    prover, mortars = BuildProver(flat), tuple(SHOWN)
+    with prover.begun(late):
+        first = prover.of_builds({"late": late})["late"]
+    assert [each.mortar for each in first if each.first] == [mortars[0]]  # dry, it falls
+    assert prover.of_builds({"early": early, "late": late})["late"] == first
+
+
 def test_words_count_what_falls_and_what_is_open():
     falls, open_ = Verdict.FALLS, Verdict.UNDECIDED
     assert str(BuildVerdicts("dry", (Verdict.STANDS,) * 2)) == "dry: every step stands"
