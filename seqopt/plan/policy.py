@@ -21,6 +21,7 @@ from seqopt.graph._explore import Visited
 from seqopt.graph.paths import _to_go
 from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import States
+from seqopt.plan.judge._infeasible import confirmed
 from seqopt.plan.judge._policy import check_policy
 from seqopt.plan.solving import states_of
 from seqopt.problem.problem import Problem
@@ -250,8 +251,9 @@ def find_policy(
 
     The aims of ``problem`` have at most one worst step, which totals may precede and follow. With
     ``proof`` a second version of the rules and responses computed anew check every move. Raises
-    `ProblemError` if aims are margins or totals over scenarios, or there are budgets; `SolverError`
-    if the check finds a move that leads to less than the table says.
+    `ProblemError` if aims are margins or totals over scenarios, or there are budgets;
+    `InfeasibleError`, with why, if no build reaches an end; `SolverError` if the check finds a move
+    that leads to less than the table says.
 
     >>> import seqopt
     >>> from seqopt.plan.policy import find_policy
@@ -266,6 +268,8 @@ def find_policy(
     states = _states_with_policy(problem)
     tell("looking at every state")
     found = explore(states)
+    if not found.whole:
+        raise confirmed(replace(states), "the policy")
     found.refine()
     visited = found.graph()
     policy = _of_graph(states, visited)

@@ -102,7 +102,8 @@ class RuleBook:
         first, last = self.span
         keeps = bricks > 0 and not self.fault(bricks, grips)
         told = self.rules.begin is not None or self.rules.takes_down
-        begins = told and 0 < bricks == first
+        letting_go = bricks == last and self.rules.how_it_ends is Ending.ONE_BY_ONE
+        begins = told and 0 < bricks == first and not letting_go
         able = keeps or begins  # what stands at first need not keep rules, and may be held
         if able and (self.rules.regrips is None or regrips < self.rules.regrips):
             for after in self._held(bricks, grips):

@@ -208,6 +208,7 @@ class FreeSpace(StateRows):
     def holds(self, bricks: int, states: Ints) -> Moves:
         """Return the moves in which a free robot takes a grip on a brick that stands."""
         begins = self.rules.begin is not None and bricks == self._span[0]
+        begins &= not self.rules.lets_go_one_by_one(bricks, self._span)
         able = np.ones(len(states), dtype=bool) if begins else self.lawful(bricks, states)
         if self.rules.regrips is not None:
             able &= states[:, -1] < self.rules.regrips
@@ -229,7 +230,7 @@ class FreeSpace(StateRows):
                 parts.append(Moves(rows, new, np.zeros(len(rows))))
         moves = _join_moves(parts, states)
         ending = self.rules.how_it_ends
-        if bricks != self._span[1] or ending is not Ending.ONE_BY_ONE:
+        if not self.rules.lets_go_one_by_one(bricks, self._span):
             moves = self._lawful_only(bricks, moves)
         if bricks != self._span[1] or ending is Ending.HELD:
             return moves

@@ -68,13 +68,15 @@ class FreeRules:
     regrips : int or None
         Most grips taken between two bricks, besides those that place; by default any number.
     ending : Ending or str
-        How the build ends.
+        How the build ends. One by one: with all bricks robots may let go whatever the rules say,
+        and once a state breaks them, robots only let go; so also where a build begins in it.
     candidates : str
         Where bricks that stand may be taken hold of: ``near:6`` or ``within:1.5``, as of
         `seqopt.sequence.schedule.Near`; by default wherever robots reach.
     begin : Site or None
         Where the build begins; by default with the empty site. This state need not keep rules or
-        limits; until rules are kept for the first time, robots may only take grips.
+        limits; until rules are kept for the first time, robots may only take grips, except where
+        they have begun to let go one by one (see ``ending``).
     finish : Site or None
         Where it ends: with so many bricks, and grips, or as ``ending`` says; by default with all
         bricks. Robots of one kind may have changed places.
@@ -163,6 +165,13 @@ class FreeRules:
             return self.ending
         bare = self.ending if self.ending is not Ending.HELD else Ending.RELEASED
         return Ending.HELD if self.finish.held else bare
+
+    def lets_go_one_by_one(self, bricks: int, span: tuple[int, int]) -> bool:
+        """Return whether robots may let go against the rules, and then only let go, at a count.
+
+        ``span``: of brick counts, as of `span`.
+        """
+        return bricks == span[1] and self.how_it_ends is Ending.ONE_BY_ONE
 
     def near(self, scene: Scene, bricks: int) -> frozenset[int]:
         """Return the nodes of bricks that stand, of so many, that may be taken hold of."""

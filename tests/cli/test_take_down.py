@@ -45,6 +45,27 @@ def test_a_part_is_kept(capsys, tmp_path, arch):
     assert (out / "plan.csv").read_text().splitlines()[-1].split(",")[2] == "2"
 
 
+PROPPED = ("--props", "5,capacity=300"), ("--props", "5,push")
+CLOSE = ("--grips", "1e6", "--limit", "tolerance=1nm", "--limit", "T_max=500")
+
+
+@pytest.mark.parametrize("words", [*PROPPED, CLOSE], ids=" ".join)
+def test_what_limits_follow_from_the_scene_goes_with_it(capsys, tmp_path, arch, words):
+    """Props that bear only so much, and a tolerance beside other limits; also planned again."""
+    out = tmp_path / "propped"
+    status, said, _ = run(
+        capsys, "optimize", arch, *DOWN, *words, "--no-stability", "--out", str(out)
+    )
+    assert (status, "optimal" in said) == (0, True)
+    assert (out / "plan.csv").read_text().splitlines()[-1].split(",")[2] == "0"
+    assert len(json.loads((out / "summary.json").read_text())["limits"]) == (
+        2 if words == CLOSE else 1
+    )
+    status, said, _ = run(capsys, "replan", str(out), "--at", "2", "--no-stability")
+    assert (status, "the new plan is the old one" in said) == (0, True)
+    assert run(capsys, "analyze", str(out))[0] == 0
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import seqopt
-from seqopt.errors import FileError, ProblemError, SolverError, StepError
+from seqopt.errors import FileError, InfeasibleError, ProblemError, SolverError, StepError
 from seqopt.plan.judge._policy import check_policy
 from seqopt.plan.policy import Policy, find_policy
 from seqopt.plan.solving import states_of
@@ -17,26 +17,12 @@ from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import StepKind
 from tests.brute_force import ONES
-from tests.builders import small_arch
+from tests.builders import site_of, small_arch
 
 
 @pytest.fixture(scope="module")
 def engine():
     return seqopt.make_engine("compliance", with_robots(small_arch(3), 2))
-
-
-def site_of(policy, row, count):
-    """A state of a table as a site."""
-    grips, stays = [None] * count, [None] * count
-    for kind, columns in zip(policy.kinds, policy._columns, strict=True):
-        for robot, place in zip(kind, policy.held[row, columns], strict=True):
-            if place > 0:
-                grips[robot] = int(policy.nodes[place - 1])
-            elif place < 0:
-                stays[robot] = int(policy.nodes[-place - 1])
-    limited = policy.held.shape[1] > sum(map(len, policy.kinds))
-    regrips = int(policy.held[row, -1]) if limited else 0
-    return Site(int(policy.bricks[row]), tuple(grips), tuple(stays), regrips)
 
 
 @pytest.mark.parametrize(
@@ -128,3 +114,17 @@ def test_what_has_no_policy_says_why(engine, tmp_path):
     path.write_text("no table")
     with pytest.raises(FileError, match="it is no policy"):
         Policy.load(path)
+
+
+@pytest.mark.parametrize("direction", ["build", "take-down"])
+def test_where_there_is_no_plan_it_says_what_the_search_says(engine, direction):
+    rules = FreeRules(least_grips=1, direction=direction)
+    tight = Limit("F_largest", 1e-3)
+    problem = seqopt.pose(engine, rules, ONES, "minmax", [tight])
+    with pytest.raises(InfeasibleError) as searched:
+        seqopt.solve(problem)
+    for proof in (True, False):
+        with pytest.raises(InfeasibleError) as found:
+            find_policy(problem, proof=proof)
+        assert str(found.value) == str(searched.value)
+        assert "it becomes possible with" in str(found.value)

@@ -39,8 +39,8 @@ from seqopt._files import read_text
 from seqopt.errors import FileError, InfeasibleError, StepError
 from seqopt.plan._other.replan import compared, without
 from seqopt.plan.plan import Plan
-from seqopt.responses._tolerance import value_text
-from seqopt.responses.quantities import length_text
+from seqopt.responses._tolerance import is_tolerance, value_text
+from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, length_text
 from seqopt.scene.scenarios import as_built
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
@@ -181,7 +181,11 @@ def _told(folder: Path) -> dict[str, Any]:
         "aim": ",".join(told.get("aims", ())),
         "criteria": told["criterion"] if told.get("criterion") in CRITERIA else None,
         "rule": [f"{name}={rules[name]}" for name in names if name in rules],
-        "limit": [f"{name}={value}" for name, value in limits.items()],
+        "limit": [
+            f"{TOLERANCE if is_tolerance(name) else name}={value}"  # beside which limits follows
+            for name, value in limits.items()
+            if name != PROP_EXCESS  # which the scene says
+        ],
     }
 
 

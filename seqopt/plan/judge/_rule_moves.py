@@ -136,6 +136,8 @@ class RuleTables:
         rows, bricks = np.arange(len(states)), self.bricks_at(level)
         keeps = rows[self.keep(bricks, states)] if bricks else rows
         begins = self._rules.begin is not None and level == self.first
+        if level == self.last and self._rules.how_it_ends is Ending.ONE_BY_ONE:
+            begins = False  # who stands there against the rules has begun to let go
         able = rows if begins else keeps
         if bricks and self._rules.regrips is not None:
             able = able[states[able, -1] < self._rules.regrips]
