@@ -42,17 +42,22 @@ def test_a_policy_says_of_every_state_what_a_search_from_it_finds(rules, props, 
     scene = scene.with_robots(*(replace(r, payload=400.0) for r in scene.robots[:3]))
     engine = seqopt.make_engine("compliance", scene)
     problem = seqopt.pose(engine, rules, ONES, aim)
-    try:
-        policy = find_policy(problem)
-    except InfeasibleError as error:
-        with pytest.raises(InfeasibleError) as found:
-            seqopt.solve(problem)
-        assert str(error) == str(found.value)
+    policy = answer_to(find_policy, problem)
+    if isinstance(policy, str):
+        assert policy == answer_to(seqopt.solve, problem)
         return
     rng = np.random.default_rng(seed)
     whole = np.flatnonzero(policy.bricks == 4)
     for row in [*rng.permutation(whole)[:4], rng.integers(len(policy.bricks))]:
         same_as_a_search(policy, row, problem, len(scene.robots))
+
+
+def answer_to(ask, problem):
+    """What is found, or in words why there is nothing."""
+    try:
+        return ask(problem)
+    except InfeasibleError as error:
+        return str(error)
 
 
 def same_as_a_search(policy, row, problem, robots):

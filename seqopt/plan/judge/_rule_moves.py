@@ -135,9 +135,9 @@ class RuleTables:
         """Yield what follows from states (n, c) by one step each, of those that the rules allow."""
         rows, bricks = np.arange(len(states)), self.bricks_at(level)
         keeps = rows[self.keep(bricks, states)] if bricks else rows
-        begins = self._rules.begin is not None and level == self.first
-        if level == self.last and self._rules.how_it_ends is Ending.ONE_BY_ONE:
-            begins = False  # who stands there against the rules has begun to let go
+        begins = (
+            self._rules.begin is not None and level == self.first and not self._is_let_go(level)
+        )
         able = rows if begins else keeps
         if bricks and self._rules.regrips is not None:
             able = able[states[able, -1] < self._rules.regrips]
@@ -217,7 +217,7 @@ class RuleTables:
             source = np.flatnonzero(states[:, robot] > 0)
             after = states[source]
             after[:, robot] = -after[:, robot] if self._parks else 0
-            if not (level == self.last and ending is Ending.ONE_BY_ONE):
+            if not self._is_let_go(level):
                 ok = self.keep(bricks, after)
                 source, after = source[ok], after[ok]
             yield source, after
@@ -226,6 +226,13 @@ class RuleTables:
             after = states[source]
             after[:, : self.robots] = 0
             yield source, after
+
+    def _is_let_go(self, level: int) -> bool:
+        """Return whether robots let go one by one there, whatever else the rules say, and only so.
+
+        Who stands there against the rules has begun to let go.
+        """
+        return level == self.last and self._rules.how_it_ends is Ending.ONE_BY_ONE
 
     def only_end(self) -> Ints | None:
         """Return the places held (1, robots) in the one state that ends builds, if it is one."""
