@@ -89,3 +89,30 @@ def find_mortar(mortar: Mortar | str) -> Mortar:
             "or bond=STRENGTH (Pa)"
         ) from None
     return bond_mortar(pascal)
+
+
+def mortar_name(mortar: Mortar) -> str:
+    """Return what a mortar is called: as `find_mortar` takes it, or its strengths.
+
+    >>> mortar_name(DRY), mortar_name(bond_mortar(3e3)), mortar_name(Mortar(friction=0.6))
+    ('dry', 'bond=3000', 'dry, friction 0.6')
+    """
+    tension, cohesion = mortar.tensile_strength, mortar.cohesion
+    named = (
+        n for n, m in MORTARS.items() if (m.tensile_strength, m.cohesion) == (tension, cohesion)
+    )
+    bonded = math.isclose(cohesion, tension * (1 + mortar.friction), rel_tol=1e-9)
+    own = (
+        f"bond={tension:.10g}" if bonded else f"{tension:g} Pa in tension, {cohesion:g} Pa in shear"
+    )
+    rough = "" if mortar.friction == _FRICTION else f", friction {mortar.friction:.3g}"
+    return f"{next(named, own)}{rough}"
+
+
+def with_mortar(name: str) -> str:
+    """Return a mortar's name as what a structure stands with.
+
+    >>> with_mortar("dry"), with_mortar("epoxy")
+    ('dry', 'with epoxy')
+    """
+    return name if name.partition(",")[0] == "dry" else f"with {name}"

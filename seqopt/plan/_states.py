@@ -18,7 +18,7 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.orders import AllOrders, OrderSelection
-from seqopt.graph.states._visits import steps_in_hands
+from seqopt.graph.states._visits import barred, steps_in_hands
 from seqopt.graph.states.states import States
 from seqopt.plan._layers import solve_layers
 from seqopt.plan._status import FoundOrder
@@ -228,6 +228,8 @@ def _selected(
     """Return what a formulation says, with numbers where numbers belong; or why there is none."""
     start, name = time.perf_counter(), formulation.name
     solve = partial(formulation.solve, problem, **options)
+    if barred(problem) is not None:  # what every plan passes is asked before any is sought
+        raise confirmed(twin, name, float(options.get("seconds", math.inf)))
     try:
         selection = called(name, partial(_judged, problem), StatePath, solve)
     except InfeasibleError as error:
@@ -296,6 +298,8 @@ def _selected_order(
 ) -> OrderSelection:
     """Return what a formulation says, with numbers where numbers belong; or why there is none."""
     asked, problem = problems
+    if problem.down is None and barred(problem.states) is not None:  # all orders end so
+        raise confirmed(problem.states, found.name, end - time.perf_counter())
     try:
         said = called(found.name, lambda: (_judged_orders(asked), problem), OrderSelection, solve)
     except InfeasibleError as error:

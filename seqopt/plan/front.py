@@ -18,7 +18,7 @@ from seqopt.graph._explore import Explorer, Key, Visited
 from seqopt.graph.graph import Graph
 from seqopt.graph.orders import MOST_PARTS, AllOrders, OrderStates
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
-from seqopt.graph.states._visits import explore, steps_of, steps_with, with_held
+from seqopt.graph.states._visits import barred, explore, steps_of, steps_with, with_held
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import called, readable, text
 from seqopt.plan.calling.formulation import Formulation, On, as_formulation
@@ -200,6 +200,8 @@ class _OrderFront(_StateFront):
         return _OrderFront(replace(self._orders, states=states), self._rounding)
 
     def _explored(self) -> Explorer:
+        if self._orders.down is None and barred(self._orders.states) is not None:
+            raise confirmed(self._orders.states, "the search")  # all orders end so
         found = Explorer(self._space, tell=_require_memory)
         if found.rise():
             return found

@@ -11,7 +11,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.curing import Curing, _find_curing
-from seqopt.contact.mortar import DRY, Mortar, bond_mortar, find_mortar
+from seqopt.contact.mortar import DRY, Mortar, bond_mortar, find_mortar, mortar_name, with_mortar
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.responses._grip_sets import KnownRows
@@ -75,6 +75,16 @@ class Standing:
         """Return whether what meets this demand meets another one."""
         stronger = map(le, astuple(self.mortar), astuple(other.mortar))
         return all(stronger) and self.tilt >= other.tilt
+
+    @property
+    def said(self) -> str:
+        """How it is demanded to stand, in words.
+
+        >>> Standing("dry").said, Standing("epoxy", tilt=0.05).said
+        ('dry', 'with epoxy, tilted by 2.86°')
+        """
+        tilted = f", tilted by {degrees(self.tilt):.3g}°" if self.tilt else ""
+        return f"{with_mortar(mortar_name(self.mortar))}{tilted}"
 
     def described(self) -> dict[str, float | str]:
         """Return the demand, ready for JSON: strengths in Pa, tilt in degrees."""

@@ -10,7 +10,7 @@ the node that it held last, -n.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -136,6 +136,11 @@ class FreeSpace(StateRows):
     def ends_bare(self) -> bool:
         """Whether every build ends in the finished structure that nobody holds."""
         return self.rules.how_it_ends is not Ending.HELD
+
+    def without_choice(self) -> Iterator[tuple[int, Ints]]:
+        """Yield the level and the state (1, c) in which every build ends, if it is one."""
+        if self.ends_bare:
+            yield self.levels, np.zeros_like(self.start())
 
     @property
     def fewest_steps(self) -> int:

@@ -7,7 +7,7 @@ step, each move goes from one step to the next.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
@@ -134,6 +134,13 @@ class ScheduleSpace(StateRows):
     @cached_property
     def _places(self) -> list[Ints]:
         return [np.array([self._place[n] for n in m.candidates]) for m in self.schedule.moves]
+
+    def without_choice(self) -> Iterator[tuple[int, Ints]]:
+        """Yield the levels, last first, of steps without an open grip, and their state (1, r)."""
+        for level, step in reversed([*enumerate(self.schedule.steps, start=1)]):
+            if not any(isinstance(grip, OpenGrip) for grip in step.grips):
+                places = [self._place.get(grip, 0) for grip in step.grips]
+                yield level, np.array([places], dtype=np.int32)
 
     def ended(self, states: Ints) -> Bools:
         """Return which states of the last step end the build: all, (n,) bool."""

@@ -297,6 +297,21 @@ def floors_of_goals(problem: States) -> tuple[float, ...]:
     return tuple(out)
 
 
+def barred(problem: States) -> tuple[int, Ints] | None:
+    """Return a state that every plan passes and that is not allowed; None if there is none.
+
+    Of a free schedule that is the finished structure that nobody holds, of others every step in
+    which no grip is open. Result: its level, and the state (1, c). Without limits and demands
+    nothing is asked.
+    """
+    asked = bool(problem.demands) or any(goal.of_margins for goal in problem.goals)
+    space = FreeStates(problem, standing=asked)
+    for level, state in problem.space.without_choice() if asked or problem.limits else ():
+        if not space.values(level, state, rough=False)[1].all():
+            return level, state
+    return None
+
+
 def explore(
     problem: States,
     ceiling: float = np.inf,
@@ -307,12 +322,14 @@ def explore(
 
     ``ceiling``: the first goal must not take more of a state, where it is about a peak; ``width``:
     from how many new states of a brick count the search goes on, and without regrips; ``tell``:
-    called after every level; may raise to end the search.
+    called after every level; may raise to end the search. Nothing is visited where a state that
+    every plan passes is not allowed.
     """
     asked = bool(problem.demands) or any(goal.of_margins for goal in problem.goals)
     space = FreeStates(problem, regrips=width is None, standing=asked)
     found = Explorer(space, width, tell)
-    found.rise(ceiling)
+    if barred(problem) is None:
+        found.rise(ceiling)
     return found
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import fields, replace
-from functools import partial
+from dataclasses import dataclass, fields, replace
 from itertools import chain, combinations, islice
 
 import numpy as np
 
+from seqopt.arrays import Ints
 from seqopt.engines.registry import recipe_of
 from seqopt.errors import InfeasibleError, SeqoptError, SolverError
 from seqopt.graph._counted import least_by_counts
@@ -19,12 +19,12 @@ from seqopt.graph.layers.costs import Budget, LayeredCosts, _array_by_array, _wh
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.paths import distances, least_peak, tied
 from seqopt.graph.scenarios import engine_for
-from seqopt.graph.states._visits import explore
+from seqopt.graph.states._visits import barred, explore
 from seqopt.graph.states.states import States
 from seqopt.plan.judge._budget_proof import least_within, too_small
 from seqopt.plan.judge._proof import Proof
 from seqopt.plan.judge.certificate import least_sum
-from seqopt.plan.search._margin_search import WORST, bisected, with_margin
+from seqopt.plan.search._margin_search import WORST, StandingLook, bisected, with_margin
 from seqopt.problem.problem import LARGEST, STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
@@ -87,11 +87,37 @@ PROPS = "props that bear any force, both ways"
 CENTERING = "a prop at every brick, if not fewer"
 ARMS = "arms that reach more, or stand elsewhere"
 APART = "arms that are out of each other's way (slimmer, or elsewhere)"
-Look = Callable[[States], Explorer]
 
 
 class _LateError(Exception):
     """Time is over."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """Looks at the states that plans of problems may pass, until a time of the clock."""
+
+    end: float = np.inf
+
+    def tell(self, _: Explorer) -> None:
+        """Raise an error once time is over."""
+        if time.perf_counter() > self.end:
+            raise _LateError
+
+    def __call__(self, problem: States) -> Explorer:
+        """Return the states that plans of a problem may pass."""
+        return explore(problem, tell=self.tell)
+
+    def exists(self, problem: States) -> bool:
+        """Return whether a problem has a plan; what stands is asked of few of its states."""
+        problem = replace(problem, goals=STEPS)
+        if not problem.demands:
+            return self(problem).whole
+        return barred(problem) is None and self.standing(problem).exists(problem)
+
+    def standing(self, problem: States) -> StandingLook:
+        """Return the states of a problem, whether they stand or not, of which that is asked."""
+        return StandingLook(replace(problem, goals=STEPS, standing=None, settled=()), self.tell)
 
 
 def confirmed(problem: States, name: str, seconds: float = np.inf) -> SeqoptError:
@@ -103,12 +129,14 @@ def confirmed(problem: States, name: str, seconds: float = np.inf) -> SeqoptErro
     end, capped = time.perf_counter() + seconds, problem.goals[len(problem.aims) :]
     steps = replace(_with_any_margin(problem), goals=(*STEPS, *capped))
     try:
-        found = explore(steps, tell=partial(_in_time, end))
-        if found.whole and capped:
-            return _over_budget(steps, found, name)
-        if found.whole:
-            return SolverError(f"formulation {name} says that no plan is allowed, and some are")
-        hint = {level: rows for level, _, rows in found.graph().states}
+        hint = None
+        if barred(steps) is None:
+            found = Look(end)(steps)
+            if found.whole and capped:
+                return _over_budget(steps, found, name)
+            if found.whole:
+                return SolverError(f"formulation {name} says that no plan is allowed, and some are")
+            hint = {level: rows for level, _, rows in found.graph().states}
         proven = Proof(steps, hint).is_impossible()
     except _LateError:
         proven = False
@@ -145,11 +173,6 @@ def _with_any_margin(problem: States) -> States:
     return problem
 
 
-def _in_time(end: float, _: Explorer) -> None:
-    if time.perf_counter() > end:
-        raise _LateError
-
-
 def _why_impossible(problem: States, seconds: float = np.inf) -> str:
     """Return why no plan is allowed, in a line.
 
@@ -160,7 +183,7 @@ def _why_impossible(problem: States, seconds: float = np.inf) -> str:
     """
     engine = getattr(problem.engine, "rigid", problem.engine)
     problem = _with_any_margin(replace(problem, engine=engine))
-    look = partial(explore, tell=partial(_in_time, time.perf_counter() + seconds))
+    look = Look(time.perf_counter() + seconds)
     where = "no plan is allowed"
     try:
         where = _where(problem, look)
@@ -171,6 +194,8 @@ def _why_impossible(problem: States, seconds: float = np.inf) -> str:
 
 def _where(problem: States, look: Look) -> str:
     placed = problem.network.scene.placed
+    if (state := barred(replace(problem, goals=STEPS))) is not None:
+        return _barred_said(problem, *state)
     stops = look(replace(problem, goals=STEPS)).reached
     if isinstance(problem.rules, Schedule):
         return f"step {stops + 1} of {problem.space.levels} has no state that is allowed"
@@ -183,8 +208,46 @@ def _where(problem: States, look: Look) -> str:
     return f"after brick {placed[last - 1].name} the build cannot end"
 
 
+def _barred_said(problem: States, level: int, state: Ints) -> str:
+    """Return which state that every plan passes is not allowed, and why, in words."""
+    bricks, each = problem.space.bricks_at(level), problem.each or (problem,)
+    what = f"step {level} of {problem.space.levels}, in which no grip is open,"
+    if _is_bare_end(problem, level, state):
+        what = "the finished structure, which nobody holds,"
+    for one in each:
+        if not one.values(level, state)[1].all():
+            return f"{what} {_excess_said(one, level, state)}"
+    held = (one.stability.may_stand(bricks, *one._grips(state, stand=True)) for one in each)
+    how = "is not proven to stand" if all(map(np.all, held)) else "does not stand"
+    demand = next(iter(problem.demands), None)
+    return f"{what} {how}{'' if demand is None else f' {demand.said}'}"
+
+
+def _is_bare_end(problem: States, level: int, state: Ints) -> bool:
+    """Return whether a state is the finished structure that nobody holds."""
+    whole = problem.space.bricks_at(level) == len(problem.network.inner)
+    return whole and not problem.space.grips(state).any()
+
+
+def _excess_said(problem: States, level: int, state: Ints) -> str:
+    """Return which limits a state exceeds, in words."""
+    found, _ = problem.responses(level, state)
+    over = [
+        f"{each.response}={found[each.response][0]:.6g} instead of {each.bound:g}"
+        for each in problem.limits
+        if each.response in found and each.exceeded(found[each.response]).any()
+    ]
+    return f"has {' and '.join(over)}" if over else "asks more of robots than they carry"
+
+
 def _what_helps(problem: States, look: Look) -> str:
     """Return what opens a way, as the end of a line."""
+    state = barred(replace(problem, goals=STEPS))
+    if state is not None and _is_bare_end(problem, *state):  # whatever robots do
+        ways = [*_supporting(problem, look), *_limiting(problem, look)]
+        if not ways:
+            return "; no robot helps: it needs more bond or friction, less load, or other limits"
+        return f"; it becomes possible with {' or '.join(_enough(problem, w, look) for w in ways)}"
     ways = [*_opening(problem, look)]
     if {*ways} <= {ARMS, APART}:  # of the same arms two rules may ask less
         arms = (ARMS, APART) if ways else ()
@@ -201,30 +264,35 @@ def _opening(problem: States, look: Look) -> Iterator[str]:
     done: set[str] = set()
     for text, rules in _loosened(problem):
         rule = text.partition("=")[0]
-        if rule not in done and look(replace(problem, rules=rules)).whole:
+        if rule not in done and look.exists(replace(problem, rules=rules)):
             done.add(rule)
             yield text
     yield from _supporting(problem, look)
     scene = problem.network.scene  # robots without arms hold as others with joints that are rigid
     able = scene.has_arms and not scene.grip_kinds.arms.any() and recipe_of(problem.engine)
-    if able and look(_with_arms(problem, lambda _: None)).whole:
+    if able and look.exists(_with_arms(problem, lambda _: None)):
         alone = _with_arms(problem, lambda arm: arm and replace(arm, keeps_apart=False))
-        yield APART if look(alone).whole else ARMS
+        yield APART if look.exists(alone) else ARMS
     if recipe_of(problem.engine) and not (scene.has_arms or problem.scenarios):
-        yield from _enough_reach(scene, lambda other: look(_in_scene(problem, other)).whole)
+        yield from _enough_reach(scene, lambda other: look.exists(_in_scene(problem, other)))
+    yield from _limiting(problem, look)
+
+
+def _limiting(problem: States, look: Look) -> Iterator[str]:
+    """Yield the limits without which alone there is a plan, by their responses."""
     for limit in problem.limits:
         rest = tuple(other for other in problem.limits if other is not limit)
-        if look(replace(problem, limits=rest)).whole:
+        if look.exists(replace(problem, limits=rest)):
             yield limit.response
 
 
 def _supporting(problem: States, look: Look) -> Iterator[str]:
     """Yield what alone is enough for states to stand: no need to, or robots that carry more."""
-    if problem.demands and look(replace(problem, standing=None, settled=())).whole:
+    if problem.demands and look.exists(replace(problem, standing=None, settled=())):
         yield STANDING
     kept = isinstance(problem.rules, FreeRules) and problem.rules.payload is Payload.KEPT
     able = problem.demands and kept and recipe_of(problem.engine) and not problem.scenarios
-    if able and look(_carrying(problem, LARGE)).whole:
+    if able and look.exists(_carrying(problem, LARGE)):
         yield PAYLOADS
 
 
@@ -238,7 +306,7 @@ def _propped(problem: States, look: Look) -> Iterator[str]:
     held = {node for site in sites if site is not None for node in site.holds(scene)}
     props = (prop for prop in scene.with_centering().props if prop.node not in held)
     propped = _in_scene(problem, scene.with_props(*props))
-    if look(replace(propped, goals=STEPS)).whole:
+    if look.exists(propped):
         yield CENTERING
 
 
@@ -274,8 +342,11 @@ def _enough(problem: States, way: str, look: Look) -> str:
     if way == STANDING and not any(demand.tilt for demand in problem.demands):
         own, bare = problem.standing or Standing(), replace(problem, settled=(), goals=STEPS)
 
+        states = look.standing(bare)
+
         def exists(bond: float) -> bool:
-            return look(replace(bare, standing=own.demanding("bond", bond))).whole
+            asked = states.proving(replace(bare, standing=own.demanding("bond", bond)))
+            return barred(asked) is None and states.exists(asked)
 
         try:
             enough = bisected("bond", exists)[1]
@@ -284,7 +355,7 @@ def _enough(problem: States, way: str, look: Look) -> str:
         digit = 10.0 ** (math.floor(math.log10(enough)) - 2) if enough else 1.0
         return f"a bond of {math.ceil(enough / digit) * digit:.10g} Pa"
     if way == PAYLOADS:
-        return _enough_payload(problem, lambda payload: look(_carrying(problem, payload)).whole)
+        return _enough_payload(problem, lambda payload: look.exists(_carrying(problem, payload)))
     if way == IGNORED and isinstance(problem.rules, FreeRules):
         rules = replace(problem.rules, payload=Payload.IGNORED)
         newton = math.ceil(worst_least(replace(problem, rules=rules), LARGEST, look))
@@ -333,7 +404,10 @@ def _typed(way: str) -> str:
     return f"{way} (--rule {' --rule '.join(rules)})" if known else way
 
 
-def worst_least(problem: States, response: str, look: Look = explore) -> float:
+LOOK = Look()
+
+
+def worst_least(problem: States, response: str, look: Look = LOOK) -> float:
     """Return the least worst value of a response that a plan within the other limits reaches.
 
     ``response``: one of `seqopt.problem.problem.STATE_RESPONSES`, or ``bond``; ``look``:

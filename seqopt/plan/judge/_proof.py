@@ -101,6 +101,11 @@ class Passable:
         none = np.full(len(goals), -np.inf)
         return tuple(float(known.get(goal.measure, none)[k]) for k, goal in enumerate(goals))
 
+    def bars(self, margins: Sequence[float]) -> bool:
+        """Return whether a state that every plan passes is not allowed, or lacks such margins."""
+        asked = Asked((), margins, exact=True)
+        return any(not self.valued(*state, asked)[1].all() for state in self.tables.certain())
+
     def closed(self, level: int, entries: Ints, asked: Asked) -> Closed:
         """Return the states that are reached from some without placing a brick.
 
@@ -330,6 +335,9 @@ class Proof:
         ``margins``: of the first goals.
         """
         caps = self._passable.problem.budgets
+        if self._passable.bars(margins):
+            self.states = max(self.states, 1)
+            return True
         if self._passable.stands.asked(margins) and not caps:
             return self._cuts(margins)
         graph = _Levels(self._passable, self._told, Asked((), margins)).graph()

@@ -239,6 +239,11 @@ class RuleTables:
         held = self._rules.how_it_ends is Ending.HELD
         return None if held else np.zeros((1, self.robots), dtype=np.int64)
 
+    def certain(self) -> Iterator[tuple[int, Ints]]:
+        """Yield the level and the places held (1, robots) in states that every build passes."""
+        if (end := self.only_end()) is not None:
+            yield self.last, end
+
     def least_steps(self) -> int:
         """Return how many steps a build has at least.
 
@@ -389,6 +394,14 @@ class ScheduleTables:
         """Return the places that a hold may take."""
         nodes = (hold.node,) if hold.move is None else self._schedule.moves[hold.move].candidates
         return np.array([self._place[node] for node in nodes if node is not None], dtype=np.int64)
+
+    def certain(self) -> Iterator[tuple[int, Ints]]:
+        """Yield the level and the places held (1, robots) of steps in which no hold is chosen."""
+        for level in range(self.last, 0, -1):
+            own = [self._holds.get((robot, self._before + level)) for robot in range(self.robots)]
+            if all(hold is None or hold.move is None for hold in own):
+                places = [0 if hold is None else self._wanted(hold)[0] for hold in own]
+                yield level, np.array([places], dtype=np.int64)
 
     def only_end(self) -> Ints | None:
         """Return the places held (1, robots) in the last step, if all builds end alike."""

@@ -36,18 +36,18 @@ def best_margin(
     ``states``: of a plan that does, level and state, one of few steps.
     Raises `InfeasibleError` if there is no plan, whatever the margin.
     """
-    name, look = problem.goals[0].response, _Look(problem, tell)
+    name, look = problem.goals[0].response, StandingLook(problem, tell)
     if problem.demands and not look.exists(look.demanding(WORST[name])):
         raise InfeasibleError("no plan of the free schedule stands as is demanded")
     low, high = bisected(name, lambda value: look.exists(look.demanding(value)))
     return high, low, look.demanding(high, problem.goals[1:] or STEPS), look.found
 
 
-class _Look:
+class StandingLook:
     """The states of a problem that are within limits, and what is known of how they stand."""
 
     def __init__(self, problem: States, tell: Callable[[Explorer], object]) -> None:
-        self._problem, self._name = problem, problem.goals[0].response
+        self._problem = problem
         self._first: States | None = None  # with whom all others share their proofs
         steps = replace(problem, goals=STEPS, budgets=())
         self._found = Explorer(FreeStates(steps), tell=tell)
@@ -61,11 +61,15 @@ class _Look:
 
     def demanding(self, value: float, goals: tuple[Goal, ...] = STEPS) -> States:
         """Return the problem in which every state must stand with a value as well."""
-        found = replace(with_margin(self._problem, self._name, value), goals=goals)
-        first = self._first = self._first or found
-        for one, other in zip(found.each or (found,), first.each or (first,), strict=True):
+        name = self._problem.goals[0].response
+        return self.proving(replace(with_margin(self._problem, name, value), goals=goals))
+
+    def proving(self, asked: States) -> States:
+        """Return a problem with other demands that shares what was proven with those before."""
+        first = self._first = self._first or asked
+        for one, other in zip(asked.each or (asked,), first.each or (first,), strict=True):
             one.stability.share(other.stability)
-        return found
+        return asked
 
     def exists(self, asked: States) -> bool:
         """Return whether there is a plan all of whose states stand as is demanded; keep one."""
