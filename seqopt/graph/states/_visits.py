@@ -304,9 +304,9 @@ def barred(problem: States) -> tuple[int, Ints] | None:
     which no grip is open. Result: its level, and the state (1, c). Without limits and demands
     nothing is asked.
     """
-    asked = bool(problem.demands) or any(goal.of_margins for goal in problem.goals)
-    space = FreeStates(problem, standing=asked)
-    for level, state in problem.space.without_choice() if asked or problem.limits else ():
+    space = FreeStates(problem, standing=bool(problem.demands))
+    asked = problem.demands or problem.limits
+    for level, state in problem.space.without_choice() if asked else ():
         if not space.values(level, state, rough=False)[1].all():
             return level, state
     return None

@@ -1,0 +1,124 @@
+"""States that every plan passes are asked before any plan is sought, the whole first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import seqopt
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import InfeasibleError
+from seqopt.graph import Explorer
+from seqopt.graph.orders import AllOrders
+from seqopt.graph.states._visits import FreeStates, barred, explore
+from seqopt.graph.states.states import build_states
+from seqopt.network.build import build_network
+from seqopt.plan.front import _OrderFront, _StateFront, find_front
+from seqopt.plan.judge._proof import Proof
+from seqopt.problem.criteria import WorstRatio
+from seqopt.problem.requirements import Limit
+from seqopt.scene.scene_file import load_scene
+from seqopt.sequence.rules import FreeRules
+from seqopt.sequence.three_robots import three_robot_loop
+from tests.builders import small_arch
+from tests.strategies import free_builds
+
+ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
+END = r"the finished structure, which nobody holds, "
+
+
+def windy(wind, stands="dry", limits=(), bricks=5, rules=None):
+    """An arch in wind along it, over the weight of every brick, all of whose states must stand."""
+    scene = replace(small_arch(bricks), wind=(wind, 0.0, 0.0))
+    engine = seqopt.make_engine("compliance", build_network(scene))
+    return build_states(engine, rules or FreeRules(), ONES, "steps", limits, stands)
+
+
+@pytest.mark.parametrize("formulation", ["schedule_search", "path_beam"])
+def test_that_the_whole_falls_is_known_before_a_plan_is_sought(formulation):
+    """It was found after all states that are reached, and told of the brick where they ended."""
+    problem = windy(0.6)
+    with pytest.raises(InfeasibleError, match=END + "does not stand dry; .* a bond of") as found:
+        seqopt.solve(problem, formulation)
+    assert "claimed" not in str(found.value)
+    assert problem.stability.looked_at == 1
+    proof = Proof(replace(problem))
+    assert proof.is_impossible()
+    assert proof.states == 1
+    calm = windy(0.0)
+    assert barred(calm) is None
+    assert not Proof(calm).is_impossible()
+
+
+def test_the_bond_that_is_said_is_enough_and_hardly_less_is_not():
+    with pytest.raises(InfeasibleError) as found:
+        seqopt.solve(windy(0.6), "schedule_search")
+    (pascal,) = (float(word) for word in str(found.value).split() if word.isdigit())
+    assert seqopt.solve(windy(0.6, f"bond={pascal}"), "schedule_search").steps
+    with pytest.raises(InfeasibleError):
+        seqopt.solve(windy(0.6, f"bond={0.9 * pascal}"), "schedule_search")
+
+
+def test_no_robot_is_advised_for_what_nobody_holds():
+    """Two faults at once: it falls, and a limit on what robots hold leaves no build either."""
+    problem = windy(0.6, limits=[Limit("F_largest", 1e-3)])
+    with pytest.raises(InfeasibleError, match=END + "does not stand dry; no robot helps: it needs"):
+        seqopt.solve(problem, "schedule_search")
+
+
+def test_a_limit_that_the_whole_exceeds_is_named():
+    problem = windy(0.1, "epoxy", limits=[Limit("D_max", 1e-9)])
+    with pytest.raises(InfeasibleError, match=END + r"has D_max=\S+ instead of 1e-09; it becomes"):
+        seqopt.solve(problem, "schedule_search")
+    assert problem.stability.looked_at == 0
+
+
+def test_all_orders_and_fronts_end_in_it_too():
+    problem = windy(0.6)
+    with pytest.raises(InfeasibleError, match=END):
+        seqopt.solve(AllOrders(problem), "order_search")
+    with pytest.raises(InfeasibleError, match=END):
+        find_front(_StateFront(problem, None))
+    with pytest.raises(InfeasibleError, match=END):
+        find_front(_OrderFront(AllOrders(problem), None))
+
+
+def test_a_step_without_an_open_grip_is_asked_before_those_with_one():
+    """In the loop of three robots two steps have none; a storm is more than robots hold."""
+    network = build_network(replace(load_scene("arch25"), wind=(0.0, 30.0, 0.0)))
+    engine, loop = seqopt.make_engine("compliance", network), three_robot_loop(network)
+    problem = build_states(engine, loop, ONES, "minmax", stands="dry")
+    assert [level for level, _ in problem.space.without_choice()] == [2, 1]
+    level, state = barred(problem)
+    assert (level, problem.space.grips(state).tolist()) == (2, [2])
+    assert Proof(replace(problem)).is_impossible()
+    said = "step 2 of 90, in which no grip is open, does not stand dry"
+    with pytest.raises(InfeasibleError, match=said):
+        seqopt.solve(problem, "schedule_search", time_limit=1.0)
+    calm = build_states(
+        ComplianceEngine(build_network(load_scene("arch25"))), loop, ONES, stands="dry"
+    )
+    assert barred(calm) is None
+
+
+@given(build=free_builds(most_bricks=3, most_robots=2), limit=st.floats(-12.0, -4.0))
+@settings(max_examples=15, deadline=None)
+def test_where_it_says_that_no_plan_is_there_is_none(build, limit):
+    """By all states, none left out, and by the judge; where it says nothing, they decide."""
+    scene, rules = build
+    engine = ComplianceEngine(build_network(scene))
+    problem = build_states(engine, rules, ONES, "steps", [Limit("D_max", 10.0**limit)])
+    every = Explorer(FreeStates(replace(problem)))
+    found = every.rise()
+    assert explore(problem).whole == found
+    assert Proof(problem).is_impossible() == (not found)
+    if barred(problem) is not None:
+        assert not found
+        level, state = barred(problem)
+        assert problem.space.ended(state).all()
+        assert level == len(scene.bricks)
+        assert not np.any(state)
