@@ -92,11 +92,11 @@ class Passable:
         Every move to the one end that builds have is a cut. Minus infinity where nothing is known.
         """
         goals, tables = self.problem.goals, self.tables
-        end, counted = tables.only_end(), float(tables.least_steps())
+        end, counted = dict(tables.certain()).get(tables.last), float(tables.least_steps())
         last = np.full((1, len(goals)), -np.inf if end is None else 0.0)
         if end is not None and tables.bricks_at(tables.last):
-            asked = Asked(exact=True)
-            last = self._answers(tables.bricks_at(tables.last), end, asked, np.inf)[0]
+            bricks, held = tables.bricks_at(tables.last), self._held(end, self._most, self._beyond)
+            last = self._answers(bricks, held[0], Asked(exact=True), np.inf)[0]
         known = {Measure.PEAK: last[0], Measure.STEPS: np.full(len(goals), counted)}
         none = np.full(len(goals), -np.inf)
         return tuple(float(known.get(goal.measure, none)[k]) for k, goal in enumerate(goals))
@@ -140,9 +140,7 @@ class Passable:
         if not self.tables.bricks_at(level):
             return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
         held, payload = self._held(states, self._most, self._beyond)
-        most, margins, _ = asked
-        k = self.margins
-        below = np.inf
+        (most, margins, _), k, below = asked, self.margins, np.inf
         if len(most) > k and goals[k].measure is Measure.PEAK:
             below = tied(most[k])
         values, forces, ok = self._answers(self.tables.bricks_at(level), held, asked, below)
@@ -291,8 +289,7 @@ class Proof:
         """Return the same for plans within budgets, by prices that a formulation gives."""
         caps, margins = self._passable.problem.budgets, values[: self._passable.margins]
         stand = margins if self._passable.stands.asked(margins) else None
-        asked = Asked(values, stand, exact=True)
-        levels = _Levels(self._passable, self._told, asked)
+        levels = _Levels(self._passable, self._told, Asked(values, stand, exact=True))
         self.states = sum(map(len, levels.states))
         return budget_bounds(levels.graph(), values, claimed, (caps, prices))
 
@@ -386,10 +383,8 @@ class Proof:
 
     def _is_better(self, values: Sequence[float], bounds: Sequence[float]) -> int | None:
         """Return the first goal whose bound leaves room for a better plan; None if none does."""
-        for k in range(self._passable.margins, len(values)):
-            if not bounds[k] >= values[k] - BELOW * abs(values[k]):
-                return k
-        return None
+        room = [not b >= v - BELOW * abs(v) for v, b in zip(values, bounds, strict=False)]
+        return next((k for k in range(self._passable.margins, len(room)) if room[k]), None)
 
     def _fallen(self, levels: _Levels, graph: Graph, values: Sequence[float]) -> Ints:
         """Return the states of a path that would be better that are proven to fall."""

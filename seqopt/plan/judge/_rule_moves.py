@@ -234,15 +234,10 @@ class RuleTables:
         """
         return level == self.last and self._rules.how_it_ends is Ending.ONE_BY_ONE
 
-    def only_end(self) -> Ints | None:
-        """Return the places held (1, robots) in the one state that ends builds, if it is one."""
-        held = self._rules.how_it_ends is Ending.HELD
-        return None if held else np.zeros((1, self.robots), dtype=np.int64)
-
     def certain(self) -> Iterator[tuple[int, Ints]]:
         """Yield the level and the places held (1, robots) in states that every build passes."""
-        if (end := self.only_end()) is not None:
-            yield self.last, end
+        if self._rules.how_it_ends is not Ending.HELD:
+            yield self.last, np.zeros((1, self.robots), dtype=np.int64)
 
     def least_steps(self) -> int:
         """Return how many steps a build has at least.
@@ -400,13 +395,7 @@ class ScheduleTables:
         for level in range(self.last, 0, -1):
             own = [self._holds.get((robot, self._before + level)) for robot in range(self.robots)]
             if all(hold is None or hold.move is None for hold in own):
-                places = [0 if hold is None else self._wanted(hold)[0] for hold in own]
-                yield level, np.array([places], dtype=np.int64)
-
-    def only_end(self) -> Ints | None:
-        """Return the places held (1, robots) in the last step, if all builds end alike."""
-        fixed = all(grip is None for grip in self._schedule.steps[-1].grips)
-        return np.zeros((1, self.robots), dtype=np.int64) if fixed else None
+                yield level, np.array([[0 if h is None else self._wanted(h)[0] for h in own]])
 
     def least_steps(self) -> int:
         """Return how many steps a build has."""
