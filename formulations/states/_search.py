@@ -279,20 +279,16 @@ def after_margins(problem: States, search: Search, tell: Watching) -> StatePath:
 
 
 def narrow(
-    problem: States,
-    width: int,
-    tell: Watching,
-    most: Sequence[float] | None = None,
-    enough: float = -np.inf,
+    problem: States, width: int, tell: Watching, most: Sequence[float] | None = None
 ) -> StatePath | None:
     """Return the best plan through a few states of every brick count, if there is one.
 
     Where states must stand it is asked of all of them only if the best paths fall; ``most``: what
-    goals may take of it, whether states stand or not; ``enough``: as of `Explorer`.
+    goals may take of it, whether states stand or not.
     """
     for standing in (False, True)[: 1 + bool(problem.demands)]:
         space = FreeStates(problem, regrips=False, standing=standing)
-        found = Explorer(space, width, tell, enough)
+        found = Explorer(space, width, tell)
         if found.rise(np.inf if most is None else most[0]):
             visited, best = exact_best(found, problem.budgets)
             if most is not None and not all(map(le, best.values, most)):

@@ -14,21 +14,29 @@ in their order,
    g(s_1, \dots, s_N) = \sum_i c(s_{i-1}, s_i),
 
 with :math:`v` the value of a state and :math:`c` the cost of a step. A narrow search without
-regrips, which keeps the best states of every brick count, gives a first plan. It is the best if it
+regrips, which keeps the best states of every brick count, gives an incumbent. It is the best if it
 takes no more than what all plans have in common: the finished structure at their end, and as many
-steps as bricks and robots call for. Where there are many states a second one, somewhat wider, keeps
-any of those that take no more. Where states must stand or be good in scenarios, which is dear
-to ask of them all, it is sought without that, and kept only if it is then the best; what the best
-plan of the first scenario takes in all is then where the threshold starts. It rises until states
-below it connect the empty site to an end; responses are computed only for states next to those that
-are reached below it, and with six digits until their value is close to that of the plan. Among
-these every goal is a shortest path, with the maximum instead of the sum for a peak; what is not on
-a best path of one goal is left out before the next. Whether states stand is asked only of those on
-the best path; where one falls, the next best path is sought without it (Dellin and Srinivasa, A
-unifying formalism for shortest path problems with expensive edge evaluations via lazy best-first
-search over paths with edge selectors, 2016). A margin of stability comes first: the best
-one with which states still connect both ends is found by halving an interval, and all further
-states must have it.
+steps as bricks and robots call for. If not, let its first goal be :math:`z`. The set
+
+.. math::
+
+   R(t) = \{ s : \text{a path from the start to } s \text{ has } v < t \text{ throughout} \}
+
+grows with a rising threshold :math:`t`. While :math:`R(t)` has no end, the least :math:`v` next to
+it is a lower bound. Where it has one there is a better incumbent, which a *dive* finds early: it
+visits the states of :math:`R(t)` with the most bricks first, few at a time. When :math:`R(z)` has
+no end, the states next to it are a cut: :math:`z` is the least worst value, and no response was
+computed beyond that cut but for the dives. Later goals need the states that take :math:`z` too;
+among these every goal is a shortest path, and what is on none is left out before the next.
+
+Responses have six digits until these do not decide. Where states must stand or be good in
+scenarios, which is expensive, a first plan is sought without that, and kept only if it is then the
+best; what the best plan of the first scenario takes in all is then where the threshold starts.
+Whether states stand is asked only of those on the best path; where one falls, the next best path is
+sought without it (Dellin and Srinivasa, A unifying formalism for shortest path problems with
+expensive edge evaluations via lazy best-first search over paths with edge selectors, 2016). A
+margin of stability comes first: the best one with which states still connect both ends is found by
+halving an interval, and all further states must have it.
 """
 
 from __future__ import annotations
@@ -36,7 +44,6 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import groupby
-from math import comb
 from operator import itemgetter, le
 
 import numpy as np
@@ -58,7 +65,7 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph._budgets import is_beyond
 from seqopt.graph._explore import Explorer
 from seqopt.graph.instances.instance import Instance
-from seqopt.graph.paths import distances, lexicographic, tied
+from seqopt.graph.paths import distances, lexicographic, strictly_below, tied
 from seqopt.graph.states._visits import FreeStates, floors_of_goals
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
@@ -67,8 +74,6 @@ from seqopt.problem.problem import Measure
 from seqopt.work.progress import Tell
 
 FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
-MANY = 500_000  # grip sets, about: to look at all takes longer than a second narrow search
-WIDER = 4  # how many times as wide that one is
 
 
 def solve(
@@ -100,7 +105,7 @@ def solve(
         return best_total(problem, shortest, Watch(seconds), tell)
     dear = bool(problem.demands or problem.each) and min(seconds, max_memory) == np.inf
     options = _Options(width, growth, dear)
-    return after_margins(problem, lambda rest: _search(rest, options, tell), tell)
+    return after_margins(problem, lambda rest: _Search(rest, options, tell).run(), tell)
 
 
 @dataclass(frozen=True)
@@ -110,40 +115,89 @@ class _Options:
     width: int
     growth: float
     dear: bool
-    enough: float = -np.inf
 
 
-def _search(problem: States, options: _Options, tell: Watching) -> StatePath:
-    """Return the best path, or the first one found where the search is stopped."""
-    floors = tuple(map(tied, floors_of_goals(problem)))
-    found, proven = None, [floors[0]]
-    wide = Explorer(FreeStates(problem), tell=tell)
-    many = comb(2 * len(problem.network.inner), problem.space.robots) * problem.space.levels > MANY
-    try:
-        wider = replace(options, width=WIDER * options.width, enough=floors[0])
-        for each in (options, wider)[: 1 + many]:
-            plans = [found, _first(problem, each, floors, tell)]
-            found = min(filter(None, plans), key=lambda p: p.objective, default=None)
+class _Search:
+    """A search on its way: the incumbent, the lower bound of the first goal, and what is visited.
+
+    ``cuts``: whether a cut proves the first goal: it is a worst value, and there are no budgets.
+    """
+
+    def __init__(self, problem: States, options: _Options, tell: Watching = lambda _: None) -> None:
+        self._problem, self._options, self._tell = problem, options, tell
+        self._peak = problem.goals[0].measure is Measure.PEAK
+        self._cuts = self._peak and not problem.budgets
+        self._wide = Explorer(FreeStates(problem), tell=tell)
+        self.incumbent: StatePath | None = None
+        self.bound = -np.inf
+
+    def run(self) -> StatePath:
+        """Return the best path, or the incumbent where the search is stopped."""
+        problem, floors = self._problem, tuple(map(tied, floors_of_goals(self._problem)))
+        self.bound = floors[0]
+        try:
+            self.incumbent = found = self._first(floors)
             if found and not problem.budgets and all(map(le, found.objective, floors)):
                 return found  # no plan is better
-        ceiling = found.objective[0] if found else np.inf
-        if found is None and problem.budgets:
-            _require_room(problem, tell)
-        return _best(problem, wide, (ceiling, options.growth), proven)
-    except (StopError, KeyboardInterrupt) as stop:
-        return _unproven(plan_by_then(found, stop), wide, proven[-1])
+            if found is None and problem.budgets:
+                _require_room(problem, self._tell)
+            return self.best()
+        except (StopError, KeyboardInterrupt) as stop:
+            return _unproven(plan_by_then(self.incumbent, stop), self._wide, self.bound)
 
+    def _first(self, floors: tuple[float, ...]) -> StatePath | None:
+        """Return a first plan; where that is expensive, only if it takes no more than floors."""
+        problem, width = self._problem, self._options.width
+        most = floors if self._options.dear else None
+        if most and problem.each and not problem.demands:
+            found = _in_all(problem, narrow(problem.each[0], width, self._tell, most), floors)
+            if found:
+                return found
+        return narrow(problem, width, self._tell, most)
 
-def _first(
-    problem: States, options: _Options, floors: tuple[float, ...], tell: Watching
-) -> StatePath | None:
-    """Return a first plan; where that is dear, only if it takes no more than floors of goals."""
-    most, enough = floors if options.dear else None, options.enough
-    if options.dear and problem.each and not problem.demands:
-        found = _in_all(problem, narrow(problem.each[0], options.width, tell, most, enough), floors)
-        if found:
-            return found
-    return narrow(problem, options.width, tell, most, enough)
+    def best(self) -> StatePath:
+        """Return the best plan, by a threshold that rises until states below it reach an end."""
+        problem, threshold = self._problem, -np.inf
+        if self.incumbent or not self._peak:
+            threshold = max(self._ceiling / FAR_BELOW, self.bound)
+        if problem.each and self._peak:
+            threshold = max(_of_one(problem, self._options), self.bound)
+        below = self._ceiling if self._cuts else np.inf
+        while True:
+            if self._cuts and self._dives(threshold, below):
+                threshold = below = self._ceiling
+                continue
+            if self._wide.rise(threshold, below):
+                with suppress(InfeasibleError):  # of what stands
+                    return best_standing(problem, self._wide)
+            lower = self._wide.excluded
+            if self.incumbent and lower >= strictly_below(below):
+                if len(problem.goals) == 1:
+                    return replace(self.incumbent, visited=self._wide.visited())
+                threshold, below = below, np.inf  # later goals need the states that take as much
+                continue
+            if lower == np.inf:
+                raise InfeasibleError("no plan is allowed")
+            # of a state that every plan would have to pass, or a larger
+            self.bound = max(self.bound, lower)
+            grown = threshold * self._options.growth if np.isfinite(threshold) else -np.inf
+            threshold = max(lower, min(self._ceiling, grown))
+
+    @property
+    def _ceiling(self) -> float:
+        return self.incumbent.objective[0] if self.incumbent else np.inf
+
+    def _dives(self, threshold: float, below: float) -> bool:
+        """Return whether a dive finds a better incumbent; what it visits in vain stays visited."""
+        if not np.isfinite(threshold) or (np.isinf(below) and self.incumbent):
+            return False
+        trial = self._wide.copy()
+        if trial.dive(threshold, below):
+            with suppress(InfeasibleError):  # of what stands
+                self.incumbent = best_standing(self._problem, trial)
+                return True
+        self._wide = trial
+        return False
 
 
 def _require_room(problem: States, tell: Watching) -> None:
@@ -154,39 +208,15 @@ def _require_room(problem: States, tell: Watching) -> None:
         raise InfeasibleError("no plan is within all budgets")
 
 
-def _best(
-    problem: States, wide: Explorer, options: tuple[float, float], proven: list[float]
-) -> StatePath:
-    """Return the best plan below the lowest threshold of a rising row that connects both ends.
-
-    What is proven of the first goal is added to a list on the way.
-    """
-    threshold, (ceiling, growth) = -np.inf, options
-    if np.isfinite(ceiling) or problem.goals[0].measure is not Measure.PEAK:
-        threshold = max(ceiling / FAR_BELOW, proven[0])
-    if problem.each and problem.goals[0].measure is Measure.PEAK:
-        threshold = max(_of_one(problem, options), proven[0])
-    while True:
-        if wide.rise(threshold):
-            with suppress(InfeasibleError):  # of what stands
-                return best_standing(problem, wide)
-        if wide.excluded == np.inf:
-            raise InfeasibleError("no plan is allowed")
-        # of a state that every plan would have to pass, or a larger
-        proven.append(max([wide.excluded, *proven[-1:]]))
-        grown = threshold * growth if np.isfinite(threshold) else -np.inf
-        threshold = max(wide.excluded, min(ceiling, grown))
-
-
-def _of_one(problem: States, options: tuple[float, float]) -> float:
+def _of_one(problem: States, options: _Options) -> float:
     """Return what the plan that is best in the first scenario takes in all; at least in that one.
 
     What is below the former is enough to be looked at, where that plan is allowed in all.
     """
     first = replace(problem.each[0], goals=problem.aims, budgets=())  # budgets are of the scene
-    found = narrow(first, WIDTH, lambda _: None)
-    ceiling = np.inf if found is None else found.objective[0]
-    one = _best(first, Explorer(FreeStates(first)), (ceiling, options[1]), [-np.inf])
+    search = _Search(first, options)
+    search.incumbent = narrow(first, WIDTH, lambda _: None)
+    one = search.best()
     inside = _in_all(problem, one, (np.inf,) * len(problem.goals))
     return (inside or one).objective[0]
 

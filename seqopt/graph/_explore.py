@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
+from copy import copy
 from itertools import accumulate
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.graph import Graph, Rows
+from seqopt.graph.paths import strictly_below
 
 PENDING, OPEN, CLOSED = 0, 1, 2  # of a state: above the threshold, visited, not allowed
 Key: TypeAlias = Any  # which part, whatever a space calls it; it can be hashed
@@ -49,6 +51,13 @@ class Part:
             self._codes = np.insert(self._codes, at[new], distinct[new])
             self._rows = np.insert(self._rows, at[new], rows[new])
         return rows[back]
+
+    def copy(self) -> Part:
+        """Return a part that grows by itself."""
+        out = copy(self)
+        for name in ("values", "mark", "exact", "floor"):
+            setattr(out, name, getattr(self, name).copy())
+        return out
 
     def value(self, valued: Valued) -> None:
         """Value the states that were added since the last time."""
@@ -97,6 +106,7 @@ class Visited(NamedTuple):
         ]
 
 
+FEW = 8  # states that a dive visits at a time
 BAND = 1e-5  # share of a value within which six digits do not decide
 
 
@@ -162,6 +172,11 @@ class _Space(Protocol):
         """Return in which states (n, c) of the last level a build may end, (n,)."""
 
 
+def _least(part: Part, rows: Ints, count: int) -> Ints:
+    """Return so many of some rows, those of least value."""
+    return rows[np.argsort(part.values[rows, 0], kind="stable")[:count]]
+
+
 class Explorer:
     """The states of a space that are reached through states below a threshold, which may rise.
 
@@ -173,8 +188,6 @@ class Explorer:
         only by moves that take nothing; from all by default.
     tell : callable, optional
         Called after every part of which states were visited; may raise to end the search.
-    enough : float, optional
-        Where there is a width, states of no larger value are as good as each other: some of them.
 
     Attributes
     ----------
@@ -195,10 +208,8 @@ class Explorer:
         space: _Space,
         width: int | None = None,
         tell: Callable[[Explorer], object] = lambda _: None,
-        enough: float = -np.inf,
     ) -> None:
-        self._space, self._width, self._tell, self._enough = space, width, tell, enough
-        self._draws = np.random.default_rng(0)
+        self._space, self._width, self._tell = space, width, tell
         key, states = space.start()
         self._parts: list[dict[Key, Part]] = [{} for _ in range(space.levels + 1)]
         self._moves: dict[tuple[int, Key, Key], list[tuple[Rows, Rows, Floats]]] = defaultdict(list)
@@ -208,7 +219,7 @@ class Explorer:
         part = self._part(*self._start)
         part.add(space.codes(key, states), states)
         part.value(lambda _: (np.zeros((1, len(space.peaks))), np.ones(1, dtype=bool), np.inf))
-        self.threshold = -np.inf
+        self.threshold, self.below = -np.inf, np.inf
         self.reached = self.level = space.first
         self.passes = self.nbytes = 0
 
@@ -217,10 +228,13 @@ class Explorer:
         """By goal, whether the largest amount on a path counts."""
         return self._space.peaks
 
-    def rise(self, threshold: float = np.inf) -> bool:
-        """Visit the states below a threshold; return whether a build may end in one of them."""
-        self.threshold = max(self.threshold, threshold)
-        self.passes += 1
+    def rise(self, threshold: float = np.inf, below: float = np.inf) -> bool:
+        """Visit the states up to a threshold; return whether a build may end in one of them.
+
+        ``below``: only states of which the first goal takes less than this, to 1e-9 of it, are
+        visited: the cut that proves that nothing is better.
+        """
+        self._begin_pass(threshold, below)
         for level, parts in enumerate(self._parts):
             self.level = level
             for key, part in list(parts.items()):
@@ -229,6 +243,51 @@ class Explorer:
                 if len(fresh):
                     self._tell(self)
         return self.whole
+
+    def dive(self, threshold: float = np.inf, below: float = np.inf) -> bool:
+        """Visit the same states, the highest level first, until a build may end in one of them.
+
+        Few are visited at a time while that leads on, more and more where it does not.
+        """
+        self._begin_pass(threshold, below)
+        level, deepest, few = self._space.levels, -1, FEW
+        while not self.whole:
+            found = self._eligible_on(level)
+            if found is None:
+                level -= 1
+                if level < self._space.first:
+                    return False
+                continue
+            key, part, fresh = found
+            fresh = _least(part, fresh, few)
+            self.level = level
+            self._open(level, key, part, fresh)
+            self._go_on(level, key, part, fresh)
+            self._tell(self)
+            few = FEW if level > deepest else 4 * few
+            deepest = max(deepest, level)
+            level = min(level + 1, self._space.levels)
+        return True
+
+    def _begin_pass(self, threshold: float, below: float) -> None:
+        self.threshold, self.below = max(self.threshold, threshold), below
+        self.passes += 1
+
+    def copy(self) -> Explorer:
+        """Return an explorer that goes on by itself from what is visited."""
+        out = copy(self)
+        out._parts = [{key: part.copy() for key, part in level.items()} for level in self._parts]
+        out._moves = defaultdict(list, {key: [*moves] for key, moves in self._moves.items()})
+        return out
+
+    def visited(self) -> tuple[Ints, ...]:
+        """Return the visited states, (n, c) each, level by level from the first."""
+        parts = (tuple(level.values()) for level in self._parts[self._space.first :])
+        none = np.zeros((0, self._shape[0]), dtype=self._shape[1])
+        return tuple(
+            np.concatenate([none, *(part.states[part.mark == OPEN] for part in level)])
+            for level in parts
+        )
 
     @property
     def whole(self) -> bool:
@@ -252,27 +311,47 @@ class Explorer:
         """Visit states below the threshold and what they lead to within a part; return which."""
         visited = [np.zeros(0, dtype=np.int64)]
         while True:
+            fresh = self._eligible(key, part)
+            if self._width is not None:
+                fresh = _least(part, fresh, self._width)
+                part.mark[part.mark == PENDING] = CLOSED
+            if not len(fresh):
+                return np.concatenate(visited)
+            self._open(level, key, part, fresh)
+            visited.append(fresh)
+
+    def _open(self, level: int, key: Key, part: Part, fresh: Ints) -> None:
+        """Visit states, and add what they lead to within their part."""
+        part.mark[fresh] = OPEN
+        self.reached = max(self.reached, level)
+        if level:
+            moves = self._space.within(key, part.states[fresh])
+            self._keep((level, key, key), fresh, moves, part)
+
+    def _eligible_on(self, level: int) -> tuple[Key, Part, Ints] | None:
+        """Return the first part of a level that has states to visit, and these."""
+        for key, part in self._parts[level].items():
+            if len(fresh := self._eligible(key, part)):
+                return key, part, fresh
+        return None
+
+    def _eligible(self, key: Key, part: Part) -> Ints:
+        """Return the states that are to be visited, all new ones being valued."""
+        while True:
             part.value(lambda states: self._values(key, states))
             fresh = np.flatnonzero((part.mark == PENDING) & self._below(part.values))
             if self._space.floors and part.raise_floors(fresh, lambda s: self._values(key, s)):
                 continue
-            if self._width is not None:
-                fresh = fresh[self._best(part.values[fresh, 0])[: self._width]]
-                part.mark[part.mark == PENDING] = CLOSED
-            if not len(fresh):
-                return np.concatenate(visited)
-            part.mark[fresh] = OPEN
-            self.reached = max(self.reached, level)
-            visited.append(fresh)
-            if level:
-                moves = self._space.within(key, part.states[fresh])
-                self._keep((level, key, key), fresh, moves, part)
+            if not len(close := self._undecided(part, fresh)):
+                return fresh
+            part.values[close], part.exact[close] = self._exact(key, part.states[close]), True
 
-    def _best(self, values: Floats) -> Ints:
-        """Return places of values (n,), least first; those that are small enough in any order."""
-        enough = values <= self._enough
-        drawn = np.where(enough, self._draws.random(len(values)), np.arange(len(values)))
-        return np.lexsort((drawn, np.where(enough, -np.inf, values)))
+    def _undecided(self, part: Part, rows: Ints) -> Ints:
+        """Return those rows whose six digits do not say whether they lie below the cut."""
+        if np.isinf(self.below):
+            return rows[:0]
+        close = np.abs(part.values[rows, 0] - self.below) <= BAND * abs(self.below)
+        return rows[close & ~part.exact[rows]]
 
     def refine(self, values: Sequence[float] | None = None) -> bool:
         """Value states exactly that are close to the worst values of a path; return if any were.
@@ -313,10 +392,14 @@ class Explorer:
         """What the first goal may take of a visited state, for all that six digits say."""
         if not self._space.peaks[0]:
             return np.inf
-        return self.threshold + (BAND * abs(self.threshold) if np.isfinite(self.threshold) else 0.0)
+        most = min(self.threshold, self.below)
+        return most + (BAND * abs(most) if np.isfinite(most) else 0.0)
 
     def _below(self, values: Floats) -> Bools:
-        return np.asarray(values[:, 0] <= self._most)
+        inside = values[:, 0] <= self._most
+        if np.isfinite(self.below):
+            inside &= values[:, 0] < strictly_below(self.below)
+        return np.asarray(inside)
 
     def _go_on(self, level: int, key: Key, part: Part, fresh: Ints) -> None:
         """Add what visited states lead to on the next level."""

@@ -81,6 +81,11 @@ def tied(value: float) -> float:
     return value + TIED * abs(value)
 
 
+def strictly_below(value: float) -> float:
+    """Return below what a value is better than this one, by more than an error of rounding."""
+    return value - TIED * abs(value)
+
+
 def least_peak(graph: Graph, goal: int) -> float:
     """Return the least worst amount of any path; an `InfeasibleError` says that there is none."""
     least = _least_or_none(graph, goal)

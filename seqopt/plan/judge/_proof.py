@@ -17,7 +17,15 @@ from seqopt.errors import InfeasibleError
 from seqopt.graph._budgets import budget_bounds, is_beyond
 from seqopt.graph.duality import lexicographic_bounds
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import FAILS, PASSES, _lazy_path, lexicographic, reached, tied
+from seqopt.graph.paths import (
+    FAILS,
+    PASSES,
+    _lazy_path,
+    lexicographic,
+    reached,
+    strictly_below,
+    tied,
+)
 from seqopt.graph.states._visits import move_amounts
 from seqopt.graph.states.states import States
 from seqopt.plan.judge._answers import alike, ask, near, screens
@@ -44,12 +52,14 @@ class Asked(NamedTuple):
 
     ``values``: of goals; the first that is about no margin bounds states, if it is about a worst
     step; ``margins``: with which states must stand, as is demanded and by the first goals; None
-    does not ask; ``exact``: whether all values have all digits, or those that decide about these.
+    does not ask; ``exact``: whether all values have all digits, or those that decide about these;
+    ``strict``: whether states must take less of that goal, not the same.
     """
 
     values: Sequence[float] = ()
     margins: Sequence[float] | None = None
     exact: bool = False
+    strict: bool = False
 
 
 class Closed(NamedTuple):
@@ -140,9 +150,10 @@ class Passable:
         if not self.tables.bricks_at(level):
             return np.zeros((len(states), len(goals))), np.ones(len(states), dtype=bool)
         held, payload = self._held(states, self._most, self._beyond)
-        (most, margins, _), k, below = asked, self.margins, np.inf
+        most, margins = asked.values, asked.margins
+        k, below = self.margins, np.inf
         if len(most) > k and goals[k].measure is Measure.PEAK:
-            below = tied(most[k])
+            below = strictly_below(most[k]) if asked.strict else tied(most[k])
         values, forces, ok = self._answers(self.tables.bricks_at(level), held, asked, below)
         ok &= (forces <= payload).all(axis=1) & (values[:, k : k + 1] <= below).all(axis=1)
         if margins is not None:
@@ -265,10 +276,21 @@ class Proof:
         if self._is_better(values, least) is None:
             self.states = 1  # a cut before the end alone
             return least
+        if self._is_cut(values):
+            return tuple(values)
         out = self._of_paths(Asked(values))
         if self._is_better(values, out) is not None:
             out = self._of_paths(Asked(values, exact=True))
         return out
+
+    def _is_cut(self, values: Sequence[float]) -> bool:
+        """Return whether states strictly below the one worst value there is reach no end."""
+        if [goal.measure for goal in self._passable.problem.goals] != [Measure.PEAK]:
+            return False
+        graph = _Levels(self._passable, self._told, Asked(values, strict=True)).graph()
+        seen = reached(graph)
+        self.states = int(seen.sum())
+        return not graph.ends[seen].any()
 
     def _of_paths(self, asked: Asked) -> tuple[float, ...]:
         """Return bounds by the paths of states that are not proven to fall."""
