@@ -235,7 +235,7 @@ def _draw_nodes(axes: Axes, kind: Ints, seen: Floats, size_by: float) -> None:
         axes.scatter(x, y, size_by * size, zorder=3, **look)
 
 
-def draw_bricks(  # noqa: PLR0913  # what is drawn, and how, each by its name
+def draw_bricks(  # what is drawn, and how, each by its name
     axes: Axes,
     network: Network,
     bricks: int,
