@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import csv
+import io
+import json
 import os
 import stat
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
 from seqopt._interrupts import undisturbed
-from seqopt.errors import FileError
+from seqopt.errors import FileError, SeqoptError
 
 _FORMULA = ("=", "+", "-", "@")
 _MARK = "'"
@@ -69,6 +74,60 @@ def read_bytes(path: Path) -> bytes:
         most = _LARGEST_INPUT / 1e6
         raise FileError(f"cannot read {path}: it has more than {most:g} MB; name a smaller one")
     return content
+
+
+_DEEPEST = 100  # lists and objects in each other
+_MOST_VALUES = 10_000_000  # an empty list has two bytes in a file, and sixty in memory
+
+
+def parse_json(text: str, where: str, error: type[SeqoptError] = FileError, **how: Any) -> Any:
+    """Return a JSON document; an ``error`` says in a line what is wrong with it.
+
+    ``where``: what messages call it; ``how``: of `json.loads`, to read entries strictly.
+    """
+    if sum(map(text.count, ",[{")) > _MOST_VALUES:
+        raise error(f"{where}: it has more than {_MOST_VALUES:,} values; give fewer")
+    deep = f"{where}: nested too deep; give {_DEEPEST} levels at most"
+    try:
+        document = json.loads(text, **how)
+    except json.JSONDecodeError as wrong:
+        raise error(f"{where}: not JSON, line {wrong.lineno}: {wrong.msg}") from None
+    except RecursionError:
+        raise error(deep) from None
+    except SeqoptError:
+        raise
+    except ValueError:
+        raise error(f"{where}: a number has too many digits; give fewer") from None
+    level = [[document]]
+    for _ in range(_DEEPEST + 1):
+        inside = chain.from_iterable(x.values() if isinstance(x, dict) else x for x in level)
+        level = [each for each in inside if isinstance(each, dict | list)]
+    if level:
+        raise error(deep)
+    return document
+
+
+_MOST_CELLS = 10_000_000
+Row = dict[str, str]
+
+
+def read_table(
+    text: str, where: str, error: type[SeqoptError] = FileError
+) -> tuple[list[str], list[tuple[int, Row]]]:
+    """Return the columns of a CSV table, and its rows: the number of the line, cells by column.
+
+    A cell that is missing is empty; what is beyond the columns stands under None. ``error``: raised
+    if it is no such table.
+    """
+    reader = csv.DictReader(io.StringIO(text), restval="")
+    try:
+        columns = [plain(name or "") for name in reader.fieldnames or ()]
+        if len(columns) * text.count("\n") > _MOST_CELLS:
+            raise error(f"{where}: it has more than {_MOST_CELLS:,} cells; give fewer")
+        reader.fieldnames = columns
+        return columns, [(reader.line_num, row) for row in reader]
+    except csv.Error as wrong:
+        raise error(f"{where}: not a readable CSV file: {wrong}") from wrong
 
 
 def write_text(path: Path, text: str) -> None:

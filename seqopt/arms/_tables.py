@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import re
-import zipfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
 from functools import lru_cache, partial
@@ -14,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from seqopt._archives import Archive
 from seqopt._files import make_folder, read_bytes, write_bytes
 from seqopt.arms._collisions import collide_pairs
 from seqopt.arms._model import UP, ArmModel, model_path
@@ -115,7 +115,7 @@ def _stored_table(folder: Path, site: Site, compute: Callable[[], PostureTable])
     """Return the table of a site from a folder, or compute it and keep it there."""
     make_folder(folder)
     path = folder / f"postures-{_key(site)}.npz"
-    if path.exists() and (found := _read(path)) is not None:
+    if path.exists() and (found := _read(path, site)) is not None:
         return found
     table = compute()
     write_bytes(path, _content(table))
@@ -160,14 +160,37 @@ def _content(table: PostureTable) -> bytes:
     return out.getvalue()
 
 
-def _read(path: Path) -> PostureTable | None:
-    """Return the table of a file; None if it is none, or damaged."""
+def _read(path: Path, site: Site) -> PostureTable | None:
+    """Return the table of a file; None if it is none, damaged, or of another site."""
     try:
-        with np.load(io.BytesIO(read_bytes(path)), allow_pickle=False) as archive:
-            content: dict[str, Any] = {n.name: archive[n.name] for n in fields(PostureTable)}
-    except (KeyError, ValueError, OSError, EOFError, zipfile.BadZipFile):
+        archive = Archive(read_bytes(path), str(path))
+        archive.require(f"{each.name}.npy" for each in fields(PostureTable))
+        robot = archive.array("robot", "iu", (None,))
+        p, r, n, b = len(robot), len(site.robots), len(site.nodes), len(site.bricks)
+        shapes: dict[str, tuple[str, tuple[int | None, ...]]] = {
+            "robots": ("U", (r,)),
+            "nodes": ("iu", (n,)),
+            "bricks": ("iu", (b,)),
+            "robot": ("iu", (p,)),
+            "node": ("iu", (p,)),
+            "found": ("iu", (r, n)),
+            "joints": ("f", (p, None)),
+            "axes": ("f", (p, 3, 3)),
+            "place": ("f", (p, 3)),
+            "tools": ("f", (p,)),
+            "hits": ("b", (p, b)),
+            "collide": ("b", (p, p)),
+            "compliance": ("f", (p, 6, 6)),
+        }
+        content: dict[str, Any] = {name: archive.array(name, *how) for name, how in shapes.items()}
+        content |= {name: tuple(content[name].tolist()) for name in _NAMES}
+    except (OSError, ValueError):
         return None
-    return PostureTable(**content | {name: tuple(content[name].tolist()) for name in _NAMES})
+    wanted = tuple(each.name for each in site.robots), site.nodes
+    if (content["robots"], content["nodes"]) != wanted or p == 0:
+        return None
+    low, high = (np.array([f(content[k]) for k in ("robot", "node")]) for f in (np.min, np.max))
+    return PostureTable(**content) if (low >= 0).all() and (high < (r, n)).all() else None
 
 
 _SITES = 16  # of which tables are kept, the last ones that were asked for

@@ -7,14 +7,14 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
-from zipfile import BadZipFile
 
 import numpy as np
 
-from seqopt._files import read_bytes, write_bytes
+from seqopt._archives import Archive
+from seqopt._files import parse_json, read_bytes, write_bytes
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import FileError, ProblemError, StepError
 from seqopt.graph._explore import Visited
@@ -25,6 +25,7 @@ from seqopt.plan.judge._infeasible import confirmed
 from seqopt.plan.judge._policy import check_policy
 from seqopt.plan.solving import states_of
 from seqopt.problem.problem import Problem
+from seqopt.scene._checks import short
 from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import StepKind
@@ -122,7 +123,12 @@ class Policy(FrozenValue):
             raise StepError("site: no end is reached from it; let robots go elsewhere, or replan")
         if after < 0:
             return Advice(None, (), (), site, values)
-        return self._move(site, row, after, values)
+        try:
+            return self._move(site, row, after, values)
+        except (IndexError, StopIteration):  # of another scene, or damaged
+            raise StepError(
+                "site: no move leads to the state that follows; write it again"
+            ) from None
 
     def _move(self, site: Site, row: int, after: int, values: Mapping[str, float]) -> Advice:
         grips = list(site.grips or (None,) * len(self.robots))
@@ -222,16 +228,49 @@ class Policy(FrozenValue):
     @classmethod
     def load(cls, path: str | Path) -> Policy:
         """Return the policy of a file."""
-        content = io.BytesIO(read_bytes(Path(path)))
         try:
-            with np.load(content, allow_pickle=False) as found:
-                told, arrays = json.loads(str(found["told"])), [found[name] for name in ARRAYS]
-        except (ValueError, KeyError, OSError, BadZipFile) as error:
-            raise FileError(f"{path}: it is no policy ({error}); write one with --policy") from None
-        kinds = tuple(map(tuple, told["kinds"]))
-        names = tuple(told["goals"]), tuple(told["robots"])
-        order, nodes, bricks, held, values, following = arrays
-        return cls(*names, kinds, order, nodes, bricks, held, values, following, told["checked"])
+            archive = Archive(read_bytes(Path(path)), str(path))
+            archive.require(f"{name}.npy" for name in ("told", *ARRAYS))
+            told = parse_json(str(archive.array("told", "U", ())), f"{path}: told")
+            return _checked(told, archive, str(path))
+        except (FileError, ValueError) as error:  # text that is no text is a ValueError
+            raise FileError(f"{error}; it is no policy: write one with --policy") from None
+
+
+def _checked(told: Any, archive: Archive, where: str) -> Policy:
+    """Return a policy whose arrays go together; a `FileError` names one that does not."""
+    names = ("goals", "robots", "kinds", "checked")
+    if not isinstance(told, dict) or {*told} != {*names}:
+        raise FileError(f"{where}: told is {short(told)}; {', '.join(names)} belong there")
+    goals, robots, kinds = (told[name] for name in names[:3])
+    words = [*goals, *robots] if isinstance(goals, list) and isinstance(robots, list) else [None]
+    every = [*chain.from_iterable(kinds)] if _are_lists(kinds) else []
+    right = goals and all(isinstance(word, str) for word in words)
+    right = right and all(type(each) is int and 0 <= each < len(robots) for each in every)
+    if not right or not every or len({*every}) < len(every):
+        raise FileError(f"{where}: told is {short(told)}; name goals, robots, and these by kind")
+    bricks = archive.array("bricks", "iu", (None,))
+    order, nodes = (archive.array(name, "iu", (None,)) for name in ("order", "nodes"))
+    held = archive.array("held", "iu", (len(bricks), None))
+    values = archive.array("values", "f", (len(bricks), len(goals)))
+    following = archive.array("following", "iu", (len(bricks),))
+    limits = {  # what numbers stand for: robots hold one of the nodes, or were last at it
+        "bricks": (bricks, 0, len(order)),
+        "held": (held[:, : len(every)], -len(nodes), len(nodes)),
+        "following": (following, -1, len(bricks) - 1),
+    }
+    for name, (numbers, least, most) in limits.items():
+        if numbers.size and not least <= int(numbers.min()) <= int(numbers.max()) <= most:
+            raise FileError(f"{where}: {name} goes beyond {least} to {most}")
+    columns = held.shape[1] - len(every)
+    if columns not in (0, 1) or np.isnan(values).any() or type(told["checked"]) is not int:
+        raise FileError(f"{where}: held, values or checked are not of {len(every)} robots")
+    content = order, nodes, bricks, held, values, following
+    return Policy(tuple(goals), tuple(robots), tuple(map(tuple, kinds)), *content, told["checked"])
+
+
+def _are_lists(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(each, list) for each in value)
 
 
 ARRAYS = ("order", "nodes", "bricks", "held", "values", "following")

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import math
 import operator
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
 from functools import partial
 from numbers import Real
 from typing import Any, TypeVar
@@ -257,18 +255,3 @@ def positive(where: str, value: float, unit: str) -> float:
 not_negative = partial(finite, least=0.0, wanted="a number that is not negative")
 stiffness = partial(vector, at_least=0.0)
 length, density = partial(positive, unit="m"), partial(positive, unit="kg/m³")
-
-
-@contextmanager
-def reading_json(where: str, what: str) -> Iterator[None]:
-    """Say in a `SceneError` what is wrong with JSON. ``what``: stands there, as "a scene"."""
-    try:
-        yield
-    except json.JSONDecodeError as error:
-        raise SceneError(f"{where}: not JSON, line {error.lineno}: {error.msg}") from error
-    except RecursionError as error:
-        raise SceneError(f"{where}: nested too deep for {what}; give one") from error
-    except SceneError:
-        raise
-    except ValueError as error:  # an integer of thousands of digits
-        raise SceneError(f"{where}: a number has too many digits; give fewer") from error

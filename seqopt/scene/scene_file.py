@@ -21,10 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._files import read_text, write_text
+from seqopt._files import parse_json, read_text, write_text
 from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
-from seqopt.scene._checks import cut, reading_json, short, which_fit
+from seqopt.scene._checks import cut, short, which_fit
 from seqopt.scene._durations import Durations
 from seqopt.scene._props import Prop
 from seqopt.scene.arm import Arm
@@ -361,9 +361,9 @@ def _no_such(name: str) -> str:
 
 def _parse_scene(text: str, source: str = "text") -> Scene:
     """Return the scene that a JSON document describes, if it obeys the schema."""
-    with reading_json(f"scene {source}", "a scene"):
-        document = json.loads(text, object_pairs_hook=partial(_entries, source))
-        _check_schema(document, source)
+    entries = partial(_entries, source)
+    document = parse_json(text, f"scene {source}", SceneError, object_pairs_hook=entries)
+    _check_schema(document, source)
     return _scene_from_dict(document)
 
 

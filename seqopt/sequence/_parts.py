@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from seqopt._files import read_text
+from seqopt._files import parse_json, read_table, read_text
 from seqopt.errors import SceneError, StepError, did_you_mean
 from seqopt.scene._checks import as_float, short
 from seqopt.scene.scenarios import as_built
@@ -26,10 +23,7 @@ KEYS = ("bricks", "grips", "last", "regrips", "step", "measured", "ages")
 def read_site(scene: Scene, path: Path) -> tuple[Scene, Site]:
     """Return a site from a JSON file, and the scene in an order that begins with its bricks."""
     where = f"state {path}"
-    try:
-        told = json.loads(read_text(path))
-    except ValueError as error:
-        raise StepError(f"{where}: not a readable JSON file: {error}") from None
+    told = parse_json(read_text(path), where, StepError)
     if not isinstance(told, dict) or "bricks" not in told:
         raise StepError(f"{where}: give an object with bricks, and grips by robot")
     for key in told:
@@ -80,12 +74,12 @@ def read_measured(scene: Scene, path: Path) -> dict[int, tuple[float, ...]]:
         found = {brick.name: brick.position for brick in import_scene(path).bricks}
         own = {brick.name: brick.position for brick in scene.bricks}
         return {n: p for n, p in found.items() if n not in own or math.dist(own[n], p) > SAME}
-    rows = [*csv.DictReader(io.StringIO(read_text(path)))]
+    names, rows = read_table(read_text(path), str(path), StepError)
     columns = ("brick", "x", "y", "z")
-    if not rows or not {*columns} <= {*rows[0]}:
+    if not rows or not {*columns} <= {*names}:
         raise StepError(f"{path}: give a CSV file with columns {', '.join(columns)}")
     out = {}
-    for number, row in enumerate(rows, start=2):
+    for number, row in rows:
         try:
             values = [float(row[name]) for name in columns]
         except (TypeError, ValueError):

@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from seqopt._files import harmless, plain, read_text
+from seqopt._files import Row, harmless, read_table, read_text
 from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
@@ -26,8 +26,6 @@ from seqopt.sequence.steps import (
     check_step,
 )
 from seqopt.sequence.three_robots import SCHEDULES, make_schedule, open_schedule, robot_loop
-
-_Row = dict[str, str]
 
 
 def read_plan(scene: Scene, path: Path) -> tuple[Step, ...]:
@@ -98,25 +96,20 @@ def parse_plan(scene: Scene, text: str, source: str) -> tuple[Step, ...]:
     return _turned_round(scene, checked) if turned else checked
 
 
-def _read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, _Row]]:
+def _read_rows(scene: Scene, text: str, what: str) -> list[tuple[int, Row]]:
     """Return the rows of a table of steps: the number of the line, and its cells by column."""
-    reader = csv.DictReader(io.StringIO(text), restval="")
     wanted = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in scene.robots)]
-    try:
-        columns = [plain(name or "") for name in reader.fieldnames or ()]
-        for column in wanted:
-            if column not in columns:
-                raise StepError(f"{what}: column {column} is missing; give {', '.join(wanted)}")
-        for column in wanted:
-            if columns.count(column) > 1:
-                raise StepError(f"{what}: column {column} occurs twice; keep one")
-        reader.fieldnames = columns
-        return [(reader.line_num, row) for row in reader]
-    except csv.Error as error:
-        raise StepError(f"{what}: not a readable CSV file: {error}") from error
+    columns, rows = read_table(text, what, StepError)
+    for column in wanted:
+        if column not in columns:
+            raise StepError(f"{what}: column {column} is missing; give {', '.join(wanted)}")
+    for column in wanted:
+        if columns.count(column) > 1:
+            raise StepError(f"{what}: column {column} occurs twice; keep one")
+    return rows
 
 
-def _read_cells(row: _Row, where: str) -> tuple[int, StepKind, int]:
+def _read_cells(row: Row, where: str) -> tuple[int, StepKind, int]:
     """Return what a row says beside its grips."""
     kinds = {kind.value: kind for kind in StepKind}
     if row["type"] not in kinds:
@@ -125,7 +118,7 @@ def _read_cells(row: _Row, where: str) -> tuple[int, StepKind, int]:
     return number, kinds[row["type"]], bricks
 
 
-def _read_grip(scene: Scene, robot: Robot, row: _Row, where: str) -> int | None:
+def _read_grip(scene: Scene, robot: Robot, row: Row, where: str) -> int | None:
     """Return the node a robot holds; its brick, if named, must be the node's."""
     if not row[f"{robot.name}_node"].strip():
         return None
@@ -140,7 +133,7 @@ def _read_grip(scene: Scene, robot: Robot, row: _Row, where: str) -> int | None:
     return node
 
 
-def _integer(row: _Row, column: str, where: str) -> int:
+def _integer(row: Row, column: str, where: str) -> int:
     """Return a whole number; 48.0, as tables with empty cells are often written, is one too."""
     text = row[column].strip()
     try:
@@ -278,7 +271,7 @@ def _from_file(network: Network, schedule: object) -> Schedule:
     return read_schedule(network, path)
 
 
-def _step(scene: Scene, row: _Row, before: Sequence[OpenStep], where: str) -> OpenStep:
+def _step(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> OpenStep:
     """Return the step of a row, which must be possible after those before."""
     number, kind, bricks = _read_cells(row, where)
     if number != len(before) + 1:
@@ -293,7 +286,7 @@ def _step(scene: Scene, row: _Row, before: Sequence[OpenStep], where: str) -> Op
     return step
 
 
-def _grips(scene: Scene, row: _Row, before: Sequence[OpenStep], where: str) -> ScheduledGrips:
+def _grips(scene: Scene, row: Row, before: Sequence[OpenStep], where: str) -> ScheduledGrips:
     """Return what the robots hold in a row: a mark goes on, or is a new move."""
     last = before[-1].grips if before else (None,) * len(scene.robots)
     count = len({move for step in before for move in step.moves})

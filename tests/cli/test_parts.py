@@ -84,7 +84,7 @@ def test_a_state_is_read_from_a_file(capsys, folder, tmp_path):
     assert status == 0
     assert read_plan(load_scene(out / "scene.json"), out / "plan.csv")[0].number == 8
     for told, said in (
-        ("[1", "not a readable JSON file"),
+        ("[1", "not JSON"),
         ("{}", "give an object with bricks"),
         ('{"bricks": 1, "grip": {}}', "grip is not known (did you mean grips?)"),
         ('{"bricks": [77]}', "give their number, or names"),

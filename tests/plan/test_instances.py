@@ -298,7 +298,7 @@ def test_acts_say_who_is_slow(compiled):
     ("text", "said"),
     [
         ("1 two 3", "no number of a node"),
-        ("{", "no JSON"),
+        ("{", "not JSON"),
         ('{"path": [1]}', "none of nodes"),
         ('{"nodes": [1.5]}', "whole numbers"),
         ('{"nodes": [1], "bounds": [{"proof": 1}]}', "none of value"),

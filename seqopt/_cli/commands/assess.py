@@ -101,17 +101,20 @@ class Rows:
         self.taken_up = len(self.rows)
 
     def _earlier(self) -> Iterator[Row]:
-        """Yield the rows of an earlier run that asked the same; a line cut short ends them."""
+        """Yield the rows of an earlier run that asked the same; a damaged line ends them."""
         if self.path is None or not self.path.exists():
             return
         mark, *lines = read_text(self.path).splitlines() or [""]
         if mark != self._mark:
             return
         for line in lines:
-            try:
-                yield json.loads(line)
-            except ValueError:
+            mark, _, text = line.partition(" ")
+            if mark != self._checksum(text):
                 return
+            yield json.loads(text)  # our own
+
+    def _checksum(self, text: str) -> str:
+        return sha256(f"{self._mark} {text}".encode()).hexdigest()[:16]
 
     def add(self, row: Row) -> None:
         """Add a row, and keep it."""
@@ -120,7 +123,8 @@ class Rows:
             return
         fresh = len(self.rows) == self.taken_up + 1
         kept = self.rows if fresh else [row]
-        lines = [json.dumps(each, default=_plain) for each in kept]
+        texts = [json.dumps(each, default=_plain) for each in kept]
+        lines = [f"{self._checksum(text)} {text}" for text in texts]
         try:
             if fresh:  # what was cut short is not kept
                 self.path.write_text("\n".join([self._mark, *lines, ""]), encoding="utf-8")

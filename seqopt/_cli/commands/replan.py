@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -35,7 +34,7 @@ from seqopt._cli.terminal import wrapped
 from seqopt._cli.words.given import plan_folder
 from seqopt._cli.words.optimizing import AIM, TIME
 from seqopt._cli.words.where import Place
-from seqopt._files import read_text
+from seqopt._files import parse_json, read_text
 from seqopt.errors import FileError, InfeasibleError, StepError
 from seqopt.plan._other.replan import compared, without
 from seqopt.plan.plan import Plan
@@ -168,18 +167,18 @@ def _as_optimize(options: argparse.Namespace, scene_file: Path) -> argparse.Name
 def _told(folder: Path) -> dict[str, Any]:
     """Return what was asked of a plan, as words, as far as words say it."""
     try:
-        told = json.loads(read_text(folder / "summary.json"))
-    except (FileError, ValueError):
+        told = parse_json(read_text(folder / "summary.json"), "summary")
+    except FileError:
         return {}
-    if told.get("schedule") != FREE:
+    if not isinstance(told, dict) or told.get("schedule") != FREE:
         return {}
-    rules = {**told.get("rules", {})}
+    rules, limits = (_texts(told.get(name)) for name in ("rules", "limits"))
     names = ("least_grips", "newest", "payload", "regrips", "ending", "candidates")
-    limits = told.get("limits", {})
+    criterion, aims = told.get("criterion"), told.get("aims")
     return {
         "direction": rules.get("direction"),
-        "aim": ",".join(told.get("aims", ())),
-        "criteria": told["criterion"] if told.get("criterion") in CRITERIA else None,
+        "aim": ",".join(map(str, aims if isinstance(aims, list) else ())),
+        "criteria": criterion if isinstance(criterion, str) and criterion in CRITERIA else None,
         "rule": [f"{name}={rules[name]}" for name in names if name in rules],
         "limit": [
             f"{TOLERANCE if is_tolerance(name) else name}={value}"  # beside which limits follows
@@ -187,6 +186,12 @@ def _told(folder: Path) -> dict[str, Any]:
             if name != PROP_EXCESS  # which the scene says
         ],
     }
+
+
+def _texts(told: object) -> dict[str, str]:
+    """Return the words and numbers of an object, by name; nothing of what is none."""
+    pairs = told.items() if isinstance(told, dict) else ()
+    return {name: str(value) for name, value in pairs if isinstance(value, str | int | float)}
 
 
 def _changed(options: argparse.Namespace, scene: Scene, begin: Place) -> tuple[Scene, Place, str]:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from pathlib import Path
 
 import numpy as np
 
 from seqopt._cli.values import number_word
-from seqopt._files import read_text
+from seqopt._files import read_table, read_text
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.plan._other.bases import Base, facing, grid, level_axis
 from seqopt.scene.scene import Scene
@@ -35,12 +33,12 @@ def asked_places(scene: Scene, words: str) -> dict[str, tuple[Base, ...]]:
 
 def _read(scene: Scene, path: Path) -> dict[str, tuple[Base, ...]]:
     """Return the places of a CSV file: robot, x, y, and if they are given z and heading_deg."""
-    rows = [*csv.DictReader(io.StringIO(read_text(path)))]
-    if not rows or not {"robot", "x", "y"} <= {*rows[0]} or {*rows[0]} - {*_COLUMNS}:
+    names, rows = read_table(read_text(path), str(path), ProblemError)
+    if not rows or not {"robot", "x", "y"} <= {*names} or {*names} - {*_COLUMNS}:
         raise ProblemError(f"{path}: give a CSV file with columns {', '.join(_COLUMNS)}")
     arms = {robot.name: robot.arm for robot in scene.robots if robot.arm is not None}
     out: dict[str, list[Base]] = {}
-    for line, row in enumerate(rows, start=2):
+    for line, row in rows:
         where, name = f"{path}, line {line}", row["robot"]
         if name not in arms:
             known = ", ".join(arms)

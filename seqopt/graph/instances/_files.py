@@ -5,19 +5,21 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from seqopt._files import read_bytes, write_bytes, write_folder
-from seqopt.errors import FileError
-from seqopt.graph._timed import TimedGraph
+from seqopt._archives import Archive
+from seqopt._files import parse_json, read_bytes, write_bytes, write_folder
+from seqopt.errors import FileError, ProblemError
+from seqopt.graph._timed import NOW, TimedGraph
 from seqopt.graph.graph import Graph
 from seqopt.graph.instances._texts import as_cp_sat, as_lp, as_mps
-from seqopt.graph.instances.instance import Instance, _by_goal, _Cap, _Target
+from seqopt.graph.instances.instance import PEAK, SUM, TAIL, Instance, _by_goal, _Cap, _Target
+from seqopt.scene._checks import short
 
 FORMAT, VERSION = "seqopt-instance", 1
 TEXT = "instance.json"  # the name of the text in the archive
@@ -99,28 +101,76 @@ def _named(name: str) -> zipfile.ZipInfo:
 
 def read(path: Path) -> Instance:
     """Return the instance of a file; a `FileError` says what is wrong with it."""
+    if path.suffix in WRITERS and path.suffix != ".npz":
+        raise FileError(f"{path}: {path.suffix} is written for solvers, not read; give the .npz")
     content = read_bytes(path)
     try:
-        with zipfile.ZipFile(io.BytesIO(content)) as archive:
-            document = json.loads(archive.read(TEXT))
-            arrays = {
-                Path(name).stem: np.load(io.BytesIO(archive.read(name)), allow_pickle=False)
-                for name in archive.namelist()
-                if name.endswith(".npy")
-            }
-    except (zipfile.BadZipFile, KeyError, ValueError, EOFError) as error:
-        why = f"it is no instance ({error}); write one with seqopt instance"
-        raise FileError(f"{path}: {why}") from error
+        archive = Archive(content, str(path))
+        document = parse_json(archive.text(TEXT), f"{path}: {TEXT}")
+    except FileError as error:
+        raise FileError(f"{error}; it is no instance: write one with seqopt instance") from error
     _check(document, path)
+    document = _with_wholes(document)
     try:
-        return _instance(document, arrays)
-    except (KeyError, IndexError, TypeError, ValueError) as error:
-        raise FileError(f"{path}: {_said(error)}") from error
+        return _instance(document, _arrays(document, archive))
+    except (ProblemError, ValueError) as error:
+        raise FileError(f"{path}: {error}") from error
 
 
-def _said(error: Exception) -> str:
-    missing = isinstance(error, KeyError)
-    return f"it has no array {error}; write it again" if missing else str(error)
+def _with_wholes(document: dict[str, Any]) -> dict[str, Any]:
+    """Return a document whose whole numbers are such in Python: JSON Schema takes 5.0 for one."""
+    goals = [{**goal, "columns": [*map(int, goal["columns"])]} for goal in document["goals"]]
+    caps = [
+        {**cap, "column": None if cap["column"] is None else int(cap["column"])}
+        for cap in document["caps"]
+    ]
+    counts = {name: int(document[name]) for name in ("nodes", "arcs")}
+    return {**document, **counts, "goals": goals, "caps": caps}
+
+
+def _arrays(document: dict[str, Any], archive: Archive) -> dict[str, np.ndarray]:
+    """Return the arrays that a document declares, each of the shape and kind that it should be."""
+    nodes, arcs, timed = document["nodes"], document["arcs"], document["timed"]
+    names = [f"amount_{k}" for k in range(len(document["columns"]))]
+    more = [f"timed_{name}" for name in (*TIMED, "longest")] if timed else []
+    every = ("source", "target", "ends", "states", *names, *more)
+    archive.require((TEXT, *(f"{name}.npy" for name in every)))
+    out = {name: archive.array(name, "iu", (arcs,)) for name in ("source", "target")}
+    out["ends"] = archive.array("ends", "iu", (None,))
+    out["states"] = archive.array("states", "iu", (nodes, None))
+    for name, column in zip(names, document["columns"], strict=True):
+        out[name] = archive.array(name, "iuf", (nodes if column["of"] == "nodes" else arcs,))
+    return out | (_timed_arrays(archive, nodes, arcs) if timed else {})
+
+
+def _timed_arrays(archive: Archive, nodes: int, arcs: int) -> dict[str, np.ndarray]:
+    """Return the arrays of acts; numbers in them stand for columns, arcs and kinds that exist."""
+    kinds = archive.array("timed_kinds", "iu", (None,))
+    c, k = len(kinds), int(kinds.max(initial=-1)) + 1
+    move = archive.array("timed_move", "iu", (None,))
+    out = {"kinds": kinds, "move": move, "free": archive.array("timed_free", "b", (nodes, c))}
+    out["alike"] = archive.array("timed_alike", "b", (nodes, max(c - 1, 0)))
+    out["column"] = archive.array("timed_column", "iu", (len(move),))
+    out["origin"] = archive.array("timed_origin", "iu", (len(move), c))
+    shapes = {"prepares": (arcs,), "acts": (arcs,), "work": (arcs, 1 + k), "longest": (c,)}
+    out |= {name: archive.array(f"timed_{name}", "iuf", shape) for name, shape in shapes.items()}
+    if {*kinds.tolist()} != {*range(k)} or not k:
+        raise ValueError(f"kinds of robots are {short(kinds.tolist())}; count them from 0")
+    if not np.array_equal(np.unique(move), np.arange(arcs)) or (np.diff(move) < 0).any():
+        raise ValueError("timed_move: give the arcs of acts in order, every arc at least once")
+    for name, least, most in (("column", -1, c), ("origin", NOW, c)):
+        _require_between(f"timed_{name}", out[name], least, most)
+    for name in shapes:
+        if not (np.isfinite(out[name]) & (out[name] >= 0)).all():
+            raise ValueError(f"timed_{name}: give finite numbers of seconds from 0")
+    return {f"timed_{name}": array for name, array in out.items()}
+
+
+def _require_between(name: str, numbers: np.ndarray, least: int, end: int) -> None:
+    """Raise an error unless whole numbers are from one on and below another."""
+    if numbers.size and not least <= int(numbers.min()) <= int(numbers.max()) < end:
+        worst = int(numbers.min() if int(numbers.min()) < least else numbers.max())
+        raise ValueError(f"{name}: {worst} is not from {least} to {end - 1}")
 
 
 def _check(document: object, path: Path) -> None:
@@ -137,25 +187,24 @@ def _check(document: object, path: Path) -> None:
 
 def _instance(document: dict[str, Any], arrays: dict[str, np.ndarray]) -> Instance:
     """Return the instance of a document that obeys the schema, and its arrays."""
-    count = document["nodes"]
+    count, names = document["nodes"], tuple(column["name"] for column in document["columns"])
+    for name in ("source", "target", "ends"):
+        _require_between(name, arrays[name], 0, count)
     ends = np.zeros(count, dtype=bool)
     ends[arrays["ends"]] = True
-    amounts = np.zeros((document["arcs"], len(document["columns"])))
+    amounts = np.zeros((document["arcs"], len(names)))
     for k, column in enumerate(document["columns"]):
         values = arrays[f"amount_{k}"]
         amounts[:, k] = values[arrays["target"]] if column["of"] == "nodes" else values
     goals = tuple(
         _Target(g["name"], g["kind"], tuple(g["columns"]), g["most"]) for g in document["goals"]
     )
-    states = arrays["states"].astype(np.int64)
-    if len(states) != count:
-        raise ValueError(f"{len(states)} states for {count} nodes; give one for each")
-    names = tuple(column["name"] for column in document["columns"])
     caps = tuple(_Cap(**cap) for cap in document["caps"])
-    for which in [c for goal in goals for c in goal.columns] + [cap.column or 0 for cap in caps]:
-        if which and which >= len(names):
-            raise ValueError(f"column {which} is named, and there are {len(names)}")
+    _require_columns(goals, caps, len(names))
+    states = arrays["states"].astype(np.int64)
     rows = arrays["source"].astype(np.int32), arrays["target"].astype(np.int32)
+    if not states.shape[1] or (states[rows[0], 0] > states[rows[1], 0]).any():
+        raise ValueError("states: begin with levels, to lower ones of which no arc leads")
     timed = None
     if document["timed"]:
         own: list[Any] = [arrays[f"timed_{name}"] for name in (*TIMED, "longest")]
@@ -166,6 +215,21 @@ def _instance(document: dict[str, Any], arrays: dict[str, np.ndarray]) -> Instan
         timed = TimedGraph(_by_goal(graph, (goals, caps)), states[:, 0], *whole)
     made: Any = (goals, caps, states, timed, document["facts"])
     return Instance(document["name"], *rows, ends, names, amounts, *made)
+
+
+def _require_columns(goals: Sequence[_Target], caps: Sequence[_Cap], count: int) -> None:
+    """Raise an error unless goals and caps name columns that exist, as many as they need."""
+    for which in [c for g in goals for c in g.columns] + [cap.column or 0 for cap in caps]:
+        if which and which >= count:
+            raise ValueError(f"column {which} is named, and there are {count}")
+    for goal in goals:
+        if (goal.kind in (SUM, PEAK) and len(goal.columns) != 1) or (
+            goal.kind == TAIL and not goal.columns
+        ):
+            raise ValueError(f"goal {goal.name}: {goal.kind} is of one column, tail of several")
+    for cap in caps:
+        if not cap.most >= 0:
+            raise ValueError(f"cap {cap.name}: {cap.most:g} is no amount; give a number from 0")
 
 
 WRITERS: dict[str, Callable[[Instance], bytes | str]] = {

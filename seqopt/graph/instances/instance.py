@@ -148,6 +148,7 @@ class Instance(FrozenValue, Shown):
         """Whether every path has a node on every level, as where open grips are chosen."""
         levels, last = self.levels, int(self.levels.max(initial=0))
         steps = bool((levels[self.target] == levels[self.source] + 1).all())
+        steps &= bool((np.diff(levels) >= 0).all())  # candidates are counted level by level
         alone = int((levels == 0).sum()) == 1 and last > 0
         return steps and alone and bool((self.ends == (levels == last)).all())
 

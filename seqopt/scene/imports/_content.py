@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -10,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from seqopt._files import parse_json
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.scene._checks import as_float, reading_json, short
+from seqopt.scene._checks import as_float, short
 from seqopt.scene.library.common import JointLaw
 from seqopt.work.progress import Tell
 
@@ -130,10 +130,9 @@ class Given:
     progress: Tell | None = None
 
 
-def parse_json(text: str, source: str) -> Any:
-    """Return a JSON document, nested no deeper and with no longer numbers than Python reads."""
-    with reading_json(source, "an assembly"):
-        return json.loads(text, parse_constant=partial(_refuse, source))
+def assembly_json(text: str, source: str) -> Any:
+    """Return the JSON document of an assembly, whose numbers are finite."""
+    return parse_json(text, source, SceneError, parse_constant=partial(_refuse, source))
 
 
 def _refuse(source: str, name: str) -> float:

@@ -6,8 +6,6 @@ what they give way by their own length is put into their joints, half of each ba
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import warnings
 from collections.abc import Callable
@@ -18,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from seqopt._files import read_bytes, read_text
+from seqopt._files import read_bytes, read_table, read_text
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError, SceneWarning
 from seqopt.scene._checks import printable, short
@@ -44,11 +42,11 @@ from seqopt.scene.imports._content import (
     FileBlock,
     FileJoint,
     Given,
+    assembly_json,
     entry,
     listing,
     mapping,
     number,
-    parse_json,
     point,
 )
 from seqopt.scene.imports._mesh_files import read_3dm, read_mesh, read_obj, read_objects, read_off
@@ -316,7 +314,7 @@ def read_content(path: Path, form: str | None = None) -> Content:
     texts = {"boxes": _read_boxes, "obj": read_obj, "off": read_off}
     if named in texts:
         return texts[named](text, source)
-    document = parse_json(text, source)
+    document = assembly_json(text, source)
     return _DOCUMENTS[named or sniffed(document, source)](document, source)
 
 
@@ -366,12 +364,8 @@ def _read_boxes(text: str, source: str) -> Content:
 
     Others of `_COLUMNS` may be there: turns are in degrees about x, then y, then z.
     """
-    try:
-        reader = csv.DictReader(io.StringIO(text), restval="")
-        rows = [row for row, _ in zip(reader, range(MOST_BLOCKS + 1), strict=False)]
-    except csv.Error as error:
-        raise SceneError(f"{source}: not a readable CSV file: {error}") from error
-    names = [name or "" for name in reader.fieldnames or ()]
+    names, found = read_table(text, source, SceneError)
+    rows = [row for _, row in found]
     _check_columns(source, names)
     if not rows or len(rows) > MOST_BLOCKS:
         raise SceneError(f"{source}: {len(rows)} rows; give 1 to {MOST_BLOCKS} boxes")

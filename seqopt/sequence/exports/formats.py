@@ -26,7 +26,7 @@ from seqopt.scene.boxes import vertices_of
 from seqopt.scene.imports._building import block_numbers, carry
 from seqopt.scene.imports._compas_models import assembly_graph, by_guid
 from seqopt.scene.imports._compas_shapes import kind, payload
-from seqopt.scene.imports._content import entry, parse_json
+from seqopt.scene.imports._content import assembly_json, entry
 from seqopt.scene.imports.formats import read_content, sniffed
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Scene
@@ -207,7 +207,7 @@ def _read_source(scene: Scene, path: Path) -> _Source:
     content, graph = read_content(path), None
     keys = names = [block.key for block in content.blocks]
     if path.suffix.lower() == ".json":
-        document = parse_json(read_text(path), str(path))
+        document = assembly_json(read_text(path), str(path))
         form = sniffed(document, str(path))
         graph = document if form == "compas_assembly" and isinstance(document, dict) else None
         if form in ("compas_model", "compas_dem", "compas_timber"):

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from seqopt._files import read_text
+from seqopt._files import parse_json, read_text
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError, SolverError
 from seqopt.graph._timed import HELD, NOW, TimedGraph
@@ -24,7 +24,7 @@ from seqopt.plan.judge._bare._claims import (
     within_caps,
 )
 from seqopt.plan.judge.certificate import TOLERANCE, Certificate
-from seqopt.scene._checks import short
+from seqopt.scene._checks import as_float, short
 
 WHAT = ("nodes", "arcs", "acts")
 KEYS = ("value", "potentials", "cut", "prices", "weights", "shares", "labels")
@@ -57,7 +57,9 @@ def as_answer(instance: Instance, solution: Any, bounds: Any) -> Answer:
     claims, said = (own, where) if _is_empty(bounds) else _loaded(bounds)
     if isinstance(claims, Mapping):
         claims = claims.get("bounds", claims)
-    claims = [claims] if isinstance(claims, Mapping) else claims
+    claims = [claims] if isinstance(claims, Mapping | Claim) else claims
+    if isinstance(claims, str) or not isinstance(claims, Sequence):
+        raise ProblemError(f"{said}: bounds are {short(claims)}; give a list, one for every goal")
     return Answer(
         what,
         _whole(numbers, f"{where}, {what}"),
@@ -82,29 +84,36 @@ def _loaded(given: Any) -> tuple[Any, str]:
 def _parsed(text: str, where: str) -> Any:
     """Return what a text holds: JSON, or numbers after a word that says of what."""
     if text.lstrip()[:1] in ("{", "["):
-        try:
-            return json.loads(text)
-        except ValueError as error:
-            raise ProblemError(f"{where}: it is no JSON ({error})") from None
+        return parse_json(text, where, ProblemError)
     words = re.split(r"[\s,;]+", text.strip())
     what = words[0].lower().rstrip(":").removesuffix("s") + "s"
     numbers = words[1:] if what in WHAT else words
     for word in numbers:
-        if not re.fullmatch(r"\d+", word):
+        if not re.fullmatch(r"[0-9]{1,18}", word):
             raise ProblemError(f"{where}: {short(word)} is no number of a node; give 0, 1, 2 …")
     return {what if what in WHAT else "nodes": [int(word) for word in numbers]}
 
 
 def _whole(given: Any, where: str) -> Ints:
     """Return whole numbers from 0."""
+    found = _array(given)
+    if found is None or found.ndim != 1 or not len(found) or (found % 1).any():
+        raise ProblemError(f"{where}: give a list of whole numbers")
+    return found.astype(np.int64)
+
+
+def _array(given: Any) -> np.ndarray | None:
+    """Return numbers as an array, none of them beyond what whole numbers hold; None if not all are.
+
+    Nothing but numbers counts as one, nor does a list whose rows differ in length.
+    """
     try:
         found = np.asarray(given)
-        whole = found.astype(np.int64)
-    except (TypeError, ValueError, OverflowError):
-        raise ProblemError(f"{where}: give a list of whole numbers") from None
-    if found.ndim != 1 or not len(found) or not np.array_equal(found, whole):
-        raise ProblemError(f"{where}: give a list of whole numbers")
-    return whole
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        return None
+    if found.dtype.kind not in "iuf" or not (np.abs(found) < 2.0**63).all():  # NaN is none
+        return None
+    return found
 
 
 def _values(instance: Instance, given: Any, where: str) -> tuple[float | None, ...]:
@@ -112,25 +121,31 @@ def _values(instance: Instance, given: Any, where: str) -> tuple[float | None, .
     names = [goal.name for goal in instance.goals]
     if isinstance(given, Mapping):
         if unknown := {*given} - {*names}:
-            raise ProblemError(f"{where}: {min(unknown)} is no goal; give {', '.join(names)}")
-        return tuple(float(given[n]) if n in given else None for n in names)
-    return tuple(_floats(given, f"{where}, values").tolist())
+            first = min(map(str, unknown))
+            raise ProblemError(f"{where}: {first} is no goal; give {', '.join(names)}")
+        return tuple(
+            float(_floats([given[n]], f"{where}, values, {n}")[0]) if n in given else None
+            for n in names
+        )
+    found = _floats(given, f"{where}, values")
+    if len(found) > len(names):
+        raise ProblemError(f"{where}: {len(found)} values for {len(names)} goals; leave some out")
+    return tuple(found.tolist())
 
 
 def _floats(given: Any, where: str) -> Floats:
     """Return numbers (n,), infinite where there is none."""
-    try:
-        found = np.array([np.inf if v is None else float(v) for v in given], dtype=float)
-    except (TypeError, ValueError):
-        raise ProblemError(f"{where}: give a list of numbers") from None
+    if isinstance(given, str | bytes | Mapping) or not isinstance(given, Iterable):
+        raise ProblemError(f"{where}: give a list of numbers")
+    found = np.array([np.inf if v is None else as_float(v) for v in given], dtype=float)
     if np.isnan(found).any():
-        raise ProblemError(f"{where}: NaN is no number")
+        raise ProblemError(f"{where}: give a list of numbers; NaN and text are none")
     return found
 
 
 def _claim(given: Any, where: str) -> Claim:
     """Return a claim of a mapping, or of a number alone."""
-    if isinstance(given, int | float):
+    if isinstance(given, Real):
         given = {"value": given}
     if isinstance(given, Claim):
         return given
@@ -149,15 +164,16 @@ def _claim(given: Any, where: str) -> Claim:
     cut = None if given.get("cut") is None else _whole(given["cut"], f"{where}, cut")
     labels = None if given.get("labels") is None else _labels(given["labels"], f"{where}, labels")
     number = None if value is None else float(_floats([value], where)[0])
-    return Claim(number, **arrays, cut=cut, prices=dict(prices), shares=shares, labels=labels)
+    named = {str(n): float(_floats([p], f"{where}, prices")[0]) for n, p in prices.items()}
+    return Claim(number, **arrays, cut=cut, prices=named, shares=shares, labels=labels)
 
 
 def _table(given: Any, where: str) -> Floats:
     """Return rows of numbers; one row may be given alone."""
-    try:
-        return np.atleast_2d(np.array(given, dtype=float))
-    except (TypeError, ValueError):
-        raise ProblemError(f"{where}: give rows of as many numbers each") from None
+    found = _array(given)
+    if found is None or not 1 <= found.ndim <= 2:
+        raise ProblemError(f"{where}: give rows of as many numbers each")
+    return np.atleast_2d(found.astype(float))
 
 
 def _labels(given: Any, where: str) -> tuple[Ints, Floats]:

@@ -1,0 +1,122 @@
+"""Archives of arrays (npz), of which every size is known before anything is unpacked.
+
+A directory may lie, so no more is unpacked of a part than it announces; and what an array announces
+is compared with how much there is of it.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+import struct
+import zipfile
+import zlib
+from collections.abc import Iterable
+
+import numpy as np
+
+from seqopt.errors import FileError
+
+_LARGEST = 256_000_000  # bytes of all parts unpacked: 16 million arcs with one amount
+_MOST = 1000  # parts; every one takes memory before the first is read
+_ENTRY = b"PK\x01\x02"  # begins what the directory says of a part
+_BROKEN = (
+    *(zipfile.BadZipFile, EOFError, NotImplementedError, OSError, OverflowError, RuntimeError),
+    *(ValueError, struct.error, zlib.error),
+)  # what reading broken bytes raises
+_HEADER = re.compile(
+    r"\{'descr': '([<>|][biufU]\d{1,6})', 'fortran_order': (False|True), "
+    r"'shape': \(((?:\d{1,15}, ?)*(?:\d{1,15})?)\), \} *\n"
+)
+
+
+class Archive:
+    """An archive, of which nothing is unpacked yet.
+
+    ``content``: its bytes; ``where``: what messages call it. Raises `FileError` if it is none, has
+    too many parts, or would be too large.
+    """
+
+    def __init__(self, content: bytes, where: str) -> None:
+        self._where = where
+        if content.count(_ENTRY) > _MOST:
+            raise FileError(f"{where}: it has more than {_MOST} parts; leave out what is not asked")
+        try:
+            self._file = zipfile.ZipFile(io.BytesIO(content))
+        except _BROKEN as error:
+            raise FileError(f"{where}: no archive that can be read: {error}") from error
+        every = self._file.infolist()
+        self._parts = {each.filename: each for each in every}
+        if len(self._parts) < len(every):
+            raise FileError(f"{where}: it has a part twice; keep one")
+        size = sum(each.file_size for each in every)
+        if size > _LARGEST:
+            raise FileError(
+                f"{where}: unpacked it has {size / 1e6:.0f} MB, more than {_LARGEST / 1e6:.0f}; "
+                "give a smaller one"
+            )
+
+    def require(self, names: Iterable[str]) -> None:
+        """Raise a `FileError` unless the archive has parts of some names, and no others."""
+        wanted, there = {*names}, {*self._parts}
+        for name in sorted(wanted - there):
+            raise FileError(f"{self._where}: it has no {name}; write it again")
+        for name in sorted(there - wanted):
+            raise FileError(f"{self._where}: nothing says what {name[:60]!r} is; leave it out")
+
+    def read(self, name: str) -> bytes:
+        """Return the content of a part; a `FileError` says that it is not there, or broken."""
+        if name not in self._parts:
+            raise FileError(f"{self._where}: it has no {name}; write it again")
+        part = self._parts[name]
+        if part.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise FileError(f"{self._where}: {name} is not packed by deflate; pack it so")
+        try:
+            with self._file.open(part) as stream:
+                return stream.read(part.file_size + 1)  # of a number it unpacks no more than that
+        except _BROKEN as error:
+            raise FileError(f"{self._where}: {name} cannot be unpacked: {error}") from error
+
+    def text(self, name: str) -> str:
+        """Return a part as text; a `FileError` says that it is not UTF-8, or as `read`."""
+        try:
+            return self.read(name).decode()
+        except UnicodeDecodeError as error:
+            raise FileError(f"{self._where}: {name} is not UTF-8 text; write it again") from error
+
+    def array(self, name: str, kinds: str, shape: tuple[int | None, ...]) -> np.ndarray:
+        """Return an array.
+
+        ``kinds``: letters of the kinds of numbers that it may have, as of NumPy; ``shape``: that it
+        must have, None where any number will do. Raises `FileError` if it is none, or another.
+        """
+        found = _array(self.read(f"{name}.npy"))
+        if found is None:
+            raise FileError(f"{self._where}: {name} is no array that numpy.save wrote")
+        wanted = zip(found.shape, shape, strict=False)
+        fits = found.ndim == len(shape) and all(want in (None, has) for has, want in wanted)
+        if not fits or found.dtype.kind not in kinds:
+            said = " x ".join("any" if each is None else str(each) for each in shape) or "one"
+            raise FileError(
+                f"{self._where}: {name} has shape {found.shape} of {found.dtype}; "
+                f"{said} of kind {' or '.join(kinds)} belongs there"
+            )
+        return found
+
+
+def _array(content: bytes) -> np.ndarray | None:
+    """Return the array of what ``numpy.save`` wrote; None if it is none."""
+    start = 10 + int.from_bytes(content[8:10], "little")
+    said = _HEADER.fullmatch(content[10:start].decode("latin-1"))
+    if content[:8] != b"\x93NUMPY\x01\x00" or said is None:
+        return None
+    try:
+        kind, shape = np.dtype(said[1]), tuple(int(n) for n in said[3].split(",") if n.strip())
+        if math.prod(shape) * kind.itemsize != len(content) - start:
+            return None
+        found = np.frombuffer(content, kind, math.prod(shape), start)
+        ordered = found.reshape(shape, order="F" if said[2] == "True" else "C")
+    except (TypeError, ValueError):  # no such kind, or too many dimensions
+        return None
+    return ordered.astype(kind.newbyteorder("="), copy=False)
