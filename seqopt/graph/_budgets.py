@@ -15,7 +15,7 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from seqopt.arrays import Floats, Ints
-from seqopt.errors import InfeasibleError
+from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.duality import ROUNDING, least_sum
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import TIED, distances, tied
@@ -202,6 +202,8 @@ def budget_bounds(
     for goal in range(goals):
         amounts, price = graph.amounts[:, goal], np.maximum(prices[goal], 0.0)
         taken = np.array([cap for _, cap in limited])
+        if price.shape != taken.shape or not np.isfinite(price).all():
+            raise SolverError(f"{price.size} prices where {taken.size} numbers belong")
         paid = graph.amounts[:, [c for c, _ in limited]] @ price
         rounding = ROUNDING * graph.states * float(price @ np.abs(taken))  # of the longest path
         if graph.peaks[goal]:

@@ -36,7 +36,7 @@ from seqopt.plan.calling.formulation import (
 )
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.problem.problem import Aim
-from seqopt.scene._checks import short
+from seqopt.scene._checks import LARGEST_NUMBER, short
 
 Result = TypeVar("Result")
 
@@ -193,7 +193,7 @@ def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
     `SolverError` if a number is none, or there are too few.
     """
     with readable(name):
-        states = tuple(tuple(operator.index(n) for n in state) for state in found.states)
+        states = tuple(tuple(map(_whole, state)) for state in found.states)
         objective, bound = (tuple(map(float, part)) for part in (found.objective, found.bound))
         if not len(objective) == len(bound) == goals or not states:
             raise ValueError(
@@ -202,14 +202,30 @@ def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
             )
         if not all(b <= v + CLOSE * abs(v) for v, b in zip(objective, bound, strict=True)):
             raise ValueError("a value or bound is NaN, or a bound is above its value")
-        visited = tuple(np.asarray(rows) for rows in found.visited)
+        visited = tuple(map(_wholes, found.visited))
         prices = tuple(tuple(map(float, each)) for each in found.prices)
-        grips = tuple(tuple(operator.index(n) for n in row) for row in found.grips)
+        grips = tuple(tuple(map(_whole, row)) for row in found.grips)
         proofs = tuple(_arrays(proof) for proof in found.proofs)
         starts, motions = tuple(map(float, found.starts)), tuple(map(_motion, found.motions))
         timed = starts, float(found.ends), motions
         told = (visited, prices, text(found.stopped), grips, proofs, *timed)
         return StatePath(states, objective, bound, *told)
+
+
+def _whole(given: object) -> int:
+    """Return a whole number that an array of these can hold."""
+    number = operator.index(given)  # type: ignore[arg-type]  # raises what `readable` tells
+    if abs(number) > LARGEST_NUMBER:
+        raise ValueError(f"{short(number)} stands for no node or brick")
+    return number
+
+
+def _wholes(given: object) -> Ints:
+    """Return rows of whole numbers."""
+    out = np.asarray(given)
+    if out.ndim != 2 or not (out.dtype.kind in "iu" or np.array_equal(out % 1, 0 * out)):
+        raise ValueError(f"{out.dtype} of shape {out.shape} where rows of whole numbers belong")
+    return out.astype(np.int64)
 
 
 def _motion(given: Floats) -> Floats:
@@ -223,7 +239,7 @@ def _motion(given: Floats) -> Floats:
 def _arrays(proof: LabelProof) -> LabelProof:
     states, labels, prices = proof
     numbers = [np.array(part, dtype=float) for part in (labels, prices)]
-    return LabelProof(np.array(states, dtype=np.int64), *numbers)
+    return LabelProof(_wholes(states), *numbers)
 
 
 def require_fit(

@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.errors import InfeasibleError
+from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph._budgets import budget_bounds, is_beyond
 from seqopt.graph.duality import lexicographic_bounds
 from seqopt.graph.graph import Graph
@@ -36,6 +36,7 @@ from seqopt.plan.judge._timed_goals import Claim, GoalProofs, TimedStates
 from seqopt.problem.problem import Measure
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses._grip_sets import KnownRows
+from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.rules import Payload
 from seqopt.sequence.schedule import Schedule
@@ -482,12 +483,17 @@ class _Levels:
 
 
 def _rows(problem: States, passable: Passable, hint: Hint) -> dict[int, Ints]:
-    """Return states of a search as rows of the tables, by brick count."""
+    """Return states of a search as rows of the tables, by brick count.
+
+    Raises `SolverError` if a row is no state: it has too few numbers, or names no node.
+    """
     tables, columns = passable.tables, [r for kind in problem.space.kinds for r in kind.robots]
     order = [columns.index(r) for r in tables.team]
-    return {
-        bricks: tables.in_order(
-            rows[:, [*order, *range(len(order), rows.shape[1])]].astype(tables.start().dtype)
-        )
-        for bricks, rows in hint.items()
-    }
+    width, nodes = tables.start().shape[1], len(node_numbers(problem.network))
+    out = {}
+    for bricks, rows in hint.items():
+        if rows.shape[1] != width or (np.abs(rows[:, : len(order)]) > nodes).any():
+            raise SolverError(f"states that were visited with {bricks} bricks are none")
+        own = rows[:, [*order, *range(len(order), width)]].astype(tables.start().dtype)
+        out[bricks] = tables.in_order(own)
+    return out
