@@ -10,10 +10,15 @@ import os
 import signal
 import sys
 import threading
+import traceback
 from collections.abc import Callable
 from types import FrameType
 
-INTERRUPTED, FAILED = 130, 4  # as seqopt._cli.answer has it, which may not be there yet
+INTERRUPTED, FAILED, CRASHED = (
+    130,
+    4,
+    70,
+)  # as seqopt._cli.answer has it, which may not be there yet
 LEAST = 400e6  # bytes of addresses with which a program starts
 AGAIN = 0.05  # s after which an interrupt that was lost is raised again
 
@@ -42,6 +47,8 @@ def run() -> int:
                 f"seqopt: cannot start: {said}; give it more memory, or reinstall it\n"
             )
         return FAILED
+    except Exception as error:  # Python itself would end with the status of what does not hold
+        return _crashed(error)
     if status == INTERRUPTED:  # else Python may end by the signal, where it met an exec of text
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, AttributeError):
@@ -49,6 +56,17 @@ def run() -> int:
         os._exit(INTERRUPTED)
     gc.freeze()  # else Python would look through all once more before it ends
     return status
+
+
+def _crashed(error: Exception) -> int:
+    """Say on standard error where seqopt itself failed, last in a line; return that status."""
+    with contextlib.suppress(OSError, AttributeError, ValueError):
+        said = " ".join(f"{type(error).__name__}: {error}".split())[:500]
+        lines = "".join(traceback.format_exception(error))
+        lines += f"seqopt: internal error: {said}; this is a fault of seqopt: report it\n"
+        shown = (c if c == "\n" or c.isprintable() else repr(c)[1:-1] for c in lines)
+        sys.stderr.write("".join(shown))  # names of files may steer a terminal
+    return CRASHED
 
 
 def _answer_signals(answer: Callable[[int, FrameType | None], object]) -> None:

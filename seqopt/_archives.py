@@ -57,6 +57,11 @@ class Archive:
                 "give a smaller one"
             )
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of its parts."""
+        return tuple(self._parts)
+
     def require(self, names: Iterable[str]) -> None:
         """Raise a `FileError` unless the archive has parts of some names, and no others."""
         wanted, there = {*names}, {*self._parts}

@@ -34,6 +34,7 @@ class Status(IntEnum):
     BAD_INPUT = 2
     NO_ANSWER = 3  # infeasible, or a mechanism
     FAILED = 4  # a solver, workers, or memory; says nothing about the structure
+    CRASHED = 70  # an error of seqopt itself; no answer has this status
     INTERRUPTED = 130
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from seqopt._files import parse_json, read_table, read_text
 from seqopt.errors import SceneError, StepError, did_you_mean
-from seqopt.scene._checks import as_float, short
+from seqopt.scene._checks import LARGEST_NUMBER, as_float, short
 from seqopt.scene.scenarios import as_built
 from seqopt.scene.scene import Scene, in_order
 from seqopt.sequence.schedule import Move, OpenGrip, Schedule
@@ -57,13 +57,18 @@ def _measured(scene: Scene, told: object, where: str) -> Scene:
     """Return a scene whose bricks are where they were measured."""
     points = {} if not isinstance(told, Mapping) else {**told}
     right = all(
-        str(name).isdecimal() and isinstance(point, list) and len(point) == 3
+        name.isdecimal() and isinstance(point, list) and len(point) == 3 and _are_near(point)
         for name, point in points.items()
     )
     if not isinstance(told, Mapping) or not right:
         raise StepError(f"{where}: measured {short(told)}; give x, y, z by brick, m")
     found = {int(name): tuple(map(as_float, point)) for name, point in points.items()}
     return as_built(scene, found)
+
+
+def _are_near(values: Sequence[object]) -> bool:
+    """Return whether numbers can be places of a scene: beyond, products of them lose all digits."""
+    return all(abs(as_float(value)) <= LARGEST_NUMBER for value in values)
 
 
 def read_measured(scene: Scene, path: Path) -> dict[int, tuple[float, ...]]:
@@ -84,7 +89,7 @@ def read_measured(scene: Scene, path: Path) -> dict[int, tuple[float, ...]]:
             values = [float(row[name]) for name in columns]
         except (TypeError, ValueError):
             values = [math.nan]
-        if not all(map(math.isfinite, values)) or values[0] % 1:
+        if not _are_near(values) or values[0] % 1:
             raise StepError(f"{path}, line {number}: give numbers for {', '.join(columns)}")
         out[int(values[0])] = tuple(values[1:])
     return out

@@ -143,6 +143,28 @@ def test_what_ends_a_command_is_one_line(capsys, monkeypatch, error, status, sai
     assert err.count("\n") == 1
 
 
+def test_a_fault_of_the_program_has_a_status_that_no_answer_has():
+    """Python ends with 1, which is the status of what does not hold."""
+    program = """
+import sys
+import seqopt._cli.bare.judge
+from seqopt.__main__ import run
+
+def fails(options):
+    raise KeyError(chr(27) + "[2J")
+
+seqopt._cli.bare.judge.run = fails
+sys.argv = ["seqopt", "judge", "a", "b"]
+sys.exit(run())
+"""
+    words = {"capture_output": True, "text": True, "cwd": ROOT, "timeout": 30}
+    done = subprocess.run([sys.executable, "-c", program], check=False, **words)
+    assert (done.returncode, done.stdout) == (Status.CRASHED, "")
+    assert "Traceback" in done.stderr
+    assert done.stderr.splitlines()[-1].startswith("seqopt: internal error: KeyError: ")
+    assert chr(27) not in done.stderr
+
+
 def test_statuses():
     """The table of docs/command_line.md is this one."""
     page = Path(ROOT, "docs", "command_line.md").read_text(encoding="utf-8")

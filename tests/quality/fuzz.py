@@ -16,10 +16,13 @@ Then programs are ended from outside at 50 random moments (SIGKILL, SIGTERM and 
 half while they optimize, half while they do nothing but write. They must leave nothing or whole
 folders. After SIGKILL, which no program can answer, a hidden folder may be left beside them.
 
+Files of every kind that is read are damaged too, and read without a command: each ends in a line
+of its own, or is read.
+
 Optimizing is not drawn with discrete elements, which take minutes for hundreds of grip sets.
 
-Inputs: five small scenes. Command: ``python -m tests.quality.fuzz [--cases N] [--kills N]``; the
-exit status is 1 if there is a fault.
+Inputs: five small scenes. Command: ``python -m tests.quality.fuzz [--cases N] [--files N]
+[--kills N]``; the exit status is 1 if there is a fault.
 """
 
 from __future__ import annotations
@@ -39,6 +42,7 @@ import pandas as pd
 
 from tests.builders import ROOT
 from tests.quality.fuzz_cases import COMMANDS
+from tests.quality.fuzz_files import read_damaged, right_files
 from tests.quality.fuzz_judge import judged
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
@@ -115,7 +119,7 @@ def _left(out: Path, names: Sequence[str]) -> str:
     return ("whole" if folders else "nothing") + (", and a hidden folder" if hidden else "")
 
 
-CASES, KILLS = 20_000, 50
+CASES, KILLS, FILES = 20_000, 50, 1000
 GOOD = {"nothing", "whole"}
 KILLED = {f"{left}, and a hidden folder" for left in GOOD}  # by what no program can answer
 
@@ -143,10 +147,19 @@ def holds(table: pd.DataFrame, kills: pd.DataFrame) -> bool:
     return not table["faults"].any() and all(is_clean(row) for row in kills.to_dict("records"))
 
 
+def _damaged(count: int) -> list[str]:
+    """Return what is wrong with how damaged files of every kind are read."""
+    every = [(kind, n) for kind in (right_files() if count else ()) for n in range(count)]
+    with tempfile.TemporaryDirectory() as folder:
+        found = (read_damaged(kind, number, Path(folder)) for kind, number in every)
+        return [each for each in found if each]
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--cases", type=int, default=CASES, help="how many cases")
     parser.add_argument("--kills", type=int, default=KILLS, help="how many programs are ended")
+    parser.add_argument("--files", type=int, default=FILES, help="how many damaged ones of a kind")
     options = parser.parse_args(arguments)
     table = pd.DataFrame(list(judged(0, options.cases)))
     counts = summary(table)
@@ -159,7 +172,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"\n{ends.rename('kills').reset_index().to_string(index=False)}\n")
     for row in table[table["fault"] != ""].itertuples():
         print(f"fault in case {row.number}: {row.fault}")
-    clean = holds(counts, kills)
+    wrong = _damaged(options.files)
+    print("".join(f"fault: {each}\n" for each in wrong), end="")
+    clean = holds(counts, kills) and not wrong
     print(f"{'no' if clean else 'a'} fault: {len(table)} cases, {len(kills)} kills")
     return int(not clean)
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import io
+import json
+import tracemalloc
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,9 +13,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from seqopt.errors import SeqoptError
 from tests.quality import fuzz_judge
 from tests.quality.fuzz import BLOCKS, _left, holds, is_clean, killed, main, summary
 from tests.quality.fuzz_cases import Mutator
+from tests.quality.fuzz_files import read_damaged, right_files
 from tests.quality.fuzz_judge import judge, judged, run
 
 CASES = 120
@@ -24,7 +30,7 @@ def mutator():
 
 @pytest.mark.slow
 def test_a_small_run_of_the_command_finds_no_fault(capsys):
-    assert main(["--cases", "5", "--kills", "2"]) == 0
+    assert main(["--cases", "5", "--kills", "2", "--files", "2"]) == 0
     assert capsys.readouterr().out.splitlines()[-1] == "no fault: 5 cases, 2 kills"
 
 
@@ -119,3 +125,96 @@ def test_a_part_of_a_folder_is_seen(tmp_path):
 )
 def test_a_program_that_is_killed_leaves_nothing_or_a_whole(number):
     assert is_clean(killed("optimize" if number % 2 else "write", number))
+
+
+KINDS = (
+    *("instance", "timed instance", "answer", "answer as text", "bound 1", "bound 2", "bound 3"),
+    *("scene", "plan", "schedule", "state", "measured", "summary", "compas_assembly", "boxes"),
+    *("obj", "glb", "ply", "stl", "off", "3mf", "policy", "postures", "bases", "rows", "answers"),
+)
+
+
+def test_files_of_every_kind_are_right_before_they_are_damaged(tmp_path):
+    assert {*right_files()} == {*KINDS}
+    for name, right, read in right_files().values():
+        (tmp_path / name).write_bytes(right)
+        assert read(tmp_path / name) is not None
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_damaged_file_is_read_or_one_line_says_why_not(tmp_path, kind):
+    assert [f for n in range(60) if (f := read_damaged(kind, n, tmp_path))] == []
+
+
+def test_a_reader_that_fails_otherwise_is_seen(tmp_path, monkeypatch):
+    def fails(path):
+        raise KeyError(path.name)
+
+    name, right, _ = right_files()["plan"]
+    monkeypatch.setitem(right_files(), "plan", (name, right, fails))
+    assert "KeyError" in read_damaged("plan", 0, tmp_path)
+
+
+def with_part(content, name, part, announced=None):
+    """Return an archive with one part in place of its own, of which its directory may lie."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        parts = {each: archive.read(each) for each in archive.namelist()} | {name: part}
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for each, own in parts.items():
+            archive.writestr(each, own)
+    packed = bytearray(out.getvalue())
+    if announced is not None:  # in the directory, and before the part itself
+        size = len(part).to_bytes(4, "little")
+        packed = packed.replace(size, announced.to_bytes(4, "little"))
+    return bytes(packed)
+
+
+MANY, SOME = 260_000_000, 120_000_000  # zeros: in an archive a megabyte
+MOST = 80e6  # bytes; a file may take 64 MB before anything is unpacked
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "size", "announced"),
+    [
+        ("instance", "amount_0.npy", MANY, None),
+        ("instance", "amount_0.npy", SOME, 900),
+        ("instance", "more.npy", SOME, None),
+        ("policy", "held.npy", SOME, 900),
+        ("3mf", "3D/3dmodel.model", SOME, 900),
+    ],
+)
+def test_no_more_is_unpacked_than_may_be(tmp_path, kind, name, size, announced):
+    file, right, read = right_files()[kind]
+    (tmp_path / file).write_bytes(with_part(right, name, bytes(size), announced))
+    assert _takes(tmp_path / file, read) < MOST
+
+
+def _takes(path, read):
+    """Return the most memory that it takes to refuse a file, bytes."""
+    tracemalloc.start()
+    try:
+        with pytest.raises(SeqoptError):
+            read(path)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_what_only_counts_takes_no_memory(tmp_path):
+    """A GLB without numbers is all zeros; a table has a cell for every column of every row."""
+    name, right, read = right_files()["glb"]
+    length = int.from_bytes(right[12:16], "little")
+    document = json.loads(right[20 : 20 + length])
+    for each in document["accessors"]:
+        each.pop("bufferView", None)
+        each["count"] = 10**8
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    whole = right[:8] + (len(right) - length + len(text)).to_bytes(4, "little")
+    whole += len(text).to_bytes(4, "little") + right[16:20] + text + right[20 + length :]
+    (tmp_path / name).write_bytes(whole)
+    assert _takes(tmp_path / name, read) < MOST
+    name, right, read = right_files()["plan"]
+    (tmp_path / name).write_bytes(b"a," * 20_000 + b"\n1" * 20_000)
+    assert _takes(tmp_path / name, read) < MOST

@@ -11,6 +11,7 @@ from seqopt._cli.values import number_word
 from seqopt._files import read_table, read_text
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.plan._other.bases import Base, facing, grid, level_axis
+from seqopt.scene._checks import LARGEST_NUMBER
 from seqopt.scene.scene import Scene
 
 _COLUMNS = ("robot", "x", "y", "z", "heading_deg")
@@ -60,7 +61,7 @@ def _number(text: str, where: str) -> float:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
+    if not abs(value) <= LARGEST_NUMBER:  # NaN is none
         raise ProblemError(f"{where}: {text!r} is not a number")
     return value
 

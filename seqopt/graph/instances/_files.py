@@ -140,6 +140,8 @@ def _arrays(document: dict[str, Any], archive: Archive) -> dict[str, np.ndarray]
     out["states"] = archive.array("states", "iu", (nodes, None))
     for name, column in zip(names, document["columns"], strict=True):
         out[name] = archive.array(name, "iuf", (nodes if column["of"] == "nodes" else arcs,))
+        if not np.isfinite(out[name]).all():
+            raise ValueError(f"{name}: give finite numbers; an arc that nobody may take is none")
     return out | (_timed_arrays(archive, nodes, arcs) if timed else {})
 
 

@@ -223,7 +223,8 @@ def _whole(given: object) -> int:
 def _wholes(given: object) -> Ints:
     """Return rows of whole numbers."""
     out = np.asarray(given)
-    if out.ndim != 2 or not (out.dtype.kind in "iu" or np.array_equal(out % 1, 0 * out)):
+    whole = out.dtype.kind in "iuf" and out.ndim == 2
+    if not whole or not ((np.abs(out) <= LARGEST_NUMBER) & (out % 1 == 0)).all():
         raise ValueError(f"{out.dtype} of shape {out.shape} where rows of whole numbers belong")
     return out.astype(np.int64)
 

@@ -17,9 +17,12 @@ from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 
+from seqopt._archives import Archive
+from seqopt._files import parse_json
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import FileError, SceneError
 from seqopt.scene._checks import short
@@ -164,6 +167,7 @@ def _arrays(mesh: Any, source: str) -> tuple[Floats, Ints]:
 def _loaded(content: bytes, source: str, form: str, loader: str) -> Any:
     """Return what trimesh makes of bytes; what it logs is for those who asked for logs."""
     require_readers(form, source)
+    content = _BOUNDED[form](content, source) if form in _BOUNDED else content
     logging.getLogger("trimesh").addHandler(_UNASKED)
     joined = {"merge_primitives": True} if form == "glb" else {}  # of several materials
     try:
@@ -174,6 +178,34 @@ def _loaded(content: bytes, source: str, form: str, loader: str) -> Any:
     except Exception as error:  # whatever a reader of broken bytes may raise
         said = short(str(error) or type(error).__name__, 80)
         raise SceneError(f"{source}: no {form} file that can be read: {said}") from error
+
+
+def _unpacked(content: bytes, source: str) -> bytes:
+    """Return an archive with the same parts, none of them packed: it takes no more when read."""
+    archive, out = Archive(content, source), io.BytesIO()
+    with ZipFile(out, "w") as plain:
+        for name in archive.names:
+            plain.writestr(name, archive.read(name))
+    return out.getvalue()
+
+
+def _counted_glb(content: bytes, source: str) -> bytes:
+    """Return a GLB whose arrays have no more numbers than it has bytes.
+
+    One without numbers of its own is all zeros, as many as it says.
+    """
+    length = int.from_bytes(content[12:16], "little")
+    text = content[20 : 20 + length].decode("utf-8", "replace")
+    document = parse_json(text, source, SceneError)
+    arrays = document.get("accessors", ()) if isinstance(document, dict) else ()
+    counts = [each.get("count", 0) if isinstance(each, dict) else 0 for each in arrays]
+    numbers = [count for count in counts if isinstance(count, int | float)]
+    if not sum(numbers) <= len(content):
+        raise SceneError(f"{source}: it counts {sum(numbers):g} points or corners, and has none")
+    return content
+
+
+_BOUNDED = {"3mf": _unpacked, "glb": _counted_glb}
 
 
 def _numbers(where: str, words: list[str]) -> list[float]:

@@ -15,7 +15,7 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import SceneError
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import as_vectors
-from seqopt.scene.imports._content import MOST_BLOCKS, Content, FileBlock
+from seqopt.scene.imports._content import MOST_BLOCKS, MOST_CORNERS, Content, FileBlock
 from seqopt.scene.shape import FLAT, Polyhedron, Surface, bend, edges, fans
 
 if TYPE_CHECKING:
@@ -129,8 +129,14 @@ def mesh_content(
 
 def object_content(objects: Iterable[FileBlock], source: str) -> Content:
     """Return the blocks of objects that have a name each; an object may be several blocks."""
-    found = []
+    found, corners = [], 0
     for own in objects:
+        corners += sum(map(len, own.faces))
+        if corners > MOST_CORNERS or len(found) > MOST_BLOCKS:  # a file may have one many times
+            raise SceneError(
+                f"{source}: more than {MOST_BLOCKS} blocks, or {MOST_CORNERS} corners of faces; "
+                "give fewer"
+            )
         sides = [face for face in own.faces if len(face) > 2]
         if any(not 0 <= min(face) <= max(face) < len(own.vertices) for face in sides):
             raise SceneError(
