@@ -98,7 +98,7 @@ def parse_json(text: str, where: str, error: type[SeqoptError] = FileError, **ho
         raise
     except ValueError:
         raise error(f"{where}: a number has too many digits; give fewer") from None
-    level = [[document]]
+    level: list[Any] = [[document]]
     for _ in range(_DEEPEST + 1):
         inside = chain.from_iterable(x.values() if isinstance(x, dict) else x for x in level)
         level = [each for each in inside if isinstance(each, dict | list)]

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.xdist_group("architecture")  # one worker reads every f
 
 ROOMS = (
     {"arrays", "errors", "_interrupts", "_later"},
-    {"_files", "work"},
+    {"_archives", "_files", "work"},
     {"_showing"},
     {"scene"},
     {"network", "arms"},

@@ -129,7 +129,7 @@ def mesh_content(
 
 def object_content(objects: Iterable[FileBlock], source: str) -> Content:
     """Return the blocks of objects that have a name each; an object may be several blocks."""
-    found, corners = [], 0
+    found, corners = list[FileBlock](), 0
     for own in objects:
         corners += sum(map(len, own.faces))
         if corners > MOST_CORNERS or len(found) > MOST_BLOCKS:  # a file may have one many times
