@@ -1,7 +1,8 @@
 """The model of an arm: its links as convex bodies, in postures and pictures, and its Jacobian.
 
 Pinocchio reads the URDF and computes where frames are; bodies are convex hulls of the meshes that
-the URDF gives for collisions. It needs the extra ``arms``.
+the URDF gives for collisions, or, of links without, of those that it shows. It needs the extra
+``arms``.
 """
 
 from __future__ import annotations
@@ -15,11 +16,15 @@ from typing import Any
 
 import numpy as np
 
+from seqopt.arms._urdf import read_urdf
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import ExtraError, SceneError
 from seqopt.scene.arm import Arm
 
 UP = 4  # folders above a URDF in which packages that it names are looked for
+_SAME = 1e-6  # m; points that are closer are one
+SAYS = "…"  # in the name of a body: what it does
+_DRAWN = 2_000  # postures from which the reach of an arm is known
 
 
 def needs_extra() -> None:
@@ -50,7 +55,7 @@ def model_path(arm: Arm) -> Path:
 class Body:
     """A convex body of an arm.
 
-    ``joint``: that moves it, 0 for none; ``shape``: as coal has it; ``rotation``, ``shift``: where
+    ``name``: of its link; ``joint``: that moves it, 0 for none; ``shape``: as coal has it; ``rotation``, ``shift``: where
     it is from that joint; ``points`` (m, 3): its corners, from there.
     """
 
@@ -97,7 +102,7 @@ class ArmModel:
         self.data = self.model.createData()
         self.flange = self.model.getFrameId(flange_of(self.model, arm))
         self.base = pin.SE3(_axes(arm), np.array(arm.position))
-        bodies = [*_bodies(geometry)]
+        bodies = [*_bodies(self.model, geometry)]
         self.fixed = [body for body in bodies if body.joint == 0]
         self.moving = [body for body in bodies if body.joint > 0]
         lower, upper = self.model.lowerPositionLimit, self.model.upperPositionLimit
@@ -107,19 +112,68 @@ class ArmModel:
         self.low: Floats = np.where(turns, np.maximum(lower, -np.pi), lower)
         self.high: Floats = np.where(turns, np.minimum(upper, np.pi), upper)
 
+        self._require_shapes(path)
         known = len(arm.joint_stiffness)
         if known not in (0, self.joints):
             raise SceneError(
                 f"arm: {known} joint stiffnesses for {self.joints} joints; give one each"
             )
 
+    def _require_shapes(self, path: Path) -> None:
+        """Raise a `SceneError` if links that are one rigid body with a length have no shape."""
+        seen = {body.joint for body in (*self.fixed, *self.moving)}
+        slides = [*~self.turns, False]
+        for joint, (length, slide) in enumerate(zip(self._lengths, slides, strict=True)):
+            if joint not in seen and (slide or length > _SAME):
+                own = (each for each in self.model.frames if each.parentJoint == joint)
+                names = [each.name for each in own if each.type.name == "BODY"]
+                raise SceneError(
+                    f"arm: {path} has no shape of {', '.join(names)}, neither <collision> nor "
+                    "<visual>, so nothing says what it hits; give it one"
+                )
+
+    @cached_property
+    def _lengths(self) -> list[float]:
+        """From every joint, and first the root, to the next one, and last to the flange, m."""
+        ends = [*[*self.model.jointPlacements][1:], self.model.frames[self.flange].placement]
+        return [float(np.linalg.norm(end.translation)) for end in ends]
+
     @cached_property
     def span(self) -> float:
         """No flange is farther from the root of the model than this, m."""
-        frame, joints = self.model.frames[self.flange], [*self.model.jointPlacements][1:]
-        links = [*joints, frame.placement]
         slides = np.maximum(np.abs(self.low), np.abs(self.high))[~self.turns].sum()
-        return float(sum(np.linalg.norm(link.translation) for link in links) + slides)
+        return float(sum(self._lengths) + slides)
+
+    @cached_property
+    def reach(self) -> float:
+        """How far the flange gets from the root of the model, m, as postures drawn at random do."""
+        flanges = (self.flange_pose(q)[1] for q in self.draw(np.random.default_rng(0), _DRAWN))
+        return float(max(np.linalg.norm(at - self.base.translation) for at in flanges))
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Bodies in words: fixed ones, moving ones, and last the tool; `SAYS` stands for what they do.
+
+        Links that come after the flange are the tool: it is said what to give.
+        """
+        frames, bodies = self.model.frames, (*self.fixed, *self.moving)
+        after = {self.flange}
+        for i, frame in enumerate(frames):  # parents come first
+            after |= {i} if frame.parentFrame in after else set()
+        parents, shaped = {frame.parentFrame for frame in frames}, {body.name for body in bodies}
+        beyond = {frames[i].name for i in after - {self.flange}}
+        tips = [
+            frames[i].name for i in sorted(after - parents) if frames[i].name in beyond - shaped
+        ]
+        flange = tips[-1] if tips else "the frame at its tip"
+        tool = (
+            f"; it comes after the flange {frames[self.flange].name}, so the model has the tool: "
+            f"give flange={flange}, and tool_length from there"
+        )
+        return (
+            *(f"link {b.name} {SAYS}{tool * (b.name in beyond)}" for b in bodies),
+            f"tool {SAYS}",
+        )
 
     @property
     def joints(self) -> int:
@@ -225,10 +279,11 @@ def _joints(model: ArmModel) -> list[Any]:
 def _read(pin: Any, path: Path, arm: Arm) -> tuple[Any, Any]:
     """Return the model of a URDF, joints locked that do not move the flange, and its bodies."""
     folders = [str(folder) for folder in [*path.resolve().parents][:UP]]
+    text = read_urdf(path).text
     try:
-        model = pin.buildModelFromUrdf(str(path))
-        geometry = pin.buildGeomFromUrdf(
-            model, str(path), pin.GeometryType.COLLISION, package_dirs=folders
+        model = pin.buildModelFromXML(text)
+        geometry = pin.buildGeomFromUrdfString(
+            model, text, pin.GeometryType.COLLISION, package_dirs=folders
         )
     except (ValueError, RuntimeError) as error:
         why = str(error).strip().splitlines()[0]
@@ -238,14 +293,28 @@ def _read(pin: Any, path: Path, arm: Arm) -> tuple[Any, Any]:
     still = [joint for joint in range(1, model.njoints) if joint not in moves]
     if still:
         model, geometry = pin.buildReducedModel(model, geometry, still, pin.neutral(model))
-    if model.nq != model.nv or not np.isfinite(model.upperPositionLimit).all():
-        raise SceneError(f"arm: {path} has a joint without limits; give it some")
     if not model.nq:
         raise SceneError(f"arm: no joint of {path} moves its flange; name another flange")
+    endless = [*_endless(model)]
+    if endless:
+        raise SceneError(
+            f"arm: {path} has no limits of joint {', '.join(endless)}; give <limit> with lower < "
+            "upper, and type revolute in place of continuous"
+        )
     return model, geometry
 
 
-def _bodies(geometry: Any) -> Iterator[Body]:
+def _endless(model: Any) -> Iterator[str]:
+    """Yield the joints that go around without end, or whose limits leave no way to move."""
+    low, high = model.lowerPositionLimit, model.upperPositionLimit
+    for name, joint in zip([*model.names][1:], [*model.joints][1:], strict=True):
+        at = joint.idx_q
+        ends = np.isfinite([low[at], high[at]]).all() and low[at] < high[at]
+        if joint.nq != joint.nv or not ends:
+            yield name
+
+
+def _bodies(model: Any, geometry: Any) -> Iterator[Body]:
     import coal  # noqa: PLC0415  # an extra
 
     for each in geometry.geometryObjects:
@@ -255,7 +324,8 @@ def _bodies(geometry: Any) -> Iterator[Body]:
             shape = shape.convex
         at = each.placement
         points = _corners(shape)
-        yield Body(each.name, each.parentJoint, shape, at.rotation, at.translation, points)
+        link = model.frames[each.parentFrame].name
+        yield Body(link, each.parentJoint, shape, at.rotation, at.translation, points)
 
 
 def _corners(shape: Any) -> Floats:
@@ -268,7 +338,6 @@ def _corners(shape: Any) -> Floats:
     return np.array([ends[[i, j, k], [0, 1, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 
 
-_SAME = 1e-6  # m; points that are closer are one
 _AROUND = 12  # points around each end of a tool
 
 _model = lru_cache(maxsize=16)(ArmModel)

@@ -177,8 +177,8 @@ def reach_table(scene: Scene) -> pd.DataFrame:
     ``node``; ``postures``, how many were found that touch neither ground, bases, the arm itself nor
     the brick that it grips; ``from_bricks``, with how many bricks that of the node is placed;
     ``to_bricks``, up to how many a posture hits none of them, zero if there is none; ``clear``, how
-    many of the kept postures hit no brick of the finished structure. Raises `SceneError` if no
-    robot has an arm.
+    many of the kept postures hit no brick of the finished structure; ``why``, what is in the way
+    where ``to_bricks`` is zero. Raises `SceneError` if no robot has an arm.
     """
     table, allowed = find_table(scene), permits(scene)
     assert allowed is not None
@@ -186,8 +186,11 @@ def reach_table(scene: Scene) -> pd.DataFrame:
     for r, name in enumerate(table.robots):
         own = next(i for i, robot in enumerate(scene.robots) if robot.name == name)
         for place, node in enumerate(n for brick in scene.placed for n in brick.nodes):
-            mine = table.rows(name, node)
+            mine, used = table.rows(name, node), allowed.rows[own, place + 1]
             last = min(len(scene.bricks), allowed.until[own, place + 1] - 1)
+            standing = np.isin(table.bricks, scene.build_order[: place // 2 + 1])
+            reached = last > place // 2
+            why = "" if reached else table.why_not(name, node, used[used >= 0], standing)
             rows.append(
                 {
                     "robot": name,
@@ -195,8 +198,9 @@ def reach_table(scene: Scene) -> pd.DataFrame:
                     "node": node,
                     "postures": int(table.found[r, table.nodes.index(node)]),
                     "from_bricks": place // 2 + 1,
-                    "to_bricks": int(last) if last > place // 2 else 0,
+                    "to_bricks": int(last) if reached else 0,
                     "clear": int((~table.hits[mine].any(axis=1)).sum()),
+                    "why": why,
                 }
             )
     return pd.DataFrame(rows)

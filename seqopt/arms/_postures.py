@@ -7,8 +7,10 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.arms._model import SAYS
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.scene.scene import Scene
 
 
@@ -33,14 +35,18 @@ class PostureTable(FrozenValue):
         Where the flange is, m.
     tools : (P,) float
         How long the body of the tool is that may hit something, from the flange, m.
-    hits : (P, B) bool
-        Which bricks an arm hits in it: it is usable while none of these stands.
+    links : tuple of str
+        Bodies of all arms, in words; `SAYS` stands for what they do.
+    strikes : (P, B) int
+        Which of these hits each brick, the one nearest to the base; -1 for none.
     collide : (P, P) bool
         Which pairs of postures, of different robots, are in each other's way.
     compliance : (P, 6, 6) float
         How a grip gives way in it by the joints of the arm, m/N and rad/(N m); NaN if not known.
     found : (R, N) int
         How many postures were found, of which at most `MOST` are kept.
+    why : (R, N) str
+        Why there is none; empty where there are some.
     """
 
     robots: tuple[str, ...]
@@ -52,14 +58,38 @@ class PostureTable(FrozenValue):
     axes: Floats
     place: Floats
     tools: Floats
-    hits: Bools
+    links: tuple[str, ...]
+    strikes: Ints
     collide: Bools
     compliance: Floats
     found: Ints
+    why: NDArray[np.str_]
+
+    @cached_property
+    def hits(self) -> Bools:
+        """Which bricks an arm hits in a posture (P, B): it is usable while none of these stands."""
+        return frozen(np.asarray(self.strikes >= 0))
 
     def rows(self, robot: str, node: int) -> Ints:
         """Return the postures of a robot at a node."""
         return self._rows.get((robot, node), np.zeros(0, dtype=np.int64))
+
+    def why_not(self, robot: str, node: int, rows: Ints, standing: Bools) -> str:
+        """Return why none of the postures of a robot at a node, as rows, is free of bricks.
+
+        ``standing`` (B,): which bricks stand. Named is what stops the one that comes farthest;
+        nothing, if one is free.
+        """
+        if not len(rows):
+            return str(self.why[self.robots.index(robot), self.nodes.index(node)])
+        hit = self.hits[rows] & standing
+        if not hit.any(axis=1).all():
+            return ""
+        first = np.where(hit, self.strikes[rows], len(self.links))
+        best = int(first.min(axis=1).argmax())
+        brick = int(first[best].argmin())
+        said = self.links[first[best, brick]]
+        return said.replace(SAYS, f"hits brick {self.bricks[brick]}")
 
     def table(self) -> pd.DataFrame:
         """Return every posture: joints, flange, and the bricks that the arm hits in it.

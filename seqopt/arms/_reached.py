@@ -18,7 +18,7 @@ from seqopt.arms._collisions import (
     overlap,
     touching,
 )
-from seqopt.arms._model import ArmModel, Placed
+from seqopt.arms._model import SAYS, ArmModel, Placed
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SceneError
 from seqopt.scene.arm import MOST
@@ -142,7 +142,7 @@ def solve(model: ArmModel, target: Target, draws: np.random.Generator) -> list[F
 
     wanted = model.base.actInv(pin.SE3(target.axes, target.place))
     found: list[Floats] = []
-    if np.linalg.norm(target.place - model.base.translation) > model.span:
+    if _distance(model, target) > model.span:
         return found
     for first in model.draw(draws, _TRIES):
         posture = _descend(pin, model, wanted, first)
@@ -154,6 +154,11 @@ def solve(model: ArmModel, target: Target, draws: np.random.Generator) -> list[F
         if inside and all(np.abs(posture - other).max() > _SAME for other in found):
             found.append(posture)
     return found
+
+
+def _distance(model: ArmModel, target: Target) -> float:
+    """Return how far the flange has to be from the root of an arm, m."""
+    return float(np.linalg.norm(target.place - model.base.translation))
 
 
 def way(model: ArmModel, target: Target, posture: Floats) -> Floats | None:
@@ -194,7 +199,7 @@ def _descend(pin: object, model: ArmModel, wanted: object, posture: Floats) -> F
 
 
 _KEPT = 64  # robots of which postures are kept, the last ones that were asked for
-_BY_POSTURE = ("node", "joints", "axes", "place", "hits")
+_BY_POSTURE = ("node", "joints", "axes", "place", "strikes")
 _SEED = 4600  # with the number of the node, of what is drawn for it
 
 
@@ -250,7 +255,9 @@ class Site:
 class Reached:
     """The postures of one robot at all nodes, as a table has them, and where its bodies are.
 
-    ``found`` (N,): how many there are at each node, before all but some are left out.
+    ``strikes`` (P, B): which body of the arm, by its names, hits each brick, -1 for none; ``found``
+    (N,): how many there are at each node, before all but some are left out; ``why``: by node, why
+    there is none.
     """
 
     model: ArmModel
@@ -258,14 +265,41 @@ class Reached:
     joints: Floats
     axes: Floats
     place: Floats
-    hits: Bools
+    strikes: Ints
     placed: Placed
     found: Ints
+    why: dict[int, str]
 
-    def rows(self, rows: Ints) -> Reached:
-        """Return some of the postures."""
+    def without(self, faults: Sequence[_Fault | None]) -> Reached:
+        """Return the postures that have no fault."""
+        rows = np.flatnonzero([fault is None for fault in faults])
         parts = {name: getattr(self, name)[rows] for name in _BY_POSTURE}
-        return replace(self, placed=self.placed.rows(rows), **parts)
+        why = self.why | _lacking(self.node, faults)
+        return replace(self, placed=self.placed.rows(rows), why=why, **parts)
+
+
+_Fault = tuple[int, int, str]  # the check that is not passed, which body, the higher the later
+
+
+def _blame(
+    faults: list[_Fault | None], rows: Ints, found: Bools, said: Sequence[str], check: int
+) -> None:
+    """Give postures without a fault the first one that is found, in place.
+
+    ``rows`` (n,): of postures; ``found`` (n, k); ``said``: the k faults in words.
+    """
+    for row, own in zip(rows.tolist(), found, strict=True):
+        if faults[row] is None and own.any():
+            body = int(own.argmax())
+            faults[row] = (check, body, said[body])
+
+
+def _lacking(node: Ints, faults: Sequence[_Fault | None]) -> dict[int, str]:
+    """Return why there is no posture at nodes (P,): what stops the one that passes the most."""
+    at: dict[int, list[_Fault | None]] = {}
+    for place, fault in zip(node.tolist(), faults, strict=True):
+        at.setdefault(place, []).append(fault)
+    return {n: max(filter(None, own))[-1] for n, own in at.items() if None not in own}
 
 
 @lru_cache(maxsize=_KEPT)
@@ -283,22 +317,25 @@ def reached_alone(site: Site, most: int) -> Reached:
         [(convex(c - c.mean(axis=0)), _at(c.mean(axis=0))) for c in corners], corners
     )
     _require_free(site, robot, np.asarray(overlap(fixed_bodies(model), bricks).any(axis=0)))
-    places, joints, flanges = _solved(site, model)
+    places, joints, flanges, why = _solved(site, model)
     tools = np.array([flange.tool for flange in flanges])
     placed, able = _with_ways(model, joints, flanges, tools)
     up = np.array(site.up)
     ground = min(float(model.base.translation @ up), *(float((c @ up).min()) for c in corners))
-    pairs, clear = apart_pairs(model), able
-    for each in (placed, *placed.ways):
-        clear &= ~np.asarray(touching(model, each, pairs).any(axis=1))
-        clear &= (_lowest(model, each, up) > ground)[:, model.above :].all(axis=1)
-    rows = np.flatnonzero(clear)
+    faults: list[_Fault | None] = [None] * len(able)
+    stuck = f"there is no straight way of {robot.arm.approach:g} m to it"
+    _blame(faults, np.arange(len(able)), ~able[:, None], [stuck], 0)
+    _blame_itself(model, faults, placed, (up, ground))
+    rows = np.flatnonzero([fault is None for fault in faults])
     free = placed.rows(rows)
     struck = np.logical_or.reduce([hits(model, each, bricks) for each in (free, *free.ways)])
     held = places[rows] // 2  # the tool goes around the brick that it grips, the arm does not
     at = np.arange(len(rows))
-    some = np.flatnonzero(~struck[at, :-1, held].any(axis=1))
     struck[at, -1, held] = False
+    moving = model.names[len(model.fixed) :]
+    said = [name.replace(SAYS, "hits the brick that it grips") for name in moving]
+    _blame(faults, rows, struck[at, :, held], said, 3)
+    some = np.flatnonzero([faults[row] is None for row in rows])
     hit = np.asarray(struck.any(axis=1))
     counts = np.bincount(places[rows[some]], minlength=len(site.nodes))
     some = some[diverse(places[rows[some]], joints[rows[some]], hit[some], most)]
@@ -309,10 +346,25 @@ def reached_alone(site: Site, most: int) -> Reached:
         joints=joints[kept],
         axes=np.array([flanges[i].axes for i in kept]).reshape(-1, 3, 3),
         place=np.array([flanges[i].place for i in kept]).reshape(-1, 3),
-        hits=hit[some],
+        strikes=np.where(hit, struck.argmax(axis=1) + len(model.fixed), -1)[some],
         placed=placed.rows(kept),
         found=counts,
+        why=why | _lacking(places, faults),
     )
+
+
+def _blame_itself(
+    model: ArmModel, faults: list[_Fault | None], placed: Placed, ground: tuple[Floats, float]
+) -> None:
+    """Find postures in which an arm touches itself or the ground, by what is up and how high."""
+    pairs, names, rows = apart_pairs(model), model.names, np.arange(len(faults))
+    both = [names[j].replace(SAYS, f"touches {names[i].split(f' {SAYS}')[0]}") for i, j in pairs]
+    above = names[len(model.fixed) + model.above :]
+    low = [name.replace(SAYS, "touches the ground") for name in above]
+    for each in (placed, *placed.ways):
+        _blame(faults, rows, touching(model, each, pairs), both, 1)
+        under = _lowest(model, each, ground[0])[:, model.above :] <= ground[1]
+        _blame(faults, rows, under, low, 2)
 
 
 def _with_ways(
@@ -344,33 +396,51 @@ def beside_others(site: Site, alone: Sequence[Reached]) -> list[Reached]:
     bases = [fixed_bodies(each.model) for each in alone]
     out = []
     for i, own in enumerate(alone):
-        clear = np.ones(len(own.node), dtype=bool)
+        faults: list[_Fault | None] = [None] * len(own.node)
+        rows = np.arange(len(own.node))
+        names = own.model.names[len(own.model.fixed) :]
         for j in (j for j in range(len(alone)) if j != i and site.together(i, j)):
+            one, two = (site.robots[k].name for k in (i, j))
             if overlap(bases[i], bases[j]).any():
-                one, two = (site.robots[k].name for k in (i, j))
                 raise SceneError(f"robot {one}: the base of its arm hits that of {two}; move one")
+            said = [name.replace(SAYS, f"hits the base of {two}") for name in names]
             for placed in (own.placed, *own.placed.ways):
-                clear &= ~np.asarray(hits(own.model, placed, bases[j]).any(axis=(1, 2)))
-        out.append(own.rows(np.flatnonzero(clear)))
+                _blame(faults, rows, hits(own.model, placed, bases[j]).any(axis=2), said, 4)
+        out.append(own.without(faults))
     return out
 
 
-def _solved(site: Site, model: ArmModel) -> tuple[Ints, Floats, list[Target]]:
-    """Return the nodes, as places, the joints and the targets of all postures of a robot."""
+def _solved(site: Site, model: ArmModel) -> tuple[Ints, Floats, list[Target], dict[int, str]]:
+    """Return the nodes, as places, the joints and the targets of all postures of a robot.
+
+    And by place why there is none.
+    """
     reach = site.robots[0].reach
-    nodes, joints, flanges = [], [], []
+    nodes, joints, flanges, why = [], [], [], {}
     for place, node in enumerate(site.nodes):
         brick = site.bricks[place // 2]
         if node in site.blocked or not reach.covers(brick.node_position(node)):
+            why[place] = "it lies outside the reach that the scene gives, or nobody may hold it"
             continue
         draws = np.random.default_rng((_SEED, place))
-        for target in targets(model, brick, node):
-            for posture in solve(model, target, draws):
-                nodes.append(place)
-                joints.append(posture)
-                flanges.append(target)
+        aims = [*targets(model, brick, node)]
+        found = [(posture, aim) for aim in aims for posture in solve(model, aim, draws)]
+        nodes += [place] * len(found)
+        joints += [posture for posture, _ in found]
+        flanges += [aim for _, aim in found]
+        if not found:
+            why[place] = _unsolved(model, aims)
     rows = np.array(joints).reshape(-1, model.joints)
-    return np.array(nodes, dtype=np.int64), rows, flanges
+    return np.array(nodes, dtype=np.int64), rows, flanges, why
+
+
+def _unsolved(model: ArmModel, aims: Sequence[Target]) -> str:
+    """Return why there is no posture for any of some targets, as far as it is known."""
+    if not aims:
+        return "the tool is too short: the flange would be in the brick, give a longer tool_length"
+    if min(_distance(model, aim) for aim in aims) > model.reach:
+        return f"too far: its flange gets about {model.reach:.2g} m from its base"
+    return "no posture was found within joint limits with the tool square to a face of the brick"
 
 
 def _lowest(model: ArmModel, placed: Placed, up: Floats) -> Floats:

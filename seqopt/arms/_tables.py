@@ -44,7 +44,9 @@ def _compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
     tell("postures that are in each other's way")
     robot_of = np.repeat(np.arange(len(reached)), [len(each.node) for each in reached])
     node = np.concatenate([each.node for each in reached])
-    found = np.array([each.found for each in reached])
+    links = [each.model.names for each in reached]
+    first = np.cumsum([len(fixed) for fixed in ((), *links)])
+    places = range(len(site.nodes))
     return PostureTable(
         robots=tuple(robot.name for robot in site.robots),
         nodes=site.nodes,
@@ -55,10 +57,17 @@ def _compute_table(site: Site, tell: Tell = lambda _: None) -> PostureTable:
         axes=np.concatenate([each.axes for each in reached]),
         place=np.concatenate([each.place for each in reached]),
         tools=np.concatenate([each.placed.tools for each in reached]),
-        hits=np.concatenate([each.hits for each in reached]),
+        links=tuple(name for own in links for name in own),
+        strikes=np.concatenate(
+            [
+                np.where(each.strikes < 0, -1, each.strikes + start)
+                for each, start in zip(reached, first.tolist(), strict=False)
+            ]
+        ),
         collide=_collisions(site, reached, robot_of),
         compliance=np.full((len(node), 6, 6), np.nan),
-        found=found,
+        found=np.array([each.found for each in reached]),
+        why=np.array([[each.why.get(place, "") for place in places] for each in reached]),
     )
 
 
@@ -106,8 +115,8 @@ def _with_compliance(table: PostureTable, arms: Sequence[tuple[str, Arm]]) -> Po
     return replace(table, compliance=found)
 
 
-_VERSION = 1  # of what is computed: tables of another one are not taken
-_NAMES = ("robots", "nodes", "bricks")
+_VERSION = 2  # of what is computed: tables of another one are not taken
+_NAMES = ("robots", "nodes", "bricks", "links")
 _MESH = re.compile(rb'filename="(?:package://|file://)?([^"]+)"')
 
 

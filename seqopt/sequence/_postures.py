@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from seqopt.arms._held import held_postures
 from seqopt.arms.reach import find_postures
-from seqopt.arrays import Terse
+from seqopt.arrays import Bools, Ints, Terse
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.steps import Step
@@ -94,7 +96,7 @@ class _Search:
         names = [f"{self._scene.robots[h.robot].name} at node {h.node}" for h in now]
         for name, hold, rows in zip(names, now, options, strict=True):
             if not rows:
-                return [], f"{name} {self._lacking(hold)}"
+                return [], f"{name} {self._lacking(step, hold)}"
         ways: list[_Way] = [()]
         for k, rows in enumerate(options):
             longer = [(*way, row) for way in ways for row in rows if self._free(way, row)]
@@ -103,22 +105,26 @@ class _Search:
             ways = longer[:_MOST_WAYS]
         return ways, ""
 
-    def _lacking(self, hold: Hold) -> str:
+    def _lacking(self, step: Step, hold: Hold) -> str:
         """Return why a hold has no posture, in words."""
-        assert hold.node is not None
-        row = None if self._held is None else self._held.row(hold.robot, hold.node)
-        one = row is not None and row >= 0
-        return "hits a brick in its one posture" if one else "has no posture"
+        rows, standing = self._own(step, hold)
+        name = self._scene.robots[hold.robot].name
+        why = self._table.why_not(name, hold.node, rows, standing)
+        one = self._held is not None and len(rows) == 1
+        return f"{'hits a brick in its one' if one else 'has no'} posture ({why})"
 
-    def _options(self, step: Step, hold: Hold) -> list[int]:
-        """Return the postures of a hold that hit no brick that stands."""
-        assert hold.node is not None
+    def _own(self, step: Step, hold: Hold) -> tuple[Ints, Bools]:
+        """Return the postures of a hold, as rows, and which bricks stand (B,)."""
         rows = self._table.rows(self._scene.robots[hold.robot].name, hold.node)
         only = None if self._held is None else self._held.row(hold.robot, hold.node)
         if only is not None:
             rows = rows[rows == only]
-        standing = [since <= step.bricks for since in self._since]
-        return [int(row) for row in rows if not (self._table.hits[row] & standing).any()]
+        return rows, np.array(self._since) <= step.bricks
+
+    def _options(self, step: Step, hold: Hold) -> list[int]:
+        """Return the postures of a hold that hit no brick that stands."""
+        rows, standing = self._own(step, hold)
+        return [int(row) for row in rows if not self._table.hits[row, standing].any()]
 
     def _free(self, way: _Way, row: int) -> bool:
         return not any(self._table.collide[row, other] for other in way)

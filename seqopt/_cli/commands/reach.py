@@ -103,9 +103,8 @@ def _described(scene: Scene, table: pd.DataFrame) -> Iterator[str]:
             f"{len(to_end)} of them up to the last brick; "
             f"{able['postures'].median() if len(able) else 0:g} postures at a node, by the median"
         )
-        lacking = [str(node) for node in rows["node"][rows["to_bricks"] == 0]]
-        if lacking:
-            yield f"  never: {_listed(lacking)}"
+        for why, lacking in rows[rows["to_bricks"] == 0].groupby("why", sort=False):
+            yield f"  never: {_listed([*map(str, lacking['node'])])} ({why})"
         early = able[able["to_bricks"] < last]
         if len(early):
             pairs = zip(early["node"], early["to_bricks"], strict=True)

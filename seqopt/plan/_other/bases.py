@@ -32,7 +32,6 @@ from seqopt.work.progress import Tell
 _SAME = 1e-9  # over the size of a value
 _ROUND, _NEAR, _FAR = 0.35, 0.25, 0.7  # of the reach: spacing, and distances from the bricks
 _MOST = 5_000  # sets of bases
-_DRAWN = 2_000  # postures from which the reach of an arm is known
 
 
 def _said(place: Vector) -> str:
@@ -116,7 +115,9 @@ def grid(scene: Scene, spacing: float | None = None) -> dict[str, tuple[Base, ..
 
 
 def _places(scene: Scene, arm: Arm, spacing: float | None) -> Iterator[Base]:
-    up, reach = np.array(scene.up), _reach(arm)
+    from seqopt.arms._model import ArmModel  # noqa: PLC0415  # an extra
+
+    up, reach = np.array(scene.up), ArmModel(arm).reach
     step = spacing or _ROUND * reach
     x = level_axis(up)
     plane = np.array([x, np.cross(up, x)])
@@ -131,15 +132,6 @@ def _places(scene: Scene, arm: Arm, spacing: float | None) -> Iterator[Base]:
         away = float(np.linalg.norm(flat - at, axis=1).min())
         if _NEAR * reach <= away <= _FAR * reach:
             yield facing(scene, _vector(at @ plane + height * up))
-
-
-def _reach(arm: Arm) -> float:
-    """Return how far from its base an arm holds, m."""
-    from seqopt.arms._model import ArmModel  # noqa: PLC0415  # an extra
-
-    model = ArmModel(arm)
-    flanges = (model.flange_pose(q)[1] for q in model.draw(np.random.default_rng(0), _DRAWN))
-    return float(max(np.linalg.norm(at - model.base.translation) for at in flanges))
 
 
 def without_arms(scene: Scene) -> Scene:

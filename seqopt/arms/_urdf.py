@@ -1,0 +1,100 @@
+"""The URDF of an arm as text, in which links without shapes for collisions take those they show."""
+
+from __future__ import annotations
+
+import re
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+from seqopt._files import read_bytes
+from seqopt.errors import SceneError
+
+_Link = ElementTree.Element
+_MACRO = re.compile(r"\$[({]")  # begins what xacro puts in
+
+
+@dataclass(frozen=True)
+class Urdf:
+    """A URDF: its ``text``; the links whose ``visual`` shapes are taken for collisions.
+
+    ``bare``: links of no shape at all that have a mass, or a joint at a distance: there is a body.
+    """
+
+    text: str
+    visual: tuple[str, ...]
+    bare: tuple[str, ...]
+
+    def __str__(self) -> str:
+        said = []
+        if self.visual:
+            said.append(f"no <collision> of {', '.join(self.visual)}: <visual> is checked instead")
+        if self.bare:
+            said.append(f"no shape at all of {', '.join(self.bare)}: nothing says what it hits")
+        return "; ".join(said)
+
+
+def read_urdf(path: Path) -> Urdf:
+    """Return a URDF. Raises `SceneError` if it is none, or xacro, which a URDF is made from."""
+    content = read_bytes(path)
+    try:
+        robot = ElementTree.fromstring(content)
+        xacro = any("xacro" in each.tag or _MACRO.search(str(each.attrib)) for each in robot.iter())
+    except ElementTree.ParseError as error:
+        xacro = b"<xacro:" in content
+        if not xacro:
+            raise SceneError(f"arm: {path} cannot be read ({error}); give a URDF") from error
+    if xacro:
+        made = f"{path.stem.removesuffix('.urdf')}.urdf"
+        raise SceneError(
+            f"arm: {path} is xacro, from which a URDF is made: run `xacro {path.name} > {made}` "
+            f"and give {made}"
+        )
+    visual, bare = [], []
+    bodies = {*_followed(robot)}
+    for link in robot.findall("link"):
+        name = str(link.get("name"))
+        if link.find("collision/geometry") is not None:
+            continue
+        if _take_visual(link):
+            visual.append(name)
+        elif name in bodies or _has_mass(link):
+            bare.append(name)
+    return Urdf(ElementTree.tostring(robot, encoding="unicode"), tuple(visual), tuple(bare))
+
+
+def _take_visual(link: _Link) -> bool:
+    """Give a link its visual shapes for collisions, in place; return whether there are any."""
+    shown = [each for each in link.findall("visual") if each.find("geometry") is not None]
+    for each in shown:
+        shape = ElementTree.SubElement(link, "collision")
+        shape.extend(deepcopy(part) for part in each if part.tag in ("origin", "geometry"))
+    return bool(shown)
+
+
+def _followed(robot: _Link) -> list[str]:
+    """Return the links, the root aside, that have a joint at a distance from their own."""
+    joints = [each for each in robot.findall("joint") if each.find("child") is not None]
+    moved = {each.find("child").get("link") for each in joints}  # type: ignore[union-attr]
+    out = []
+    for each in joints:
+        parent, origin = each.find("parent"), each.find("origin")
+        name = "" if parent is None else str(parent.get("link"))
+        shift = "0" if origin is None else str(origin.get("xyz", "0"))
+        if name in moved and any(_number(part) for part in shift.split()):
+            out.append(name)
+    return out
+
+
+def _has_mass(link: _Link) -> bool:
+    mass = link.find("inertial/mass")
+    return mass is not None and _number(str(mass.get("value"))) > 0
+
+
+def _number(text: str) -> float:
+    """Return a number; 0 where it is none, which pinocchio refuses."""
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
