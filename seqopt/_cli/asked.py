@@ -11,11 +11,12 @@ from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_payload, parse_robots
 from seqopt._cli.words.given import given_scene, given_steps
 from seqopt._cli.words.props import parse_props
+from seqopt.arms.reach import find_postures
 from seqopt.contact.mortar import Mortar
 from seqopt.engines._kinds import ChoosingEngine
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import LIMITED, make_engine
-from seqopt.errors import ProblemError, SceneError, StepError
+from seqopt.errors import ExtraError, ProblemError, SceneError, StepError
 from seqopt.network.network import Network
 from seqopt.plan.build import ShownBuild
 from seqopt.problem._arms import arm_faults
@@ -99,6 +100,15 @@ def asked_steps(options: argparse.Namespace, network: Network) -> tuple[Step, ..
             f"--method {' or '.join(METHODS)}"
         )
     return given_steps(options, network, robots)
+
+
+def posture_trouble(options: argparse.Namespace, scene: Scene) -> str:
+    """Compute postures of arms, or take those that are kept; return why there are none, if so."""
+    try:
+        find_postures(scene, options.cache, options.tell)
+    except (ExtraError, SceneError) as error:
+        return str(error)
+    return ""
 
 
 def level_notes(engine: Engine) -> tuple[str, ...]:

@@ -169,8 +169,13 @@ def quiet_numbers(*, quiet: bool = False) -> Iterator[None]:
 
 
 def _as_a_line(otherwise: Callable[..., None]) -> Callable[..., None]:
+    said = set[str]()
+
     def show_warning(message: Warning | str, category: type[Warning], *rest: Any) -> None:
+        if str(message) in said:
+            return
         if issubclass(category, SceneWarning):
+            said.add(str(message))
             note(f"seqopt: warning: {message}")
         else:
             otherwise(message, category, *rest)

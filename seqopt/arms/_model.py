@@ -55,8 +55,8 @@ def model_path(arm: Arm) -> Path:
 class Body:
     """A convex body of an arm.
 
-    ``name``: of its link; ``joint``: that moves it, 0 for none; ``shape``: as coal has it; ``rotation``, ``shift``: where
-    it is from that joint; ``points`` (m, 3): its corners, from there.
+    ``name``: of its link; ``joint``: that moves it, 0 for none; ``shape``: as coal has it;
+    ``rotation``, ``shift``: where it is from that joint; ``points`` (m, 3): corners, from there.
     """
 
     name: str
@@ -152,7 +152,7 @@ class ArmModel:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Bodies in words: fixed ones, moving ones, and last the tool; `SAYS` stands for what they do.
+        """Bodies in words: fixed ones, moving ones, and last the tool; `SAYS` is what they do.
 
         Links that come after the flange are the tool: it is said what to give.
         """

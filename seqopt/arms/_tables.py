@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import re
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
 from functools import lru_cache, partial
@@ -19,8 +20,9 @@ from seqopt.arms._collisions import collide_pairs
 from seqopt.arms._model import UP, ArmModel, model_path
 from seqopt.arms._postures import HeldPostures, PostureTable
 from seqopt.arms._reached import Reached, Site, beside_others, choose, reached_alone
+from seqopt.arms.reach import shape_notes
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.errors import SceneError
+from seqopt.errors import SceneError, SceneWarning
 from seqopt.scene.arm import MOST, Arm
 from seqopt.scene.scene import Scene
 from seqopt.work.progress import Tell
@@ -209,6 +211,8 @@ def known_table(scene: Scene, cache: Path | str | None, progress: Tell | None) -
     """Return the posture table of a scene in which a robot has an arm, computed once."""
     site = Site.of(scene)
     known = _known(site)
+    for note in () if known else shape_notes(scene):
+        warnings.warn(note, SceneWarning, stacklevel=3)
     compute = partial(_compute_table, site, progress or (lambda _: None))
     if cache is not None and Path(cache) not in known:
         known[Path(cache)] = _stored_table(Path(cache), site, lambda: known.get(None) or compute())

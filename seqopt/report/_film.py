@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from subprocess import CalledProcessError
+from subprocess import CalledProcessError, run
 from typing import Any
 
 import numpy as np
@@ -66,8 +66,7 @@ class Film:
         `FileError` if the film cannot be written.
         """
         path = Path(path)
-        if path.suffix not in (".gif", *_CODECS):
-            raise FileError(f"film {path}: give a name that ends in .gif, .mp4 or .webm")
+        self.require(path)
         try:
             if path.suffix == ".gif":
                 frames = [_shown(figure) for figure in self._figures()]
@@ -78,13 +77,27 @@ class Film:
             raise FileError(f"cannot write {path}: {error.strerror}; name another") from error
         return path
 
-    def _write_video(self, path: Path) -> None:
-        """Write a video; first beside its place, so that none is left half written."""
+    @staticmethod
+    def require(path: Path) -> None:
+        """Raise what `save` would, as far as it is known before anything is drawn."""
+        if path.suffix not in (".gif", *_CODECS):
+            raise FileError(f"film {path}: give a name that ends in .gif, .mp4 or .webm")
+        if not path.parent.is_dir():
+            raise FileError(f"cannot write {path}: there is no folder {path.parent}; name another")
+        if path.suffix == ".gif":
+            return
         if not FFMpegWriter.isAvailable():
             raise ExtraError(
                 f"film {path}: a video needs ffmpeg, which is not on the path: install it from "
                 "ffmpeg.org, or give a name that ends in .gif"
             )
+        asked = [FFMpegWriter.bin_path(), "-hide_banner", "-encoders"]
+        able = run(asked, capture_output=True, text=True, check=False).stdout.split()
+        if _CODECS[path.suffix] not in able:
+            raise FileError(f"film {path}: this ffmpeg has no {_CODECS[path.suffix]}; name a .gif")
+
+    def _write_video(self, path: Path) -> None:
+        """Write a video; first beside its place, so that none is left half written."""
         more = ["-pix_fmt", "yuv420p", "-r", str(_RATE), "-crf", "20", "-b:v", "0"]
         codec = _CODECS[path.suffix]
         writer = FFMpegWriter(fps=1 / self.seconds, codec=codec, extra_args=more)  # type: ignore[arg-type]

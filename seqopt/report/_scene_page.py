@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arms._permits import reach_table
+from seqopt.arms.reach import find_postures, shape_notes
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ExtraError, SceneError
 from seqopt.network.build import build_network
@@ -44,10 +45,14 @@ def scene_page(scene: Scene) -> str:
         "note": "Bricks appear in the order in which they are placed; a plan says who holds.",
     }
     ends, robots = f"{len(scene.grounds)} ground ends", f"{len(scene.robots)} robots"
+    doubts = [f"Of {note}." for note in shape_notes(scene)]
+    trouble = _trouble(scene)
+    doubts += [f"What arms reach is not known: {trouble}."] if trouble else []
     tables = {"Robots": _robots(scene), "Bricks, in the order of the build": _bricks(scene)}
     return _filled(
         title=escape(scene.name),
-        sentence=f"{len(scene.bricks)} bricks, {ends}, {robots}. seqopt optimize looks for a plan.",
+        sentence=f"{len(scene.bricks)} bricks, {ends}, {robots}. seqopt optimize looks for a plan."
+        + "".join(f" {escape(doubt)}" for doubt in doubts),
         tables="".join(_part(caption, part) for caption, part in tables.items()),
         data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
     )
@@ -65,14 +70,20 @@ def _reaching(scene: Scene) -> dict[int, list[int]]:
     return found
 
 
+def _trouble(scene: Scene) -> str:
+    """Return why it cannot be computed what arms reach, if so."""
+    try:
+        find_postures(scene)
+    except (ExtraError, SceneError) as error:
+        return str(error)
+    return ""
+
+
 def _by_arms(scene: Scene) -> dict[str, set[int]]:
     """Return the nodes that arms reach, by robot; nothing where it cannot be computed here."""
-    if not scene.has_arms:
+    if not scene.has_arms or _trouble(scene):
         return {}
-    try:
-        table = reach_table(scene)
-    except (ExtraError, SceneError):
-        return {}
+    table = reach_table(scene)
     able = table[table["to_bricks"] > 0]
     return {str(name): {*map(int, rows["node"])} for name, rows in able.groupby("robot")}
 
@@ -115,7 +126,7 @@ def _reaches(scene: Scene) -> Iterator[tuple[int, dict[str, object]]]:
 
 def _robots(scene: Scene) -> pd.DataFrame:
     """Return a row for every robot: what it may carry, and what it reaches."""
-    able = _reaching(scene)
+    able, unknown = _reaching(scene), bool(_trouble(scene))
     rows = []
     for k, robot in enumerate(scene.robots):
         reached = sum(k in who for who in able.values())
@@ -126,7 +137,7 @@ def _robots(scene: Scene) -> pd.DataFrame:
                 "payload, N": f"{robot.payload:g}",
                 "reach": str(robot.reach) if robot.arm is None else "that of its arm",
                 "base of its arm, m": arm,
-                "nodes it reaches": f"{reached} of {len(able)}",
+                "nodes it reaches": "not known" if arm and unknown else f"{reached} of {len(able)}",
             }
         )
     table = pd.DataFrame(rows)

@@ -22,6 +22,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from seqopt._files import csv_text
+from seqopt.arms.reach import shape_notes
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Want
 from seqopt.errors import ExtraError, ProblemError, SceneError
@@ -331,6 +332,7 @@ def report_page(
     data = json.dumps(_data(engine, builds, scatter), separators=(",", ":"))
     scene = engine.network.scene
     loading = f" Counted, and not drawn: {scene.loading}." if scene.loading else ""
+    loading += "".join(f" Of {note}." for note in shape_notes(scene))
     return _filled(
         title=f"{escape(scene.name)}, step by step",
         sentence=escape(sentence + loading),

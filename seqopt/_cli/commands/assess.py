@@ -21,6 +21,7 @@ from seqopt._cli.options import (
     BUILT,
     HOLDS,
     MOVES,
+    POSTURES,
     PROVES,
     STEPS_USAGE,
     WRITTEN,
@@ -198,7 +199,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )
     declare(holds, STRENGTH)
     declare(question(command, "What is asked beside verdicts?", OF_ASKED), HOW | LOADS | MAP)
-    declare(question(command, PROVES), WORKERS)
+    declare(question(command, PROVES), WORKERS | POSTURES)
     declare(question(command, WRITTEN), OUT)
     form_options(command)
 

@@ -6,14 +6,12 @@ import argparse
 from collections.abc import Sequence
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import scene_facts
-from seqopt._cli.options import WRITTEN, declare, form_options
+from seqopt._cli.asked import posture_trouble, scene_facts
+from seqopt._cli.options import POSTURES, WRITTEN, declare, form_options
 from seqopt._cli.screens import question
 from seqopt._cli.values import number_word
 from seqopt._cli.words.given import plan_folder
 from seqopt._files import require_apart, write_text
-from seqopt.arms.reach import find_postures
-from seqopt.errors import ExtraError, SceneError
 from seqopt.problem._arms import arm_faults
 from seqopt.scene.scene import Scene
 from seqopt.sequence.exports._tasks import Postures
@@ -34,9 +32,6 @@ EXAMPLES = (
 DISTANCE = {
     "--distance M": "with tasks, tasks_csv or compas_fab: from a grip to where the tool comes "
     "from and goes to, m (default: the longest side of each block)"
-}
-POSTURES = {
-    "--cache DIR": "where robots have arms: keep their postures there, and use what is there"
 }
 SOURCE = {
     "--source FILE": "with a format of COMPAS: the file that was imported, to name its elements or "
@@ -91,8 +86,6 @@ def _arms(
     """
     if options.format not in TASKS or not scene.has_arms:
         return (), None
-    try:
-        find_postures(scene, options.cache, options.tell)
-    except (ExtraError, SceneError) as error:
-        return (f"arms: grips are proposals without postures; {error}",), {}
+    if trouble := posture_trouble(options, scene):
+        return (f"arms: grips are proposals without postures; {trouble}",), {}
     return tuple(f"arms cannot: {fault}" for fault in arm_faults(scene, steps)), None

@@ -20,6 +20,7 @@ from seqopt._cli.options import (
     HOLDS,
     LIMIT,
     MOVES,
+    POSTURES,
     PROVES,
     RULE,
     STANDING,
@@ -89,7 +90,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     declare(question(command, BEST, "As before, where nothing is said."), AIM)
     criterion_options(command)
     declare(question(command, HOLDS, OF_HOLDS), LIMIT | STANDING | CURING)
-    declare(question(command, PROVES), TIME)
+    declare(question(command, PROVES), TIME | POSTURES)
     engine_options(command)
     declare(question(command, WRITTEN), {"--out DIR": "folder to write the new plan to"})
     form_options(command, strict=True, builds=True)

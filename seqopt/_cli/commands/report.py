@@ -6,8 +6,16 @@ import argparse
 from pathlib import Path
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import asked_engine, asked_prover, asked_scene, scene_facts
-from seqopt._cli.options import BUILT, WRITTEN, declare, engine_options, form_options, scene_options
+from seqopt._cli.asked import asked_engine, asked_prover, asked_scene, posture_trouble, scene_facts
+from seqopt._cli.options import (
+    BUILT,
+    POSTURES,
+    WRITTEN,
+    declare,
+    engine_options,
+    form_options,
+    scene_options,
+)
 from seqopt._cli.outputs import figure_notes, keep_apart
 from seqopt._cli.screens import question
 from seqopt._cli.words.given import file_name, plan_folder
@@ -48,13 +56,16 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     basic = question(command, BUILT)
     scene_options(basic)
     declare(basic, FOLDER)
-    engine_options(command)
+    declare(engine_options(command), POSTURES)
     declare(question(command, WRITTEN), SHOWN)
     form_options(command, builds=True)
 
 
 def run(options: argparse.Namespace) -> Answer:
     """Write the page of the plans in a folder."""
+    film = None if options.film is None else display("Film")
+    if film is not None:
+        film.require(options.film)
     usual = Path(options.folder, PAGE)
     if not Path(options.folder).is_dir():
         options.folder = plan_folder(options, asked := options.folder)
@@ -69,14 +80,15 @@ def run(options: argparse.Namespace) -> Answer:
     if options.figures is not None:
         require_folder(options.figures)
         written += () if figure_notes() else (options.figures,)
+    trouble = posture_trouble(options, scene)
     options.tell("analyzing plans and writing the page")
     engine = asked_engine(options, build_network(scene))
     prover = asked_prover(options, engine.network)
     write_text(path, folder_page(engine, options.folder, prover))
-    if options.film is not None:
+    if film is not None:
         options.tell("drawing the film")
         first = folder_builds(engine, options.folder, BuildProver(engine.network, {}))[0]
-        written += (display("Film")(engine, first.steps).save(options.film),)
+        written += (film(engine, first.steps).save(options.film),)
     if options.figures in written:
         from seqopt.report.charts import plan_figures  # noqa: PLC0415  # needs an extra
 
@@ -88,5 +100,8 @@ def run(options: argparse.Namespace) -> Answer:
         facts={"scene": scene_facts(scene)},
         text=f"written to {' and '.join(map(str, written))}",
         written=written,
-        notes=() if options.figures is None else figure_notes(),
+        notes=(
+            *([f"arms: drawn without postures; {trouble}"] if trouble else ()),
+            *(() if options.figures is None else figure_notes()),
+        ),
     )

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.asked import asked_scene, scene_facts, size_line
-from seqopt._cli.options import BUILT, declare, form_options, scene_options
+from seqopt._cli.asked import asked_scene, posture_trouble, scene_facts, size_line
+from seqopt._cli.options import BUILT, POSTURES, declare, form_options, scene_options
 from seqopt._cli.outputs import keep_apart
 from seqopt._cli.screens import question
 from seqopt._cli.words.given import file_name
@@ -49,6 +49,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     basic = question(command, BUILT)
     scene_options(basic)
     declare(basic.add_mutually_exclusive_group(), WHAT)
+    declare(basic, POSTURES)
     form_options(command)
 
 
@@ -67,6 +68,8 @@ def run(options: argparse.Namespace) -> Answer:
     if options.view:
         page = file_name(scene.name, ".html")
         keep_apart(options, page)
+        trouble = posture_trouble(options, scene)
+        lines += [f"arms: their reach is not known; {trouble}"] if trouble else []
         options.tell("writing the page")
         write_text(page, scene_page(scene))
         lines.append(f"written to {page}; open it in a browser")

@@ -9,11 +9,13 @@ import pandas as pd
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import (
+    arm_notes,
     asked_scene,
     asked_steps,
     exceeded,
     idle_notes,
     in_seconds,
+    posture_trouble,
     scene_facts,
     waits_said,
 )
@@ -23,6 +25,7 @@ from seqopt._cli.options import (
     DURATIONS,
     HOLDS,
     MOVES,
+    POSTURES,
     STANDING,
     STEPS_USAGE,
     WRITTEN,
@@ -80,7 +83,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     declare(built, DURATIONS)
     moves = question(command, MOVES)
     steps_options(moves)
-    declare(moves, REASSIGN)
+    declare(moves, REASSIGN | POSTURES)
     cures = question(command, HOLDS, "--stands, --friction and --tilt go with --curing alone.")
     declare(cures, STANDING | CURING | STIFFENS)
     out = {"--out DIR": "folder to write plan.csv, times.csv and a chart to"}
@@ -96,6 +99,7 @@ def run(options: argparse.Namespace) -> Answer:
         options.durations = [USUAL_SECONDS]
         take(options, f"durations: not known, taken as {USUAL_SECONDS}; --durations says others")
     scene = in_seconds(options, scene)
+    trouble = posture_trouble(options, scene)
     network = build_network(scene)
     steps = asked_steps(options, network)
     standing = _standing(options)
@@ -131,11 +135,17 @@ def run(options: argparse.Namespace) -> Answer:
         lines.append("--out DIR writes when every step happens, and a chart of it")
     facts = {"makespan_s": given, "reassigned_s": least, "robots": busy, "steps": build.times()}
     facts |= {} if aged is None else {"aged": aged}
+    cannot = [f"not checked; {trouble}"] if trouble else arm_notes(scene, {"": build.steps})
+    facts |= {"arms_cannot": [*cannot]} if scene.has_arms else {}
     return Answer(
         facts={"scene": scene_facts(scene), **facts},
         text="\n".join(map(wrapped, lines)),
         written=written,
-        notes=(*idle_notes(scene, build.steps), *(figure_notes() if written else ())),
+        notes=(
+            *idle_notes(scene, build.steps),
+            *(f"arms: {each}" for each in cannot),
+            *(figure_notes() if written else ()),
+        ),
     )
 
 

@@ -14,6 +14,7 @@ from tempfile import mkdtemp
 from typing import TypeAlias
 
 from seqopt._files import csv_text, write_folder
+from seqopt.arms.reach import find_postures
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import SceneError, StepError
 from seqopt.network.build import build_network
@@ -71,6 +72,7 @@ def plan_folder(options: argparse.Namespace, asked: object, *, free: bool = Fals
     if not isinstance(asked, ShownBuild):
         scene = asked if isinstance(asked, Scene) else load_scene(str(asked))
         options.plan = options.method = None
+        find_postures(scene, getattr(options, "cache", None), options.tell)
         engine = make_engine(USUAL, build_network(scene))
         steps = _free(options, scene) if free else _usual(options, engine.network, ())
         asked = options.plan or GivenSequence(engine, steps, options.method)
@@ -101,6 +103,7 @@ def given_steps(options: argparse.Namespace, network: Network, robots: Sequence[
         return plan.steps
     if plan is not None:
         return read_plan(scene, plan / "plan.csv" if is_folder(plan) else plan)
+    find_postures(scene, getattr(options, "cache", None), options.tell)
     if options.method is None:
         return _usual(options, network, robots)
     if options.method != PUBLISHED:
