@@ -437,10 +437,14 @@ def _said(entry: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in entry.items() if value is not None or key not in _UNSAID}
 
 
-def dump_scene(scene: Scene) -> str:
-    """Return a scene as JSON text, one brick, joint or robot a line."""
+def dump_scene(scene: Scene, folder: Path | None = None) -> str:
+    """Return a scene as JSON text, one brick, joint or robot a line.
+
+    ``folder``: where it will be, from which models of arms in it are named; others, and all where
+    it is not known, are named from the root.
+    """
     lines = []
-    for key, value in scene_to_dict(scene).items():
+    for key, value in scene_to_dict(_with_models(scene, partial(_from, folder))).items():
         if isinstance(value, tuple) and value and isinstance(value[0], dict):
             rows = ",\n    ".join(json.dumps(item, ensure_ascii=False) for item in value)
             lines.append(f"  {json.dumps(key)}: [\n    {rows}\n  ]")
@@ -472,12 +476,14 @@ def save_scene(scene: Scene, path: Path) -> None:
     True
     """
     folder = Path(os.path.abspath(path)).parent  # noqa: PTH100  # links are not followed
-    write_text(path, dump_scene(_with_models(scene, partial(_from, folder))))
+    write_text(path, dump_scene(scene, folder))
 
 
-def _from(folder: Path, model: str) -> Path:
+def _from(folder: Path | None, model: str) -> Path:
     place = Path(os.path.abspath(model))  # noqa: PTH100
-    return place.relative_to(folder) if place.is_relative_to(folder) else place
+    if folder is None or not place.is_relative_to(folder):
+        return place
+    return place.relative_to(folder)
 
 
 def _reach(entry: dict[str, Any]) -> Reach:

@@ -109,7 +109,7 @@ def test_an_export_without_postures_is_of_proposals(plan, folder, monkeypatch, c
     def missing(*_):
         raise kind("arms need pinocchio and coal: pip install 'seqopt[arms]'")
 
-    monkeypatch.setattr("seqopt._cli.commands.exporting.find_postures", missing)
+    monkeypatch.setattr("seqopt._cli.asked.find_postures", missing)
     out = folder / "proposed.json"
     assert main(["export", str(folder), "--format", "tasks", "--out", str(out)]) == 0
     assert "grips are proposals without postures; arms need pinocchio" in capsys.readouterr().err

@@ -119,6 +119,30 @@ def test_a_command_writes_a_film(tmp_path, capsys):
         assert found.n_frames == len((folder / "plan.csv").read_text("utf-8").splitlines()) - 1
 
 
+@pytest.mark.parametrize(
+    ("name", "encoders", "said"),
+    [
+        ("build.avi", "", "give a name that ends in .gif, .mp4 or .webm"),
+        ("no folder/build.gif", "", "there is no folder no folder; name another"),
+        ("build.mp4", None, "a video needs ffmpeg, which is not on the path"),
+        ("build.webm", " V....D libx264  H.264", "this ffmpeg has no libvpx-vp9; name a .gif"),
+    ],
+)
+def test_a_film_that_cannot_be_written_is_refused_before_the_page_is(
+    tmp_path, monkeypatch, capsys, name, encoders, said
+):
+    (tmp_path / "bin").mkdir()
+    if encoders is not None:  # what an ffmpeg answers that was built without the other one
+        program = tmp_path / "bin" / "ffmpeg"
+        program.write_text(f"#!/bin/sh\necho '{encoders}'\n")
+        program.chmod(0o755)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    assert main(["report", "chain:bricks=3", "--film", name, "--out", "page.html"]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "page.html").exists()
+
+
 def test_pictures_of_a_build_are_spread_over_it(build):
     numbers = [int(axes.get_title().split()[1]) for axes in build.plot().axes]
     assert numbers[-1] == 49

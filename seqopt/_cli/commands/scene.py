@@ -21,7 +21,7 @@ from seqopt.report._scene_page import scene_page
 from seqopt.scene._props import Prop
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, dump_scene, load_scene
+from seqopt.scene.scene_file import ABOUT, KINDS, builtin_scenes, load_scene, save_scene
 from seqopt.work.progress import with_progress
 
 DESCRIPTION = (
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace) -> Answer:
     facts = {**scene_facts(scene), **_network_facts(build_network(scene))}
     lines = [*_described(scene, facts)]
     if options.export is not None:
-        write_text(options.export, dump_scene(scene))
+        save_scene(scene, options.export)
         lines.append(f"written to {options.export}")
     written = () if options.export is None else (options.export,)
     if options.view:

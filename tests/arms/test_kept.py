@@ -1,0 +1,71 @@
+"""Every command that computes postures keeps them in a folder, and takes them from there."""
+
+from __future__ import annotations
+
+import pytest
+
+import seqopt
+from seqopt._cli.main import main
+from seqopt.arms import _tables
+from seqopt.arms._tables import _known
+from tests.arms.boxes import beside_a_wall, boxes
+
+pytest.importorskip("pinocchio")
+pytest.importorskip("coal")
+
+FREE = ("--schedule", "free", "--rule", "least_grips=0", "--rule", "newest=free")
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch, capsys):
+    """A plan of a wall with an arm; commands run beside it, in processes without any posture."""
+    monkeypatch.chdir(tmp_path)
+    scene = beside_a_wall(boxes(tmp_path / "arm.urdf"), faces=("thickness",))
+    seqopt.save_scene(scene, "s.json")
+    assert main(["optimize", "s.json", *FREE, "--aim", "steps", "--out", "plan"]) == 0
+    capsys.readouterr()
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["report", "plan", "--no-stability"],
+        ["times", "plan"],
+        ["scene", "s.json", "--view"],
+        ["replan", "plan", "--no-stability"],
+        ["export", "plan", "--format", "tasks"],
+        ["reach", "s.json"],
+    ],
+)
+def test_postures_are_kept_and_taken(folder, words, monkeypatch):
+    _known.cache_clear()
+    assert main([*words, "--cache", "kept"]) == 0
+    assert [*(folder / "kept").glob("postures-*.npz")]
+    _known.cache_clear()
+    monkeypatch.setattr(_tables, "_compute_table", lambda *_: pytest.fail("computed again"))
+    assert main([*words, "--cache", "kept"]) == 0
+
+
+def test_times_say_where_arms_cannot_be(folder, capsys):
+    assert main(["times", "plan"]) == 0
+    assert "arms:" not in capsys.readouterr().err
+    text = (folder / "plan" / "scene.json").read_text(encoding="utf-8")
+    for where, said in (
+        ("[0.3, -9.0, 0.0]", "has no posture (too far: its flange gets about 2.5 m from its base)"),
+        ("[0.3, 0.0, 0.0]", "arms: not checked; robot arm: the base of its arm hits brick 2"),
+    ):
+        moved = text.replace("[0.3, -0.9, 0.0]", where)
+        assert moved != text
+        (folder / "plan" / "scene.json").write_text(moved, encoding="utf-8")
+        assert main(["times", "plan"]) == 0
+        assert said in capsys.readouterr().err
+
+
+def test_a_report_says_why_arms_are_drawn_without_postures(folder, capsys):
+    file = folder / "plan" / "scene.json"
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text.replace("[0.3, -0.9, 0.0]", "[0.3, 0.0, 0.0]"), encoding="utf-8")
+    assert main(["report", "plan", "--no-stability"]) == 0
+    said = capsys.readouterr().err
+    assert "arms: drawn without postures; robot arm: the base of its arm hits brick 2" in said

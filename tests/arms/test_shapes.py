@@ -1,0 +1,169 @@
+"""Links without shapes for collisions, and models that are no URDF."""
+
+from __future__ import annotations
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt._cli.main import main
+from seqopt.arms import find_postures
+from seqopt.arms._model import ArmModel
+from seqopt.arms._tables import _known
+from seqopt.errors import SceneError, SceneWarning
+from seqopt.report._scene_page import scene_page
+from seqopt.scene.arm import Arm
+from tests.arms.boxes import beside_a_wall, boxes
+
+pytest.importorskip("pinocchio")
+pytest.importorskip("coal")
+
+INSIDE = (0.3, 0.0, 0.0)  # the wall
+EVERY = "no <collision> of l0, l1, l2, l3, l4, l5, l6: <visual> is checked instead"
+FREE = ("--schedule", "free", "--rule", "least_grips=0", "--rule", "newest=free")
+
+
+@pytest.fixture
+def shown(tmp_path):
+    """An arm of which nothing is given but what is shown."""
+    return boxes(tmp_path / "shown.urdf", "visual")
+
+
+def test_a_base_that_is_only_shown_hits_the_wall_as_its_twin_does(tmp_path, shown):
+    with (
+        pytest.warns(SceneWarning, match=re.escape(f"robot arm: its arm has {EVERY}")),
+        pytest.raises(SceneError, match="robot arm: the base of its arm hits brick 2; move it"),
+    ):
+        find_postures(beside_a_wall(shown, INSIDE))
+    with pytest.raises(SceneError, match="the base of its arm hits brick 2"):
+        find_postures(beside_a_wall(boxes(tmp_path / "twin.urdf"), INSIDE))
+
+
+@pytest.mark.parametrize("mesh", [False, True])
+def test_what_is_shown_collides_as_the_same_shapes_do(tmp_path, mesh):
+    more = {}
+    if mesh:
+        corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+        lines = [f"v {0.03 * x} {0.03 * y} {0.4 * z}" for x, y, z in corners]
+        faces = ("1 2 4 3", "5 7 8 6", "1 5 6 2", "3 4 8 7", "1 3 7 5", "2 6 8 4")
+        (tmp_path / "l3.obj").write_text("\n".join([*lines, *(f"f {f}" for f in faces)]))
+        more["l3"] = '<mesh filename="l3.obj"/>'
+    twin = find_postures(beside_a_wall(boxes(tmp_path / "twin.urdf")))
+    with pytest.warns(SceneWarning, match="visual"):
+        table = find_postures(beside_a_wall(boxes(tmp_path / "shown.urdf", "visual", **more)))
+    assert table.hits.any()  # so that what is shown is there
+    np.testing.assert_allclose(table.joints, twin.joints, atol=1e-9)
+    assert (table.hits == twin.hits).all()
+    assert (table.found == twin.found).all()
+
+
+def test_every_arm_is_told_of_once_with_the_links_that_lack_shapes(tmp_path):
+    shapes = {"l2": "visual", "l4": "mass", "l5": "visual"}
+    urdf = boxes(tmp_path / "some.urdf", shapes)
+    text = urdf.read_text().replace('<origin xyz="0 0 0.1"/><axis xyz="0 1 0"/>', "<axis/>")
+    urdf.write_text(text)  # the fifth joint is where the fourth is: that link has no length
+    scene = beside_a_wall(urdf, (0.3, -9.0, 0.0), (0.3, 9.0, 0.0))
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        find_postures(scene)
+        find_postures(scene)
+    said = (
+        "no <collision> of l2, l5: <visual> is checked instead; no shape at all of l4: nothing "
+        "says what it hits"
+    )
+    assert [str(each.message) for each in found] == [
+        f"robot {name}: its arm has {said}" for name in ("arm", "other")
+    ]
+    assert {each.filename for each in found} == {__file__}
+
+
+@pytest.mark.parametrize(("link", "name"), [("l0", "l0"), ("l3", "l3"), ("l6", "l6, tool0")])
+def test_a_link_with_a_length_and_no_shape_is_refused(tmp_path, link, name):
+    urdf = boxes(tmp_path / "bare.urdf", {link: ""})
+    said = f"bare.urdf has no shape of {name}, neither <collision> nor <visual>"
+    with pytest.raises(SceneError, match=said):
+        ArmModel(Arm(urdf=urdf, position=INSIDE, tool_length=0.2, tool_radius=0.03))
+
+
+def test_commands_say_which_links_have_no_shapes_in_one_line(tmp_path, shown, capsys):
+    file, plan, cache = (str(tmp_path / name) for name in ("s.json", "plan", "cache"))
+    seqopt.save_scene(beside_a_wall(shown, faces=("thickness",)), file)
+    kept = ["--cache", cache]
+    asked = [
+        ["optimize", file, *FREE, "--aim", "steps", "--out", plan, *kept],
+        ["reach", file, *kept],
+        ["times", plan, *kept],
+        ["report", plan, *kept],
+        ["export", plan, "--format", "tasks", "--out", str(tmp_path / "tasks.json"), *kept],
+    ]
+    for words in asked:
+        _known.cache_clear()  # as in a process of its own
+        assert main(words) == 0
+        assert capsys.readouterr().err.count(f"warning: robot arm: its arm has {EVERY}") == 1
+    html = "no &lt;collision&gt; of l0, l1, l2, l3, l4, l5, l6"
+    assert html in (tmp_path / "plan" / "report.html").read_text(encoding="utf-8")
+    assert html in scene_page(seqopt.load_scene(file))
+    twin = beside_a_wall(boxes(tmp_path / "twin.urdf"))
+    assert "&lt;collision" not in scene_page(twin)
+
+
+def test_sets_of_bases_repeat_no_warning(tmp_path, shown, capsys):
+    seqopt.save_scene(beside_a_wall(shown, faces=("thickness",)), tmp_path / "s.json")
+    (tmp_path / "bases.csv").write_text("robot,x,y\narm,0.3,-0.9\narm,0.3,0.9\narm,0.3,0\n")
+    words = ["optimize", str(tmp_path / "s.json"), *FREE, "--aim", "steps"]
+    assert main([*words, "--bases", str(tmp_path / "bases.csv")]) == 0
+    assert capsys.readouterr().err.count(EVERY) == 1
+
+
+def test_a_page_says_that_it_is_not_known_what_an_arm_reaches(tmp_path):
+    page = scene_page(beside_a_wall(boxes(tmp_path / "twin.urdf"), INSIDE))
+    assert "What arms reach is not known: robot arm: the base of its arm hits brick 2" in page
+    assert "0 of 12" not in page
+    free = scene_page(beside_a_wall(boxes(tmp_path / "twin.urdf")))
+    assert "12 of 12" in free
+    assert "What arms reach" not in free
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        (
+            "tower.xacro",
+            '<robot name="t" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:property name="h" '
+            'value="1"/><link name="a"/></robot>',
+            "is xacro, from which a URDF is made: run `xacro tower.xacro > tower.urdf` and give",
+        ),
+        (
+            "tower.urdf.xacro",
+            '<robot name="t"><xacro:include filename="a.xacro"/></robot>',
+            "run `xacro tower.urdf.xacro > tower.urdf`",
+        ),
+        (
+            "plain.urdf",
+            '<robot name="t"><joint name="a" type="fixed"><origin xyz="0 0 ${h}"/></joint></robot>',
+            "run `xacro plain.urdf >",
+        ),
+        ("torn.urdf", '<robot name="t"><link', "torn.urdf cannot be read (unclosed token"),
+    ],
+)
+def test_what_is_no_urdf_is_a_line_with_what_to_do(tmp_path, name, text, said):
+    (tmp_path / name).write_text(text)
+    with pytest.raises(SceneError, match=re.escape(said)) as error:
+        find_postures(beside_a_wall(tmp_path / name))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"kind": "continuous", "limit": ""},
+        {"limit": '<limit effort="1" velocity="1"/>'},
+        {"limit": '<limit lower="1" upper="-1" effort="1" velocity="1"/>'},
+    ],
+)
+def test_a_joint_without_limits_is_named(tmp_path, how):
+    with pytest.raises(SceneError, match=r"arm\.urdf has no limits of joint j3; give <limit>"):
+        find_postures(beside_a_wall(boxes(tmp_path / "arm.urdf", **how)))
