@@ -88,8 +88,8 @@ class PostureTable(FrozenValue):
         first = np.where(hit, self.strikes[rows], len(self.links))
         best = int(first.min(axis=1).argmax())
         brick = int(first[best].argmin())
-        said = self.links[first[best, brick]]
-        return said.replace(SAYS, f"hits brick {self.bricks[brick]}")
+        link = int(first[best, brick])
+        return self.links[link].replace(SAYS, f"hits brick {self.bricks[brick]}")
 
     def table(self) -> pd.DataFrame:
         """Return every posture: joints, flange, and the bricks that the arm hits in it.

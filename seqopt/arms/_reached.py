@@ -278,7 +278,7 @@ class Reached:
         return replace(self, placed=self.placed.rows(rows), why=why, **parts)
 
 
-_Fault = tuple[int, int, str]  # the check that is not passed, which body, the higher the later
+_Fault = tuple[int, int, str]  # the check that is not passed, by order; which body, the tool last
 
 
 def _blame(
@@ -405,7 +405,8 @@ def beside_others(site: Site, alone: Sequence[Reached]) -> list[Reached]:
                 raise SceneError(f"robot {one}: the base of its arm hits that of {two}; move one")
             said = [name.replace(SAYS, f"hits the base of {two}") for name in names]
             for placed in (own.placed, *own.placed.ways):
-                _blame(faults, rows, hits(own.model, placed, bases[j]).any(axis=2), said, 4)
+                struck = np.asarray(hits(own.model, placed, bases[j]).any(axis=2))
+                _blame(faults, rows, struck, said, 4)
         out.append(own.without(faults))
     return out
 

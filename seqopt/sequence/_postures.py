@@ -107,6 +107,7 @@ class _Search:
 
     def _lacking(self, step: Step, hold: Hold) -> str:
         """Return why a hold has no posture, in words."""
+        assert hold.node is not None
         rows, standing = self._own(step, hold)
         name = self._scene.robots[hold.robot].name
         why = self._table.why_not(name, hold.node, rows, standing)
@@ -115,6 +116,7 @@ class _Search:
 
     def _own(self, step: Step, hold: Hold) -> tuple[Ints, Bools]:
         """Return the postures of a hold, as rows, and which bricks stand (B,)."""
+        assert hold.node is not None
         rows = self._table.rows(self._scene.robots[hold.robot].name, hold.node)
         only = None if self._held is None else self._held.row(hold.robot, hold.node)
         if only is not None:

@@ -138,7 +138,7 @@ def test_a_film_that_cannot_be_written_is_refused_before_the_page_is(
         program.chmod(0o755)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PATH", str(tmp_path / "bin"))
-    assert main(["report", "chain:bricks=3", "--film", name, "--out", "page.html"]) == 2
+    assert main(["report", "chain:bricks=7", "--film", name, "--out", "page.html"]) == 2
     assert said in capsys.readouterr().err
     assert not (tmp_path / "page.html").exists()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import asked_engine, asked_prover, asked_scene, posture_trouble, scene_facts
@@ -63,7 +64,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> Answer:
     """Write the page of the plans in a folder."""
-    film = None if options.film is None else display("Film")
+    film: Any = None if options.film is None else display("Film")
     if film is not None:
         film.require(options.film)
     usual = Path(options.folder, PAGE)
