@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from seqopt.arms._urdf import read_urdf
+from seqopt.arms._urdf import model_path, read_urdf
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import ExtraError, SceneError
 from seqopt.scene.arm import Arm
@@ -32,23 +32,6 @@ def needs_extra() -> None:
     for name in ("pinocchio", "coal"):
         if find_spec(name) is None:
             raise ExtraError("arms need pinocchio and coal: pip install 'seqopt[arms]'")
-
-
-def model_path(arm: Arm) -> Path:
-    """Return where the URDF of an arm is; a `SceneError` says that there is none."""
-    if not arm.in_package:
-        path = Path(arm.urdf)
-        if not path.is_file():
-            raise SceneError(f"arm: there is no file {arm.urdf}; give a URDF, or package:path")
-        return path
-    package, _, rest = arm.urdf.partition(":")
-    spec = find_spec(package)
-    if spec is None or not spec.submodule_search_locations:
-        raise SceneError(f"arm: package {package} is not installed; pip install {package}")
-    for path in (Path(root, rest) for root in spec.submodule_search_locations):
-        if path.is_file():
-            return path
-    raise SceneError(f"arm: package {package} has no file {rest}")
 
 
 @dataclass(frozen=True, eq=False)

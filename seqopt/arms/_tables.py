@@ -17,10 +17,10 @@ import numpy as np
 from seqopt._archives import Archive
 from seqopt._files import make_folder, read_bytes, write_bytes
 from seqopt.arms._collisions import collide_pairs
-from seqopt.arms._model import UP, ArmModel, model_path
+from seqopt.arms._model import UP, ArmModel
 from seqopt.arms._postures import HeldPostures, PostureTable
 from seqopt.arms._reached import Reached, Site, beside_others, choose, reached_alone
-from seqopt.arms.reach import shape_notes
+from seqopt.arms._urdf import model_path, shape_notes
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SceneError, SceneWarning
 from seqopt.scene.arm import MOST, Arm

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree
 
 from seqopt._files import read_bytes
-from seqopt.errors import SceneError
+from seqopt.errors import FileError, SceneError
+from seqopt.scene.arm import Arm
+from seqopt.scene.scene import Scene
 
 _Link = ElementTree.Element
 _MACRO = re.compile(r"\$[({]")  # begins what xacro puts in
@@ -33,6 +37,23 @@ class Urdf:
         if self.bare:
             said.append(f"no shape at all of {', '.join(self.bare)}: nothing says what it hits")
         return "; ".join(said)
+
+
+def model_path(arm: Arm) -> Path:
+    """Return where the URDF of an arm is; a `SceneError` says that there is none."""
+    if not arm.in_package:
+        path = Path(arm.urdf)
+        if not path.is_file():
+            raise SceneError(f"arm: there is no file {arm.urdf}; give a URDF, or package:path")
+        return path
+    package, _, rest = arm.urdf.partition(":")
+    spec = find_spec(package)
+    if spec is None or not spec.submodule_search_locations:
+        raise SceneError(f"arm: package {package} is not installed; pip install {package}")
+    for path in (Path(root, rest) for root in spec.submodule_search_locations):
+        if path.is_file():
+            return path
+    raise SceneError(f"arm: package {package} has no file {rest}")
 
 
 def read_urdf(path: Path) -> Urdf:
@@ -62,6 +83,19 @@ def read_urdf(path: Path) -> Urdf:
         elif name in bodies or _has_mass(link):
             bare.append(name)
     return Urdf(ElementTree.tostring(robot, encoding="unicode"), tuple(visual), tuple(bare))
+
+
+def shape_notes(scene: Scene) -> tuple[str, ...]:
+    """Return which links of arms have no shapes for collisions, a line for each arm with some.
+
+    Nothing is said of a model that cannot be read: who needs it does.
+    """
+    found = []
+    for robot in scene.robots:
+        if robot.arm is not None:
+            with suppress(SceneError, FileError):
+                found.append((robot.name, str(read_urdf(model_path(robot.arm)))))
+    return tuple(f"robot {name}: its arm has {said}" for name, said in found if said)
 
 
 def _take_visual(link: _Link) -> bool:

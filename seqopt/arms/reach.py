@@ -6,32 +6,14 @@ hits a brick is usable as long as that brick does not stand.
 
 from __future__ import annotations
 
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from seqopt.errors import FileError, SceneError
 from seqopt.scene.scene import Scene
 from seqopt.work.progress import Tell
 
 if TYPE_CHECKING:
     from seqopt.arms._postures import PostureTable
-
-
-def shape_notes(scene: Scene) -> tuple[str, ...]:
-    """Return which links of arms have no shapes for collisions, a line for each arm with some.
-
-    Nothing is said of a model that cannot be read: who needs it does.
-    """
-    found = []
-    for robot in scene.robots:
-        if robot.arm is not None:
-            from seqopt.arms._model import model_path  # noqa: PLC0415  # few scenes have arms
-            from seqopt.arms._urdf import read_urdf  # noqa: PLC0415
-
-            with suppress(SceneError, FileError):
-                found.append((robot.name, str(read_urdf(model_path(robot.arm)))))
-    return tuple(f"robot {name}: its arm has {said}" for name, said in found if said)
 
 
 def find_postures(

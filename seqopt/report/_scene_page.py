@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arms._permits import reach_table
-from seqopt.arms.reach import find_postures, shape_notes
+from seqopt.arms._urdf import shape_notes
+from seqopt.arms.reach import find_postures
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ExtraError, SceneError
 from seqopt.network.build import build_network

@@ -22,7 +22,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from seqopt._files import csv_text
-from seqopt.arms.reach import shape_notes
+from seqopt.arms._urdf import shape_notes
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Want
 from seqopt.errors import ExtraError, ProblemError, SceneError

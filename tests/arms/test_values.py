@@ -11,6 +11,7 @@ import pytest
 
 import seqopt
 from seqopt.arms import _model, find_postures
+from seqopt.arms._urdf import model_path
 from seqopt.errors import ExtraError, SceneError
 from seqopt.scene.arm import Arm
 from seqopt.scene.scene_file import schema
@@ -88,4 +89,4 @@ def test_without_the_extra_it_is_named(monkeypatch):
 )
 def test_a_model_that_is_not_there_is_named(urdf, said):
     with pytest.raises(SceneError, match=re.escape(said)):
-        _model.model_path(Arm(**TOOL | {"urdf": urdf, "position": (0.0, 0.0, 0.0)}))
+        model_path(Arm(**TOOL | {"urdf": urdf, "position": (0.0, 0.0, 0.0)}))

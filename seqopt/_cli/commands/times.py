@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
@@ -51,6 +51,7 @@ from seqopt.problem.standing import Standing
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence._timing import has_durations, step_times
+from seqopt.sequence.steps import Step
 
 DESCRIPTION = (
     "Say how long a build takes and who does what when. A robot that holds nothing prepares what "
@@ -99,7 +100,6 @@ def run(options: argparse.Namespace) -> Answer:
         options.durations = [USUAL_SECONDS]
         take(options, f"durations: not known, taken as {USUAL_SECONDS}; --durations says others")
     scene = in_seconds(options, scene)
-    trouble = posture_trouble(options, scene)
     network = build_network(scene)
     steps = asked_steps(options, network)
     standing = _standing(options)
@@ -122,12 +122,8 @@ def run(options: argparse.Namespace) -> Answer:
     if build.standing is not None:
         starts = build.times()["start_s"].tolist()
         check_cured(build.engine.network, build.steps, build.standing, starts)
-    lines = [*_said(scene.name, len(steps), float(given), least), *waits_said(build)]
-    for row in busy.to_dict("records"):
-        spent = (
-            f"{what} {row[f'{what}_s']:.6g} s" for what in ("prepares", "acts", "holds", "idle")
-        )
-        lines.append(f"  {row['robot']}: {', '.join(spent)}")
+    said = _said(scene.name, len(steps), float(given), least)
+    lines = [*said, *waits_said(build), *_spent(busy)]
     lines += [] if aged is None else _softer(scene, build.responses(), aged)
     if written:
         lines.append(f"written to {options.out}: {', '.join(('plan.csv', 'times.csv', *files))}")
@@ -135,8 +131,8 @@ def run(options: argparse.Namespace) -> Answer:
         lines.append("--out DIR writes when every step happens, and a chart of it")
     facts = {"makespan_s": given, "reassigned_s": least, "robots": busy, "steps": build.times()}
     facts |= {} if aged is None else {"aged": aged}
-    cannot = [f"not checked; {trouble}"] if trouble else arm_notes(scene, {"": build.steps})
-    facts |= {"arms_cannot": [*cannot]} if scene.has_arms else {}
+    cannot = _arms_cannot(options, scene, build.steps)
+    facts |= {"arms_cannot": cannot} if scene.has_arms else {}
     return Answer(
         facts={"scene": scene_facts(scene), **facts},
         text="\n".join(map(wrapped, lines)),
@@ -155,6 +151,14 @@ def _standing(options: argparse.Namespace) -> Standing | None:
     if standing is not None and not options.curing:
         raise ProblemError("--stands: it goes with --curing here; seqopt assess says what stands")
     return standing
+
+
+def _arms_cannot(
+    options: argparse.Namespace, scene: Scene, steps: Sequence[Step]
+) -> tuple[str, ...]:
+    """Return which steps arms cannot be in, or why that is not known."""
+    trouble = posture_trouble(options, scene)
+    return (f"not checked; {trouble}",) if trouble else arm_notes(scene, {"": steps})
 
 
 def _aged(options: argparse.Namespace, build: GivenSequence) -> pd.DataFrame | None:
@@ -188,6 +192,15 @@ def _softer(scene: Scene, full: pd.DataFrame, aged: pd.DataFrame) -> Iterator[st
     yield from (f"  payload exceeded: {each}" for each in over)
     if not over:
         yield "  no payload is exceeded"
+
+
+def _spent(busy: pd.DataFrame) -> Iterator[str]:
+    """Yield how long each robot does what."""
+    for row in busy.to_dict("records"):
+        spent = (
+            f"{what} {row[f'{what}_s']:.6g} s" for what in ("prepares", "acts", "holds", "idle")
+        )
+        yield f"  {row['robot']}: {', '.join(spent)}"
 
 
 def _said(name: str, steps: int, given: float, least: float | None) -> Iterator[str]:
