@@ -29,7 +29,8 @@ class Obstacles:
     high: Floats
 
 
-def _turned(rotation: Floats, shift: Floats) -> Any:
+def turned(rotation: Floats, shift: Floats) -> Any:
+    """Return where a body is, as coal has it."""
     import coal  # noqa: PLC0415  # an extra
 
     return coal.Transform3s(rotation, shift)
@@ -60,7 +61,7 @@ class _Bodies:
     def __call__(self, posture: int, link: int) -> _Turned:
         key = (posture, link)
         if key not in self._made:
-            at = _turned(self._placed.rotation[key], self._placed.shift[key])
+            at = turned(self._placed.rotation[key], self._placed.shift[key])
             self._made[key] = (self._shape(posture, link), at)
         return self._made[key]
 
@@ -81,7 +82,7 @@ def fixed_bodies(model: ArmModel) -> Obstacles:
     for body in model.fixed:
         rotation = model.base.rotation @ body.rotation
         shift = model.base.rotation @ body.shift + model.base.translation
-        bodies.append((body.shape, _turned(rotation, shift)))
+        bodies.append((body.shape, turned(rotation, shift)))
         boxes.append(body.points @ rotation.T + shift)
     return obstacles(bodies, boxes)
 

@@ -126,7 +126,7 @@ def _chosen(table: PostureTable, at: Ints, ends: Floats, nodes: int) -> Ints:
 
     ``at`` (P,): places of postures; ``ends`` (P,): from which brick count on they hit something.
     """
-    from seqopt.arms._reached import choose  # noqa: PLC0415  # few scenes have arms
+    from seqopt.arms._postures import choose  # noqa: PLC0415  # few scenes have arms
 
     first = (at + 1) // 2  # the count at which the brick of a place is placed
     last = nodes // 2 + 1

@@ -13,6 +13,8 @@ from seqopt.arms._model import SAYS
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.scene.scene import Scene
 
+_SWEEPS = 50  # over all robots and nodes, each given its best posture beside those of the others
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PostureTable(FrozenValue):
@@ -148,3 +150,37 @@ class HeldPostures(FrozenValue):
             stiffness = np.array(arm.joint_stiffness)
             out.append(np.einsum("nij,nkj->nik", jacobian / stiffness, jacobian))
         return np.array(out)
+
+
+def choose(
+    whose: tuple[Ints, Ints], usable: Floats, collide: Bools, together: Floats, robots: int
+) -> Ints:
+    """Return one posture of every robot at every place, (R, N), -1 where there is none.
+
+    Robot by robot and place by place the posture is taken that can be used the longest and is in
+    the way of the fewest that were taken for others, until none changes.
+
+    ``whose`` (P,), (P,): robot and place; ``usable`` (P,): for which share of its time each can be
+    used; ``collide`` (P, P); ``together`` (N, N): how much it counts that two places cannot be held
+    together; ``robots``: how many there are.
+    """
+    robot, place = whose
+    out = np.full((robots, len(together)), -1)
+    groups = [np.flatnonzero((robot == r) & (place == n)) for r, n in np.ndindex(*out.shape)]
+    for at, rows in enumerate(groups):
+        if len(rows):
+            out.flat[at] = rows[int(np.argmax(usable[rows]))]
+    chosen = np.zeros(len(robot), dtype=bool)
+    chosen[out[out >= 0]] = True
+    for _ in range(_SWEEPS):
+        known = out.copy()
+        for at, rows in enumerate(groups):
+            if len(rows) > 1:
+                mine = together[place[rows[0]], place[chosen]]
+                cost = collide[rows][:, chosen] @ mine / together.sum(axis=1).max()
+                chosen[out.flat[at]] = False
+                out.flat[at] = rows[int(np.argmin(cost + 1 - usable[rows]))]
+                chosen[out.flat[at]] = True
+        if (out == known).all():
+            break
+    return out

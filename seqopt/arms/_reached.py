@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from seqopt.arms._collisions import (
     obstacles,
     overlap,
     touching,
+    turned,
 )
 from seqopt.arms._model import SAYS, ArmModel, Placed
 from seqopt.arrays import Bools, Floats, Ints
@@ -24,8 +24,6 @@ from seqopt.errors import SceneError
 from seqopt.scene.arm import MOST
 from seqopt.scene.parts import Brick, Robot
 from seqopt.scene.scene import Scene
-
-_SWEEPS = 50  # over all robots and nodes, each given its best posture beside those of the others
 
 
 def diverse(node: Ints, joints: Floats, struck: Bools, most: int) -> Ints:
@@ -48,40 +46,6 @@ def diverse(node: Ints, joints: Floats, struck: Bools, most: int) -> Ints:
             far = np.minimum(far, np.abs(joints[rows] - joints[rows[kept[-1]]]).max(axis=1))
         out += rows[kept].tolist()
     return np.array(out, dtype=np.int64)
-
-
-def choose(
-    whose: tuple[Ints, Ints], usable: Floats, collide: Bools, together: Floats, robots: int
-) -> Ints:
-    """Return one posture of every robot at every place, (R, N), -1 where there is none.
-
-    Robot by robot and place by place the posture is taken that can be used the longest and is in
-    the way of the fewest that were taken for others, until none changes.
-
-    ``whose`` (P,), (P,): robot and place; ``usable`` (P,): for which share of its time each can be
-    used; ``collide`` (P, P); ``together`` (N, N): how much it counts that two places cannot be held
-    together; ``robots``: how many there are.
-    """
-    robot, place = whose
-    out = np.full((robots, len(together)), -1)
-    groups = [np.flatnonzero((robot == r) & (place == n)) for r, n in np.ndindex(*out.shape)]
-    for at, rows in enumerate(groups):
-        if len(rows):
-            out.flat[at] = rows[int(np.argmax(usable[rows]))]
-    chosen = np.zeros(len(robot), dtype=bool)
-    chosen[out[out >= 0]] = True
-    for _ in range(_SWEEPS):
-        known = out.copy()
-        for at, rows in enumerate(groups):
-            if len(rows) > 1:
-                mine = together[place[rows[0]], place[chosen]]
-                cost = collide[rows][:, chosen] @ mine / together.sum(axis=1).max()
-                chosen[out.flat[at]] = False
-                out.flat[at] = rows[int(np.argmin(cost + 1 - usable[rows]))]
-                chosen[out.flat[at]] = True
-        if (out == known).all():
-            break
-    return out
 
 
 _TRIES = 10  # first postures that are drawn for a target
@@ -282,13 +246,17 @@ _Fault = tuple[int, int, str]  # the check that is not passed, by order; which b
 
 
 def _blame(
-    faults: list[_Fault | None], rows: Ints, found: Bools, said: Sequence[str], check: int
+    faults: list[_Fault | None],
+    found: Bools,
+    said: Sequence[str],
+    check: int,
+    rows: Ints | None = None,
 ) -> None:
     """Give postures without a fault the first one that is found, in place.
 
-    ``rows`` (n,): of postures; ``found`` (n, k); ``said``: the k faults in words.
+    ``found`` (n, k); ``said``: the k faults in words; ``rows`` (n,): of which postures, if not all.
     """
-    for row, own in zip(rows.tolist(), found, strict=True):
+    for row, own in zip(range(len(faults)) if rows is None else rows.tolist(), found, strict=True):
         if faults[row] is None and own.any():
             body = int(own.argmax())
             faults[row] = (check, body, said[body])
@@ -314,7 +282,7 @@ def reached_alone(site: Site, most: int) -> Reached:
     assert robot.arm is not None
     model, corners = ArmModel(robot.arm), [_corners(brick) for brick in site.bricks]
     bricks = obstacles(
-        [(convex(c - c.mean(axis=0)), _at(c.mean(axis=0))) for c in corners], corners
+        [(convex(c - c.mean(axis=0)), turned(np.eye(3), c.mean(axis=0))) for c in corners], corners
     )
     _require_free(site, robot, np.asarray(overlap(fixed_bodies(model), bricks).any(axis=0)))
     places, joints, flanges, why = _solved(site, model)
@@ -324,7 +292,7 @@ def reached_alone(site: Site, most: int) -> Reached:
     ground = min(float(model.base.translation @ up), *(float((c @ up).min()) for c in corners))
     faults: list[_Fault | None] = [None] * len(able)
     stuck = f"there is no straight way of {robot.arm.approach:g} m to it"
-    _blame(faults, np.arange(len(able)), ~able[:, None], [stuck], 0)
+    _blame(faults, ~able[:, None], [stuck], 0)
     _blame_itself(model, faults, placed, (up, ground))
     rows = np.flatnonzero([fault is None for fault in faults])
     free = placed.rows(rows)
@@ -334,7 +302,7 @@ def reached_alone(site: Site, most: int) -> Reached:
     struck[at, -1, held] = False
     moving = model.names[len(model.fixed) :]
     said = [name.replace(SAYS, "hits the brick that it grips") for name in moving]
-    _blame(faults, rows, struck[at, :, held], said, 3)
+    _blame(faults, struck[at, :, held], said, 3, rows)
     some = np.flatnonzero([faults[row] is None for row in rows])
     hit = np.asarray(struck.any(axis=1))
     counts = np.bincount(places[rows[some]], minlength=len(site.nodes))
@@ -357,14 +325,14 @@ def _blame_itself(
     model: ArmModel, faults: list[_Fault | None], placed: Placed, ground: tuple[Floats, float]
 ) -> None:
     """Find postures in which an arm touches itself or the ground, by what is up and how high."""
-    pairs, names, rows = apart_pairs(model), model.names, np.arange(len(faults))
+    pairs, names = apart_pairs(model), model.names
     both = [names[j].replace(SAYS, f"touches {names[i].split(f' {SAYS}')[0]}") for i, j in pairs]
     above = names[len(model.fixed) + model.above :]
     low = [name.replace(SAYS, "touches the ground") for name in above]
     for each in (placed, *placed.ways):
-        _blame(faults, rows, touching(model, each, pairs), both, 1)
+        _blame(faults, touching(model, each, pairs), both, 1)
         under = _lowest(model, each, ground[0])[:, model.above :] <= ground[1]
-        _blame(faults, rows, under, low, 2)
+        _blame(faults, under, low, 2)
 
 
 def _with_ways(
@@ -397,7 +365,6 @@ def beside_others(site: Site, alone: Sequence[Reached]) -> list[Reached]:
     out = []
     for i, own in enumerate(alone):
         faults: list[_Fault | None] = [None] * len(own.node)
-        rows = np.arange(len(own.node))
         names = own.model.names[len(own.model.fixed) :]
         for j in (j for j in range(len(alone)) if j != i and site.together(i, j)):
             one, two = (site.robots[k].name for k in (i, j))
@@ -406,7 +373,7 @@ def beside_others(site: Site, alone: Sequence[Reached]) -> list[Reached]:
             said = [name.replace(SAYS, f"hits the base of {two}") for name in names]
             for placed in (own.placed, *own.placed.ways):
                 struck = np.asarray(hits(own.model, placed, bases[j]).any(axis=2))
-                _blame(faults, rows, struck, said, 4)
+                _blame(faults, struck, said, 4)
         out.append(own.without(faults))
     return out
 
@@ -453,12 +420,6 @@ def _lowest(model: ArmModel, placed: Placed, up: Floats) -> Floats:
     out[:, -1] -= 0.5 * placed.tools * np.abs(lean)
     out[:, -1] -= model.arm.tool_radius * np.sqrt(np.clip(1.0 - lean**2, 0.0, None))
     return np.asarray(out)
-
-
-def _at(place: Floats) -> Any:
-    import coal  # noqa: PLC0415  # an extra
-
-    return coal.Transform3s(np.eye(3), place)
 
 
 def _corners(brick: Brick) -> Floats:

@@ -125,14 +125,12 @@ def run(options: argparse.Namespace) -> Answer:
     said = _said(scene.name, len(steps), float(given), least)
     lines = [*said, *waits_said(build), *_spent(busy)]
     lines += [] if aged is None else _softer(scene, build.responses(), aged)
-    if written:
-        lines.append(f"written to {options.out}: {', '.join(('plan.csv', 'times.csv', *files))}")
-    else:
-        lines.append("--out DIR writes when every step happens, and a chart of it")
+    kept = f"written to {options.out}: {', '.join(('plan.csv', 'times.csv', *files))}"
+    lines.append(kept if written else "--out DIR writes when every step happens, and a chart of it")
     facts = {"makespan_s": given, "reassigned_s": least, "robots": busy, "steps": build.times()}
-    facts |= {} if aged is None else {"aged": aged}
     cannot = _arms_cannot(options, scene, build.steps)
-    facts |= {"arms_cannot": cannot} if scene.has_arms else {}
+    facts |= {} if aged is None else {"aged": aged}
+    facts |= {"arms_cannot": cannot} if cannot else {}
     return Answer(
         facts={"scene": scene_facts(scene), **facts},
         text="\n".join(map(wrapped, lines)),
