@@ -185,11 +185,13 @@ def _read(path: Path, site: Site) -> PostureTable | None:
             "robot": ("iu", (p,)),
             "node": ("iu", (p,)),
             "found": ("iu", (r, n)),
+            "why": ("U", (r, n)),
             "joints": ("f", (p, None)),
             "axes": ("f", (p, 3, 3)),
             "place": ("f", (p, 3)),
             "tools": ("f", (p,)),
-            "hits": ("b", (p, b)),
+            "links": ("U", (None,)),
+            "strikes": ("iu", (p, b)),
             "collide": ("b", (p, p)),
             "compliance": ("f", (p, 6, 6)),
         }
@@ -198,10 +200,10 @@ def _read(path: Path, site: Site) -> PostureTable | None:
     except (OSError, ValueError):
         return None
     wanted = tuple(each.name for each in site.robots), site.nodes
-    if (content["robots"], content["nodes"]) != wanted or p == 0:
-        return None
-    low, high = (np.array([f(content[k]) for k in ("robot", "node")]) for f in (np.min, np.max))
-    return PostureTable(**content) if (low >= 0).all() and (high < (r, n)).all() else None
+    ends = {"robot": (0, r), "node": (0, n), "strikes": (-1, len(content["links"]))}
+    inside = (((low <= content[k]) & (content[k] < high)).all() for k, (low, high) in ends.items())
+    same = (content["robots"], content["nodes"]) == wanted
+    return PostureTable(**content) if same and all(inside) else None
 
 
 _SITES = 16  # of which tables are kept, the last ones that were asked for
