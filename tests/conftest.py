@@ -20,6 +20,7 @@ from seqopt.network.build import build_network
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS
+from tests.quality.kernels import running
 
 # modules and tests stay until the end: the collector need not look at them again and again
 gc.disable()
@@ -38,6 +39,12 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],  # on a busy machine everything is
 )
 settings.load_profile("seqopt")
+
+
+def pytest_report_header():
+    """Which kernels do linear algebra: what last digits decide differs between them."""
+    kernels = ", ".join(f"{package} {kernel}" for package, kernel in sorted(running().items()))
+    return f"kernels of OpenBLAS: {kernels or 'none'}"
 
 
 LONGEST = "test_the_site_builds_strictly"

@@ -1,9 +1,8 @@
-"""Rigid bodies on springs by one dense matrix: nothing of the engines, residuals in long double.
+"""Rigid bodies on springs by one dense matrix: of the engines, only how products are summed.
 
 Unknown are the twists of all bodies and the forces of the grips, at once. The matrix is factorized
-in double precision; its answer is refined against residuals that are summed in extended precision
-(numpy's ``longdouble``, 64 bits of mantissa on x86), until it no longer changes. Edges carry what
-recovery makes of these forces, as in the engines.
+in double precision; its answer is refined against residuals that are summed with twice the digits,
+until it no longer changes. Edges carry what recovery makes of these forces, as in the engines.
 """
 
 from __future__ import annotations
@@ -12,6 +11,7 @@ import numpy as np
 from scipy import linalg, sparse
 
 from seqopt.arrays import Floats, Ints
+from seqopt.engines._twice import add_products
 from seqopt.engines.interface import Fields
 from seqopt.engines.rigid._mixed import Solution, respond
 from seqopt.errors import SolverError
@@ -20,7 +20,6 @@ from seqopt.network.network import GROUND, Network
 
 SETTLED = 1e-14  # relative change of an answer that is settled
 ROUNDS = 12
-Wide = np.longdouble
 
 
 def dense_fields(network: Network, bricks: int, columns: Ints) -> Fields:
@@ -51,15 +50,12 @@ def dense_fields(network: Network, bricks: int, columns: Ints) -> Fields:
     carried = _carried(network, nodes, bricks)
     load = carried.T @ network.inner_weight[nodes].ravel()
     held = carried.toarray()[(3 * columns[:, None] + np.arange(3)).ravel()]
-    twist, force = _refined(gap, stiffness.ravel().astype(Wide), held, load)
-    own = -(stiffness.astype(Wide) * (_wide(gap) @ twist).reshape(-1, 6))
+    twist, force, stretch = _refined(gap, stiffness.ravel(), held, load)
+    own = -(stiffness * stretch.reshape(-1, 6))
     wrench = np.zeros((1, len(springs.since), 6))
-    axes = springs.axes[acting].astype(Wide)
     for part in (slice(0, 3), slice(3, 6)):
-        wrench[0, acting, part] = np.einsum("sa,saj->sj", own[:, part], axes)
-    solution = Solution(
-        twist.astype(float)[None], wrench, force.astype(float).reshape(1, len(columns), 3)
-    )
+        wrench[0, acting, part] = np.einsum("sa,saj->sj", own[:, part], springs.axes[acting])
+    solution = Solution(twist[None], wrench, force.reshape(1, len(columns), 3))
     motion = node_motion(network, bricks)
     return respond(network, build_statics(network), motion, columns[None], solution)
 
@@ -105,30 +101,29 @@ def _gaps(network: Network, acting: Ints, bricks: int) -> sparse.csr_array:
     return _spread(row, body, turned.reshape(-1, 6, 6), len(acting), bricks)
 
 
-def _wide(matrix: sparse.csr_array) -> sparse.csr_array:
-    return matrix.astype(Wide)
-
-
 def _refined(
     gap: sparse.csr_array, stiffness: Floats, held: Floats, load: Floats
-) -> tuple[Floats, Floats]:
-    """Return twists (6b,) and grip forces (3r,) in long double."""
+) -> tuple[Floats, Floats, Floats]:
+    """Return twists (6b,), grip forces (3r,) and deformations of springs (6s,)."""
     size = gap.shape[1]
     matrix = np.zeros((size + len(held),) * 2)
-    matrix[:size, :size] = (gap.T @ (gap * stiffness.astype(float)[:, None])).toarray()
+    matrix[:size, :size] = (gap.T @ (gap * stiffness[:, None])).toarray()
     matrix[:size, size:], matrix[size:, :size] = -held.T, held
     scale = np.ones(len(matrix))
     scale[:size] = 1 / np.sqrt(np.diag(matrix)[:size])
     scale[size:] = 1 / np.abs(held * scale[:size]).max(axis=1, initial=0)
     factors = linalg.lu_factor(matrix * scale[:, None] * scale)
-    across, along, tied = _wide(gap), _wide(gap.T.tocsr()), held.astype(Wide)
-    answer = np.zeros(len(matrix), Wide)
+    pulls = sparse.csr_array(sparse.hstack([-gap.T, sparse.csr_array(held.T)]))
+    tied = sparse.csr_array(held)
+    answer, change = np.zeros(len(matrix)), np.zeros(len(matrix))
     for _ in range(ROUNDS):
-        pulled = along @ (stiffness * (across @ answer[:size]))
-        left = np.concatenate([load - pulled + tied.T @ answer[size:], -tied @ answer[:size]])
-        change = scale * linalg.lu_solve(factors, (scale * left).astype(float))
         answer = answer + change
+        stretch = add_products(np.zeros(gap.shape[0]), gap, answer[:size])
+        left = add_products(load, pulls, np.concatenate([stiffness * stretch, answer[size:]]))
+        moved = add_products(np.zeros(len(held)), tied, -answer[:size])
+        change = scale * linalg.lu_solve(factors, scale * np.concatenate([left, moved]))
         parts = ((change[:size], answer[:size]), (change[size:], answer[size:]))
         if all(np.abs(a).max(initial=0) <= SETTLED * np.abs(b).max(initial=0) for a, b in parts):
-            return answer[:size], answer[size:]
+            stretch = add_products(gap @ change[:size], gap, answer[:size])  # as of both
+            return answer[:size], answer[size:], stretch
     raise SolverError(f"dense bodies: {size // 6} bricks do not settle in {ROUNDS} rounds")

@@ -26,7 +26,7 @@ from seqopt.network.network import Network, PartKind
 from seqopt.scene.scene import Scene
 
 CONTRAST = 1e7  # bar over joint stiffness; see experiments/engines/frame_contrast.py
-_FRAME_CORRECTIONS = 3  # after which a solution is judged
+_FEWEST, _MOST = 3, 12  # corrections; how fast they shrink, each processor decides in its own way
 _LAST_FRAME_CORRECTION = 1e-6  # the largest of an accepted solution, relative to it
 _SUSPICIOUS = 1e-9  # a smallest scaled eigenvalue below this, over the contrast, is looked into
 _LOOSE = 1e-12  # stiffness of a spring that has none, over the stiffest: holds its joint node
@@ -247,11 +247,11 @@ def _solve(
     if 1 / np.linalg.norm(vector) < _SUSPICIOUS / contrast:
         examine()
     answer = scale * factor.solve(scale * load)
-    for _ in range(_FRAME_CORRECTIONS):
+    for count in range(1, _MOST + 1):
         residual = pull - maps.T @ (stiffness * (maps @ answer + strain))
         correction = scale * factor.solve(scale * residual)
         answer += correction
-    last, most = (np.abs(part / scale).max() for part in (correction, answer))
-    if not last <= _LAST_FRAME_CORRECTION * most:
-        raise failure
-    return np.asarray(answer)
+        last, most = (np.abs(part / scale).max() for part in (correction, answer))
+        if count >= _FEWEST and last <= _LAST_FRAME_CORRECTION * most:
+            return np.asarray(answer)
+    raise failure

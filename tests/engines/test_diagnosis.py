@@ -21,6 +21,7 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.engines.rigid._mixed import mixed_system, solve_dense, ungripped_system
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.errors import SolverError
 from seqopt.network.build import build_network
 from tests.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
 from tests.reference_chain import solve_exactly
@@ -169,6 +170,16 @@ def test_a_frame_at_a_bad_contrast_is_seen(contrast):
     assert told.finding is Finding.ILL_CONDITIONED
     assert told.backward_error > 1e-5
     assert told.condition < 1e3  # it is the frame, not the structure
+
+
+def test_a_frame_is_corrected_as_long_as_that_helps():
+    """Three corrections were not enough, and at another contrast none are: the control."""
+    net, none = build_network(chain(100)), np.zeros((1, 0), dtype=int)
+    exact = ComplianceEngine(net).solve(100, none).displacement
+    found = FrameEngine(net).solve(100, none).displacement
+    assert np.abs(found - exact).max() <= 2e-6 * np.abs(exact).max()
+    with pytest.raises(SolverError, match="too ill-conditioned"):
+        FrameEngine(net, 1e11).solve(100, none)
 
 
 def test_a_frame_at_its_best_is_told_from_rigid_bricks():

@@ -81,7 +81,7 @@ def test_what_rows_do_not_answer_is_that_of_the_fields(alter):
     bricks = len(scene.bricks)
     sets = sets_of(engine.network, bricks, 2, 40)
     found = engine._extremes(bricks, sets, Want.RESPONSES, compiled=True)
-    assert apart(found, of_fields(engine, bricks, sets, Want.RESPONSES)) == 0
+    assert apart(found, of_fields(engine, bricks, sets, Want.RESPONSES)) <= CLOSE
 
 
 @needs_numba
@@ -160,8 +160,8 @@ def test_a_set_has_the_same_whatever_is_beside_it():
     sets = sets_of(engine.network, 6, 1, 100)  # no two grips on one brick
     whole = engine._extremes(6, sets, Want.RESPONSES, compiled=True)
     parts = [engine._extremes(6, s, Want.RESPONSES, compiled=True) for s in np.split(sets, 20)]
-    for each, some in zip(whole, zip(*parts, strict=True), strict=True):
-        assert np.array_equal(each, np.concatenate(some))
+    together = [np.concatenate(some) for some in zip(*parts, strict=True)]
+    assert apart(together, whole) <= CLOSE
 
 
 @needs_numba

@@ -79,7 +79,7 @@ def test_a_torsion_free_joint_matters_only_where_it_acts(arch25, engine25, monke
     for bricks in (1, 7, TWISTED + 1):
         sets = grip_sets(engine.network, bricks, 20) if bricks > 1 else NONE
         mine, whole = (e.solve(bricks, sets, Want.ALL) for e in (engine, engine25))
-        assert mine == whole
+        assert apart(mine, whole) <= 1e-12
     with pytest.raises(TypeError):
         engine.solve(TWISTED + 2, NONE)
 

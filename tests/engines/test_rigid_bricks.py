@@ -61,10 +61,17 @@ def test_many_small_systems(count):
     system = np.concatenate([np.tril(matrix), load[:, None]], axis=1).transpose(1, 2, 0).copy()
     answer, pivot = _solve_positive(system)
     expected = np.linalg.solve(matrix, load[..., None])[..., 0]
-    assert np.abs(answer.T - expected).max() <= 1e-9 * np.abs(expected).max()
     diagonals = np.linalg.cholesky(matrix).diagonal(axis1=1, axis2=2) ** 2
     scaled = diagonals / matrix.diagonal(axis1=1, axis2=2)
-    assert np.abs(pivot.T / scaled - 1).max() <= 1e-6
+    rounding = count * np.finfo(float).eps * np.linalg.cond(matrix)  # of both routes, at most
+
+    def is_near(answer):
+        off = np.abs(answer.T - expected).max(axis=1)
+        return (off <= rounding * np.abs(expected).max(axis=1)).all()
+
+    assert is_near(answer)
+    assert (np.abs(pivot.T / scaled - 1).max(axis=1) <= rounding).all()
+    assert not is_near(answer * (1 + 1e-6))  # the control
 
 
 @pytest.mark.parametrize("last", [-1.0, 0.0, 0.5, 1.0, 1.0 + 1e-9])
@@ -120,8 +127,9 @@ def test_what_is_solved_again_fits_what_was_asked():
     engine = ComplianceEngine(net)
     whole = engine.solve(25, [HELD, (3, 8, 10), (48, 49, 30)], Want.ALL)
     part = engine.solve(25, [HELD, (3, 8, 10), (48, 49, 30)], Want.SUPPORT)
-    assert (part.support == whole.support).all()
-    assert (part.grip_force == whole.grip_force).all()
+    for name in ("support", "grip_force"):
+        size = np.abs(getattr(whole, name)).max()
+        assert np.abs(getattr(part, name) - getattr(whole, name)).max() <= 1e-12 * size
     assert part.edge_force.shape == (3, 0)
     held = whole.displacement[2, [net.index_of_node[n] for n in (48, 49, 30)]]
     assert np.abs(held).max() < 1e-12 * np.abs(whole.displacement[2]).max()

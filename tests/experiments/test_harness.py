@@ -69,14 +69,14 @@ def test_everything_runs_and_is_a_row(smoke):
     assert (exact["gap"] <= 1e-12).all()
     assert (exact["error"] == 0).all()
     errors = smoke.groupby("engine")["error"].max()
-    assert errors["auto"] < 1e-13  # few sets here, many there: they are solved on two routes
+    assert errors["auto"] < 1e-11  # few sets here, many there: they are solved on two routes
     assert errors["auto"] < errors["discrete"] < 1e-8
     assert errors["discrete"] < errors["frame 1e7"] < 1e-5 < errors["frame 1e3"]
     windows = smoke[smoke["formulation"] == "cascade"]
     assert windows["models"].max() < exact["models"].min()
     alone = smoke[smoke["formulation"] == NO_PROOF].reset_index(drop=True)
     proven = smoke[smoke["formulation"] == "cascade"].reset_index(drop=True)
-    assert alone["objective"].equals(proven["objective"])
+    pd.testing.assert_series_equal(alone["objective"], proven["objective"], rtol=1e-9)
     compiled = smoke[smoke["formulation"].isin(["overlap_lp", "overlap_mip"])]
     assert (compiled["compile"] > 0).all()
 

@@ -35,7 +35,12 @@ def aged(words, network=NETWORK, steps=STEPS, times=TIMES):
 def test_at_once_it_is_the_table_of_today():
     own = aged("0s=1")
     full = seqopt.analyze(seqopt.make_engine("compliance", NETWORK), STEPS)
-    pd.testing.assert_frame_equal(own.drop(columns=["start_s", SHARE]), full, check_exact=True)
+    for column in full:
+        if full[column].dtype.kind == "f":
+            np.testing.assert_allclose(own[column], full[column], rtol=1e-9, err_msg=column)
+        else:
+            assert own[column].equals(full[column])
+    assert [*own.drop(columns=["start_s", SHARE])] == [*full]
     assert (own[SHARE] == 1).all()
 
 

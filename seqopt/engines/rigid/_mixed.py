@@ -21,10 +21,11 @@ from itertools import permutations
 
 import numpy as np
 from scipy import linalg, sparse
-from scipy.sparse.linalg import splu
+from scipy.sparse.linalg import SuperLU, splu
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines._hands import Hands
+from seqopt.engines._twice import add_products
 from seqopt.engines.interface import Fields, join_sets, no_sets
 from seqopt.engines.rigid._mechanism import (
     RigidStructure,
@@ -255,8 +256,10 @@ def rescaled(parts: Ungripped, wrench: Floats, twist: Floats) -> Floats:
     return np.hstack([own / parts.wrench_unit, twist / parts.twist_unit])
 
 
-_CORRECTIONS = 3  # after which an answer is judged
+_CORRECTIONS = 6  # most of an answer; rounding in what is left does not spoil them
 LAST_CORRECTION = 1e-10  # the largest of forces, moments, shifts and turns, relative to each
+_SENSITIVE = 1e-6  # largest change by last digits of the system; errors seen are a tenth or less
+_TRIES = 4  # ways in which last digits are changed
 _EMPTY = 1e-6  # forces this small beside the moments over a brick's length are not looked at alone
 _LIGHT = 1e-3  # nor what is this small beside the weight, or the motion it makes at a typical joint
 
@@ -287,7 +290,8 @@ def solve_load(
 
     ``pull`` (6b,), ``moved`` (6s,): as ``load`` and ``moved`` of the parts; ``hands``: of this set,
     if they move. Raises `MechanismError` if a motion that the load excites meets no resistance;
-    `SolverError` if the answer still changes by more than `LAST_CORRECTION`.
+    `SolverError` if the last digits of the system decide more than `_SENSITIVE` of the answer. That
+    is a matter of its condition, not of how a processor rounds.
     """
     network, bricks = parts.network, parts.bricks
     system = mixed_system(parts, grips, hands=hands)
@@ -301,11 +305,8 @@ def solve_load(
     except RuntimeError as error:
         require_resistance(network, bricks, grips, hands)
         raise SolverError(f"{bricks} bricks: exactly singular in double precision") from error
-    result = factors.solve(load)
-    for _ in range(_CORRECTIONS):
-        correction = factors.solve(load - system.matrix @ result)
-        result += correction
-    if not unchanged(parts, *np.stack([result, correction])[:, None, :last])[0]:
+    result, settled = _corrected(parts, factors, system.matrix.tocsr(), load)
+    if not settled:
         require_resistance(network, bricks, grips, hands)
         raise SolverError(
             f"{bricks} bricks: too close to a mechanism for double precision; "
@@ -314,6 +315,30 @@ def solve_load(
     wrench, twist = unscaled(parts, result[None, :last])
     force = system.force @ (result[last:] * parts.unit)
     return Solution(twist, wrench, *borne(force[None], len(grips), hands))
+
+
+def _corrected(
+    parts: Ungripped, factors: SuperLU, matrix: sparse.csr_array, load: Floats
+) -> tuple[Floats, bool]:
+    """Return the solution (6s + 6b + c,) of a factored system, and whether it is determined.
+
+    It is if corrections end, and random changes of the last digits of loads and entries change it
+    hardly.
+    """
+    last = len(parts.wrench_unit) + len(parts.twist_unit)
+    result = factors.solve(load)
+    for _ in range(_CORRECTIONS):
+        correction = factors.solve(add_products(load, matrix, -result))
+        result += correction
+        if unchanged(parts, result[None, :last], correction[None, :last])[0]:
+            break
+    else:
+        return result, False
+    digits = np.finfo(float).eps * (abs(matrix) @ np.abs(result) + np.abs(load))
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(len(load), _TRIES))
+    changes = factors.solve(digits[:, None] * signs)[:last].T
+    state = np.broadcast_to(result[:last], changes.shape)
+    return result, bool(unchanged(parts, state, changes, _SENSITIVE).all())
 
 
 def borne(force: Floats, grips: int, hands: Hands | None) -> tuple[Floats, Floats, Bools | None]:
