@@ -11,7 +11,8 @@ that a frame that is wrong by more than 1e-3 is not found to be solved well. The
 direct solve is made beyond 100 bricks; two errors below 1e-12 are alike.
 
 The cases are a choice and no proof. Random grip sets beyond a joint of 1e-8 to 1e-10 of the others'
-stiffness, which are not among them, were answered with errors of up to 9e-9 (a few of 4,000).
+stiffness, which are not among them, were answered with errors of up to 2.4e-8, and of 1e-11 and
+1e-12 with up to 7.6e-8, or refused.
 
 Inputs: none. Command: ``python -m tests.quality.engine_limits [--redraw]``. Writes
 ``engine_limits.csv`` beside this file and ``docs/figures/engine_limits.png``, which ``--redraw``

@@ -258,7 +258,7 @@ def rescaled(parts: Ungripped, wrench: Floats, twist: Floats) -> Floats:
 
 _CORRECTIONS = 6  # most of an answer; rounding in what is left does not spoil them
 LAST_CORRECTION = 1e-10  # the largest of forces, moments, shifts and turns, relative to each
-_SENSITIVE = 1e-6  # largest change by last digits of the system; errors seen are a tenth or less
+_SENSITIVE = 1e-6  # largest change by last digits of the system; errors are a tenth of it or less
 _TRIES = 4  # ways in which last digits are changed
 _EMPTY = 1e-6  # forces this small beside the moments over a brick's length are not looked at alone
 _LIGHT = 1e-3  # nor what is this small beside the weight, or the motion it makes at a typical joint
