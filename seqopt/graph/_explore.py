@@ -174,7 +174,7 @@ class _Space(Protocol):
 
 def _least(part: Part, rows: Ints, count: int) -> Ints:
     """Return so many of some rows, those of least value."""
-    return rows[np.argsort(part.values[rows, 0], kind="stable")[:count]]
+    return np.asarray(rows[np.argsort(part.values[rows, 0], kind="stable")[:count]])
 
 
 class Explorer:
@@ -351,7 +351,7 @@ class Explorer:
         if np.isinf(self.below):
             return rows[:0]
         close = np.abs(part.values[rows, 0] - self.below) <= BAND * abs(self.below)
-        return rows[close & ~part.exact[rows]]
+        return np.asarray(rows[close & ~part.exact[rows]])
 
     def refine(self, values: Sequence[float] | None = None) -> bool:
         """Value states exactly that are close to the worst values of a path; return if any were.

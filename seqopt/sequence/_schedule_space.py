@@ -138,8 +138,9 @@ class ScheduleSpace(StateRows):
     def without_choice(self) -> Iterator[tuple[int, Ints]]:
         """Yield the levels, last first, of steps without an open grip, and their state (1, r)."""
         for level, step in reversed([*enumerate(self.schedule.steps, start=1)]):
-            if not any(isinstance(grip, OpenGrip) for grip in step.grips):
-                places = [self._place.get(grip, 0) for grip in step.grips]
+            held = [grip for grip in step.grips if not isinstance(grip, OpenGrip)]
+            if len(held) == len(step.grips):
+                places = [self._place.get(grip, 0) for grip in held]
                 yield level, np.array([places], dtype=np.int32)
 
     def ended(self, states: Ints) -> Bools:
