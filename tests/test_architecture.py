@@ -52,10 +52,8 @@ SHARED = {  # what formulations may import
     "formulations.states._totals",
 }
 MECHANICS = {"network.mechanics", "engines.rigid"}  # not for the frame
-LINES, LINES_OF_A_FUNCTION = (
-    450,
-    50,
-)  # of code, so that no thought is split for a limit; imports, docstrings and comments aside
+LINES = 450  # of code: no thought is split for a limit; imports, docstrings and comments aside
+LINES_OF_A_FUNCTION = 50
 IMPORT = r"(?m)^ *((?:from .*)?\bimport (?:\([^)]*\)|.*))$"  # on one line, or in brackets
 NO_CODE = {COMMENT, NL, NEWLINE, INDENT, DEDENT, ENDMARKER}
 SAID = (ast.Module, ast.ClassDef, ast.FunctionDef)  # what may have a docstring
