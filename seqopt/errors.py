@@ -78,7 +78,7 @@ class ProblemError(SeqoptError, ValueError):
 
 
 class InfeasibleError(ProblemError):
-    """No choice of candidates is allowed."""
+    """No plan is allowed: a search that left nothing out found none."""
 
 
 class MechanismError(SeqoptError, ArithmeticError):
@@ -94,6 +94,10 @@ class MechanismError(SeqoptError, ArithmeticError):
 
 class SolverError(SeqoptError, ArithmeticError):
     """A numerical method failed to answer; this says nothing about the structure."""
+
+
+class NothingFoundError(SolverError):
+    """A search that left something out found no plan; there may be one."""
 
 
 class TimeUpError(SolverError):

@@ -85,8 +85,8 @@ def solve(
 
     ``most``: how many labels are kept at a move, from 1; it has stopped early if more were needed.
     Result: with bound and prices. Raises `InfeasibleError` if no choice is allowed, or none is
-    within all budgets; `ProblemError`, `SolverError` if ``most`` is below 1, or it had to stop
-    before it met any choice within the budgets.
+    within all budgets; `ProblemError`, `NothingFoundError` if ``most`` is below 1, or it had to
+    stop before it met any choice within the budgets.
     """
     if most < 1:
         raise ProblemError(f"labels: most is {most}; give a whole number from 1")

@@ -43,7 +43,7 @@ def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection
     """Return the best choice that was met, with bound and prices.
 
     Raises `InfeasibleError` if no choice is allowed, or prices prove that none is within all
-    budgets; `SolverError` if no choice within the budgets was met; there may be one.
+    budgets; `NothingFoundError` if no choice within the budgets was met; there may be one.
     """
     watch = watch or Watch()
     paths = priced_paths(problem)

@@ -13,7 +13,7 @@ import numpy as np
 from formulations.states._totals import least_total
 from seqopt._interrupts import answered
 from seqopt.arrays import Ints
-from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, TimeUpError
+from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
 from seqopt.graph._budgets import Within, within_budgets
 from seqopt.graph._explore import Explorer, Key, Visited
 from seqopt.graph.graph import Graph
@@ -25,7 +25,7 @@ from seqopt.graph.orders import (
     Trial,
     order_value,
 )
-from seqopt.graph.paths import Best, distances, fewest_moves, lexicographic, reached, tied
+from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
 from seqopt.graph.states._visits import FreeStates, ScenarioSums, explore
 from seqopt.graph.states.states import States
 from seqopt.plan.calling._guard import StatePath
@@ -53,13 +53,16 @@ def best_order(
 ) -> OrderSelection:
     """Return the order of the path that is chosen through the states of all orders at once.
 
-    ``width``: how many new states of a set of bricks are kept; by default, if the first goal is a
-    peak, those below that of the scene's own order.
+    ``width``: how many new states of a set of bricks are kept, where these are enough to find a
+    plan; by default, if the first goal is a peak, those below that of the scene's own order.
     """
     try:
         if problem.states.goals[0].of_margins:
             return _order_of_margin(problem, tell)
-        return _order_of_path(problem, choose, watch, tell, width)
+        if width is not None:
+            with suppress(NothingFoundError):
+                return _order_of_path(problem, choose, watch, tell, width)
+        return _order_of_path(problem, choose, watch, tell, None)
     except StopError as stop:
         if str(stop) == "memory":
             raise ProblemError(
@@ -79,7 +82,7 @@ def _order_of_path(
     own = np.inf if width or states.totals or states.budgets else _own_value(problem)
     found.rise(own if space.peaks[0] else np.inf)
     if not found.whole:
-        raise InfeasibleError("no order of the bricks has a plan")
+        raise found.without_plan("no order of the bricks has a plan")
     if states.totals:
         return _order_of_total(found, problem, choose, watch)
     if states.budgets:
@@ -105,16 +108,21 @@ def _own_value(problem: AllOrders) -> float:
 def _order_of_margin(problem: AllOrders, tell: Watching) -> OrderSelection:
     """Return the order with the best margin of stability, by halving an interval."""
     name, states = problem.states.goals[0].response, problem.states
+    goals = (Goal(Measure.STEPS), *states.goals[len(states.aims) :])
 
-    def demanding(value: float) -> Explorer:
-        asked = replace(with_margin(states, name, value), goals=(Goal(Measure.STEPS),), budgets=())
+    def demanding(value: float) -> tuple[Visited, Best | Within] | None:
+        asked = replace(with_margin(states, name, value), goals=goals)
         found = Explorer(OrderStates(replace(problem, states=asked), MOST_PARTS), tell=tell)
-        found.rise()
-        return found
+        if not found.rise():
+            return None
+        with suppress(InfeasibleError):  # of budgets
+            return exact_best(found, states.budgets)
+        return None
 
-    low, high = bisected(name, lambda value: demanding(value).whole)
-    visited = demanding(high).graph()
-    order = problem.order_of(visited.of(fewest_moves(visited.graph)))
+    low, high = bisected(name, lambda value: demanding(value) is not None)
+    found = demanding(high)
+    assert found is not None  # as it was before
+    order = problem.order_of(found[0].of(found[1].path))
     value = find_formulation("schedule_search").solve(problem.at(order)).objective[0]
     return OrderSelection(order, value, min(low, value), 0)
 
@@ -172,7 +180,7 @@ def best_total(
         if not found.rise():
             if width is not None:
                 return best_total(problem, choose, watch, tell)
-            raise InfeasibleError("no plan is allowed")
+            raise found.without_plan("no plan is allowed")
         visited = found.graph()
         best = least_total(_on_paths(visited.graph), problem.over, _cheapest(choose, watch), watch)
     except StopError as stop:
@@ -189,7 +197,7 @@ def chosen(problem: States, choose: _Choose, watch: Watch, tell: Watching) -> St
         first = narrow(problem, WIDTH, tell)
         wide = explore(problem, first.objective[0] if first else np.inf, tell=tell)
         if not wide.whole:
-            raise InfeasibleError("no plan is allowed")
+            raise wide.without_plan("no plan is allowed")
         wide.refine()
         graph, states = wide.graph()
         with answered(watch.interrupt):
@@ -272,7 +280,10 @@ def after_margins(problem: States, search: Search, tell: Watching) -> StatePath:
         raise _too_little(stop) from None
     if len(problem.goals) == 1:  # nothing else was wished
         return StatePath(tuple(states), (value,), (bound,))
-    after = after_margins(rest, search, tell)
+    try:
+        after = after_margins(rest, search, tell)
+    except InfeasibleError as error:  # with another margin there may be one
+        raise NothingFoundError(f"with the best {problem.goals[0]}, {error}") from None
     prices = ((0.0,) * len(problem.budgets), *after.prices) if problem.budgets else ()
     objective, bounds = (value, *after.objective), (bound, *after.bound)
     return replace(after, objective=objective, bound=bounds, prices=prices)
@@ -289,13 +300,13 @@ def narrow(
     for standing in (False, True)[: 1 + bool(problem.demands)]:
         space = FreeStates(problem, regrips=False, standing=standing)
         found = Explorer(space, width, tell)
-        if found.rise(np.inf if most is None else most[0]):
-            visited, best = exact_best(found, problem.budgets)
-            if most is not None and not all(map(le, best.values, most)):
-                return None
-            if not problem.demands:
-                return _selection(visited, best)
-            with suppress(InfeasibleError):
+        with suppress(NothingFoundError):
+            if found.rise(np.inf if most is None else most[0]):
+                visited, best = exact_best(found, problem.budgets)
+                if most is not None and not all(map(le, best.values, most)):
+                    return None
+                if not problem.demands:
+                    return _selection(visited, best)
                 return best_standing(problem, found)
     return None
 
@@ -328,11 +339,18 @@ def _close_alike(problem: States, found: Explorer, visited: Visited, part: tuple
 
 
 def exact_best(found: Explorer, budgets: Sequence[float] = ()) -> tuple[Visited, Best | Within]:
-    """Return the best path through visited states, values close to its own being exact."""
+    """Return the best path through visited states, values close to its own being exact.
+
+    Raises `InfeasibleError` if there is none though all states were visited; `NothingFoundError` if
+    some were not.
+    """
     while True:
         visited = found.graph()
         graph = visited.graph
-        best = within_budgets(graph, budgets) if budgets else lexicographic(graph)
+        try:
+            best = within_budgets(graph, budgets) if budgets else lexicographic(graph)
+        except InfeasibleError as error:
+            raise found.without_plan(str(error)) from None
         if not found.refine(best.values):
             return visited, best
 

@@ -30,7 +30,7 @@ from itertools import islice
 import numpy as np
 
 from formulations.states._search import StopError, best_order, exact_best, shortest, watched
-from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
+from seqopt.errors import NothingFoundError, ProblemError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.orders import (
     AllOrders,
@@ -138,7 +138,7 @@ def solve(
             raise
         why = "interrupt"
     if not search.order:
-        raise ProblemError("options most, tries: no order was found with a plan; give more")
+        raise NothingFoundError("options most, tries: no order was found with a plan; give more")
     bound = min(search.bound, search.value)
     return OrderSelection(search.order, search.value, bound, search.evaluated, why)
 
@@ -179,7 +179,7 @@ def _all_orders(search: _Search, most: int) -> bool:
     if found.whole:
         _take_best(search, found)
     elif not search.order:
-        raise InfeasibleError(
+        raise found.without_plan(
             "no order of the bricks has a plan; extend a reach, loosen a rule or raise a limit"
         )
     search.bound = search.value

@@ -31,7 +31,7 @@ from formulations.states._search import (
     watched,
 )
 from formulations.states.on_graph import Choice
-from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.errors import ProblemError
 from seqopt.graph._explore import Explorer
 from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.graph.paths import lexicographic
@@ -79,7 +79,7 @@ def solve(
             if found is None:
                 every = Explorer(FreeStates(rest), tell=tell)
                 if not every.rise():
-                    raise InfeasibleError("no plan is allowed")
+                    raise every.without_plan("no plan is allowed")
                 found = best_standing(rest, every)
         except StopError as stop:
             return plan_by_then(None, stop)

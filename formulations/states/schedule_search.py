@@ -61,7 +61,7 @@ from formulations.states._search import (
     watched,
 )
 from formulations.states.on_graph import _path_of_instance
-from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph._budgets import is_beyond
 from seqopt.graph._explore import Explorer
 from seqopt.graph.instances.instance import Instance
@@ -167,9 +167,12 @@ class _Search:
             if self._cuts and self._dives(threshold, below):
                 threshold = below = self._ceiling
                 continue
+            nothing = None
             if self._wide.rise(threshold, below):
-                with suppress(InfeasibleError):  # of what stands
+                try:
                     return best_standing(problem, self._wide)
+                except NothingFoundError as error:
+                    nothing = error
             lower = self._wide.excluded
             if self.incumbent and lower >= strictly_below(below):
                 if len(problem.goals) == 1:
@@ -177,7 +180,7 @@ class _Search:
                 threshold, below = below, np.inf  # later goals need the states that take as much
                 continue
             if lower == np.inf:
-                raise InfeasibleError("no plan is allowed")
+                raise nothing or self._wide.without_plan("no plan is allowed")
             # of a state that every plan would have to pass, or a larger
             self.bound = max(self.bound, lower)
             grown = threshold * self._options.growth if np.isfinite(threshold) else -np.inf
@@ -193,7 +196,7 @@ class _Search:
             return False
         trial = self._wide.copy()
         if trial.dive(threshold, below):
-            with suppress(InfeasibleError):  # of what stands
+            with suppress(InfeasibleError, NothingFoundError):  # of what stands
                 self.incumbent = best_standing(self._problem, trial)
                 return True
         self._wide = trial

@@ -24,7 +24,7 @@ from formulations.states._search import (
 )
 from formulations.times._stages import ALMOST, Choose, StageFound, Stages
 from seqopt.arrays import Terse
-from seqopt.errors import InfeasibleError, ProblemError, StepError, TimeUpError
+from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph._timed import timed_graph
 from seqopt.graph.instances.instance import PEAK, TIME, Instance
@@ -183,16 +183,11 @@ def _searched(
     try:
         first = narrow(problem, WIDTH, tell)
         wide = Explorer(FreeStates(problem), tell=tell)
-        capped = any(g.measure is Measure.MAKESPAN for g in problem.goals[len(problem.aims) :])
-        known = first is not None and problem.goals[0].measure is Measure.PEAK and not capped
-        wide.rise(first.objective[0] if first and known else np.inf)
+        wide.rise(_ceiling(problem, first, waits))
         while wide.whole:
             wide.refine()
             progress("makespan")
-            visited = wide.graph()
-            timed = timed_graph(problem, visited, waits.cuts)
-            stages = Stages(problem, visited, choose, watch, timed)
-            found = stages.run()
+            visited, stages, found = _staged(problem, wide, choose, watch, waits)
             if _fell(problem, wide, visited, found.path):
                 continue
             plan = _plan(problem, visited, stages, found, waits)
@@ -208,7 +203,38 @@ def _searched(
             ended = "interrupt" if isinstance(stop, KeyboardInterrupt) else str(stop)
             return _least_of(best, best[-1].bound, ended)
         return _by_then(problem, first, stop, waits)
-    raise InfeasibleError("no plan is allowed")
+    raise _none(wide)
+
+
+def _none(wide: Explorer) -> InfeasibleError | NothingFoundError:
+    """Return the error that says why no plan was found among states that were looked at."""
+    if wide.whole:
+        return NothingFoundError("no wait for mortar is enough for the plans that were looked at")
+    return wide.without_plan("no plan is allowed")
+
+
+def _ceiling(problem: States, first: StatePath | None, waits: Waits) -> float:
+    """Return up to which value of the first goal states are looked at: that of a first plan.
+
+    Unless budgets of time, or mortar, may forbid it.
+    """
+    capped = any(g.measure is Measure.MAKESPAN for g in problem.goals[len(problem.aims) :])
+    forbidden = capped or waits.cuts is not None
+    if first is None or forbidden or problem.goals[0].measure is not Measure.PEAK:
+        return np.inf
+    return first.objective[0]
+
+
+def _staged(
+    problem: States, wide: Explorer, choose: Choose, watch: Watch, waits: Waits
+) -> tuple[Visited, Stages, StageFound]:
+    """Return the visited states in time, and the best path through them, goal after goal."""
+    visited = wide.graph()
+    stages = Stages(problem, visited, choose, watch, timed_graph(problem, visited, waits.cuts))
+    try:
+        return visited, stages, stages.run()
+    except InfeasibleError as error:
+        raise wide.without_plan(str(error)) from None
 
 
 def _fell(problem: States, wide: Explorer, visited: Visited, path: Sequence[int]) -> bool:

@@ -26,7 +26,7 @@ from formulations.times._labels import (
     best_prices,
 )
 from seqopt.arrays import Bools
-from seqopt.errors import InfeasibleError
+from seqopt.errors import InfeasibleError, NothingFoundError
 from seqopt.graph._explore import Visited
 from seqopt.graph._timed import TimedGraph
 from seqopt.graph.graph import Graph, LabelProof
@@ -202,10 +202,15 @@ class Stages:
             found = self._choose(asked)
         else:
             found = first
-        if not found.path:
-            if found.late:
-                raise StopError("time")
-            raise InfeasibleError("no plan is within all budgets")
+        if not found.path and found.late:
+            raise StopError("time")
+        if not found.path or found.value > tied(stage.caps.time):
+            if found.bound == np.inf or found.bound > tied(stage.caps.time):
+                raise InfeasibleError("no plan is within all budgets")
+            raise NothingFoundError(
+                f"no plan within all budgets was found, and none takes less than {found.bound:.6g} "
+                "s; makespan_labels looks at all"
+            )
         stage.path, stage.late = found.path, found.late
         stage.bounds.append(min(found.bound, found.value))
         stage.proofs.append(self._proof(found.labels, prices))

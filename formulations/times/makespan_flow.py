@@ -51,7 +51,8 @@ def _bounded(asked: Asked) -> Chosen:
     right[graph.states + len(shares) :] = [cap for _, cap in asked.caps.sums]
     cost = np.eye(1, count + 1, count)[0]
     found = minimize_rows(cost, rows, right, watch=watch, whole=count, equations=graph.states)
-    bound = max(asked.prices.bound, scale * found.bound * (1 - 1e-9))
+    least = np.inf if found.end == "kInfeasible" else scale * found.bound * (1 - 1e-9)
+    bound = max(asked.prices.bound, least)
     taken = found.values[: len(moves)] > 0.5
     if taken.any():
         every = np.zeros(len(kept), dtype=bool)

@@ -16,6 +16,7 @@ from seqopt._cli.terminal import complain, note, show, show_text
 from seqopt.errors import (
     InfeasibleError,
     MechanismError,
+    NothingFoundError,
     SeqoptError,
     SolverError,
     TimeUpError,
@@ -33,7 +34,7 @@ class Status(IntEnum):
     DOES_NOT_HOLD = 1  # done, and something asked for does not hold
     BAD_INPUT = 2
     NO_ANSWER = 3  # infeasible, or a mechanism
-    FAILED = 4  # a solver, workers, or memory; says nothing about the structure
+    FAILED = 4  # a solver, a search, workers, or memory; says nothing about the structure
     CRASHED = 70  # an error of seqopt itself; no answer has this status
     INTERRUPTED = 130
 
@@ -48,8 +49,8 @@ def status_of(error: BaseException) -> Status:
         complain(f"seqopt: out of memory: {str(error) or 'no more is to be had'}{advice}")
         return Status.FAILED
     if isinstance(error, SolverError):
-        what = "time is over" if isinstance(error, TimeUpError) else "solver failed"
-        complain(f"seqopt: {what}: {error}")
+        ends = {TimeUpError: "time is over", NothingFoundError: "nothing found"}
+        complain(f"seqopt: {ends.get(type(error), 'solver failed')}: {error}")
         return Status.FAILED
     if isinstance(error, OSError) and not isinstance(error, SeqoptError):
         complain(f"seqopt: error: cannot write standard output: {error.strerror or error}")

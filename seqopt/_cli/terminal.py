@@ -23,7 +23,8 @@ STYLES = {"heading": "1", "bad": "1;31", "doubt": "33"}  # of terminals: bold, b
 CLEAR = "\r\033[K"  # of a terminal: the line it is on
 LONGEST = 2000  # characters of a line on standard error
 BEGIN = re.compile(
-    r"^seqopt: (error|warning|solver failed|time is over|out of memory|payload exceeded)(?=:)"
+    r"^seqopt: (error|warning|solver failed|nothing found|time is over|out of memory"
+    r"|payload exceeded)(?=:)"
 )
 
 

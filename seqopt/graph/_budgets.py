@@ -4,18 +4,25 @@ A price for every budget turns its amounts into costs; the cheapest path then bo
 within the budgets takes, by weak duality. Prices are found by cutting planes: every path that was
 met is a plane, and the next prices are best for all of them. What no prices decide stays open as a
 gap between a path and its bound, except that one budget alone is decided exactly for worst amounts.
+
+A path within the budgets is sought first, at no cost: whether there is one, one budget alone
+decides exactly. Several can leave it open, where mixtures of paths keep them and no path was met
+that does. Then it is sought by labels, vectors of what beginnings of paths take, as far as they may
+become one.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
+from heapq import heappop, heappush
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from seqopt.arrays import Floats, Ints
-from seqopt.errors import InfeasibleError, SolverError
+from seqopt.errors import InfeasibleError, NothingFoundError, SolverError
 from seqopt.graph.duality import ROUNDING, least_sum
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import TIED, distances, tied
@@ -23,6 +30,7 @@ from seqopt.graph.paths import TIED, distances, tied
 ROUNDS = 60  # of cutting planes
 CLOSED = 1e-9  # share of a value to which prices are the best
 DEAREST = 1e6  # largest price, over what a path takes per unit of the budget
+LABELS = 20_000  # that are continued at most
 
 
 class Within(NamedTuple):
@@ -53,11 +61,12 @@ class _Path(NamedTuple):
 def within_budgets(graph: Graph, caps: Sequence[float]) -> Within:
     """Return a path that is good in one goal after the other, its last columns within caps.
 
-    Raises `InfeasibleError` if no path is found.
+    Raises `InfeasibleError` if prices prove that no path is within all caps; `NothingFoundError` if
+    that is open, and none was found.
     """
     goals = len(graph.peaks) - len(caps)
     limited = [*zip(range(goals, len(graph.peaks)), caps, strict=True)]
-    bounds, prices, best = [], [], None
+    bounds, prices, best = [], [], _some_path(graph, caps)
     for goal in range(goals):
         if graph.peaks[goal]:
             bound, price, way = _least_worst(graph, goal, limited)
@@ -79,6 +88,69 @@ def within_budgets(graph: Graph, caps: Sequence[float]) -> Within:
     return Within(best.states, values, (*least, *values[goals:]), tuple(prices))
 
 
+def _some_path(graph: Graph, caps: Sequence[float]) -> _Path:
+    """Return a path whose last columns are within caps."""
+    goals = len(graph.peaks) - len(caps)
+    limited = [*zip(range(goals, len(graph.peaks)), caps, strict=True)]
+    found = _least_sum(graph, np.zeros(len(graph.source)), limited)
+    path = _path(graph, found.moves)
+    if path is not None:
+        return path
+    if found.bound <= _rounding(graph, found.prices, caps):
+        path = _path(graph, _by_labels(graph, limited, found.prices))
+    if path is None:
+        raise InfeasibleError("no path is within all budgets")
+    return path
+
+
+def _by_labels(graph: Graph, limited: Sequence[tuple[int, float]], prices: Floats) -> Ints | None:
+    """Return the moves of a path within caps, that of least price first; None if there is none.
+
+    Raises `NothingFoundError` if it ends before that is known.
+    """
+    amounts = graph.amounts[:, [c for c, _ in limited]]
+    caps, priced = np.array([tied(cap) for _, cap in limited]), amounts @ prices
+    left = np.column_stack([distances(graph, costs, back=True) for costs in amounts.T])
+    to_go = distances(graph, priced, back=True)
+    starts = np.searchsorted(graph.source, np.arange(graph.states + 1))
+    count, kept = itertools.count(), dict[int, Floats]()
+    heap = [(to_go[0], next(count), 0, -1, -1, np.zeros(len(caps)))]
+    labels = list[tuple[int, int]]()  # which one each continues, and by which move
+    while heap and len(labels) < LABELS:
+        least, _, state, before, move, taken = heappop(heap)
+        others = kept.get(state, np.zeros((0, len(caps))))
+        if (others <= taken).all(axis=1).any():
+            continue
+        kept[state] = np.vstack([others, taken])
+        labels.append((before, move))
+        if graph.ends[state]:
+            return _moves_to(labels)
+        for onward in range(starts[state], starts[state + 1]):
+            to, then = int(graph.target[onward]), taken + amounts[onward]
+            if (then + left[to] <= caps).all():
+                bound = least - to_go[state] + priced[onward] + to_go[to]
+                heappush(heap, (bound, next(count), to, len(labels) - 1, onward, then))
+    if heap:
+        raise NothingFoundError(
+            "mixtures of plans are within all budgets, and no plan was found that is; raise one"
+        )
+    return None
+
+
+def _moves_to(labels: Sequence[tuple[int, int]]) -> Ints:
+    """Return the moves that lead to the last label, by which each continues another one."""
+    out, (before, move) = list[int](), labels[-1]
+    while move >= 0:
+        out.append(move)
+        before, move = labels[before]
+    return np.array(out[::-1], dtype=np.int64)
+
+
+def _rounding(graph: Graph, prices: Floats, caps: Floats | Sequence[float]) -> float:
+    """Return by how much sums of the longest path may be off, priced."""
+    return ROUNDING * graph.states * float(prices @ np.abs(caps))
+
+
 def _path(graph: Graph, moves: Ints | None) -> _Path | None:
     if moves is None:
         return None
@@ -90,16 +162,13 @@ def _taken(graph: Graph, path: _Path) -> tuple[float, ...]:
     return tuple(np.where(graph.peaks, worst, total).tolist())
 
 
-def _better(graph: Graph, goal: int | None, first: _Path | None, other: _Path | None) -> _Path:
+def _better(graph: Graph, goal: int | None, first: _Path | None, other: _Path) -> _Path:
     """Return the path that takes less of a goal, or moves; the first one of two alike."""
 
     def taken(path: _Path) -> float:
         return len(path.states) if goal is None else _taken(graph, path)[goal]
 
-    paths = [path for path in (first, other) if path is not None]
-    if not paths:
-        raise InfeasibleError("no path is within all budgets")
-    return min(paths, key=taken)
+    return min((path for path in (first, other) if path is not None), key=taken)
 
 
 def _least_worst(
@@ -177,7 +246,8 @@ def _cheapest(graph: Graph, costs: Floats) -> Ints | None:
         return None
     state, moves = int(ends[np.argmin(least[ends])]), list[int]()
     while state != 0:
-        first, last = np.searchsorted(graph.source, before[state] + np.arange(2))
+        ends_of = (before[state] + np.arange(2)).astype(graph.source.dtype)  # no copy of all
+        first, last = np.searchsorted(graph.source, ends_of)
         own = first + np.flatnonzero(graph.target[first:last] == state)
         moves.append(int(own[np.argmin(costs[own])]))
         state = int(before[state])
@@ -205,7 +275,7 @@ def budget_bounds(
         if price.shape != taken.shape or not np.isfinite(price).all():
             raise SolverError(f"{price.size} prices where {taken.size} numbers belong")
         paid = graph.amounts[:, [c for c, _ in limited]] @ price
-        rounding = ROUNDING * graph.states * float(price @ np.abs(taken))  # of the longest path
+        rounding = _rounding(graph, price, taken)
         if graph.peaks[goal]:
             better = amounts < claimed[goal] - TIED * abs(claimed[goal])
             least = least_sum(graph.only(better), paid[better])
@@ -219,8 +289,12 @@ def budget_bounds(
 
 
 def is_beyond(graph: Graph, caps: Sequence[float]) -> bool:
-    """Return whether potentials prove that every path exceeds one of the caps on last columns."""
-    columns = graph.amounts[:, -len(caps) :].T
-    if any(least_sum(graph, costs) > tied(c) for costs, c in zip(columns, caps, strict=True)):
+    """Return whether potentials prove that no path is within all caps on the last columns."""
+    columns = [*range(len(graph.peaks) - len(caps), len(graph.peaks))]
+    amounts, most = graph.amounts[:, columns], np.array([tied(cap) for cap in caps])
+    if any(least_sum(graph, costs) > cap for costs, cap in zip(amounts.T, most, strict=True)):
         return True
-    return not np.isfinite(distances(graph, np.zeros(len(graph.source)))[graph.ends]).any()
+    nothing, limited = np.zeros(len(graph.source)), [*zip(columns, caps, strict=True)]
+    prices = _least_sum(graph, nothing, limited).prices  # of all caps together
+    together = float(prices @ most) + _rounding(graph, prices, caps)
+    return least_sum(graph, amounts @ prices) > together

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import InfeasibleError, NothingFoundError
 from seqopt.graph.graph import Graph, Rows
 from seqopt.graph.paths import strictly_below
 
@@ -153,6 +154,10 @@ class _Space(Protocol):
 
     def onward(self, part: Key, states: Ints) -> Iterator[tuple[Key, Moves]]:
         """Yield the moves of states (n, c) that lead to the next level, by part."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether these are all moves that are allowed."""
 
     @property
     def floors(self) -> bool:
@@ -300,6 +305,20 @@ class Explorer:
         """The least that the first goal takes of a state above the threshold; infinite if none."""
         least = [p.values[p.mark[: len(p.values)] == PENDING, 0] for p in self._all()]
         return float(min((values.min() for values in least if len(values)), default=np.inf))
+
+    @property
+    def complete(self) -> bool:
+        """Whether no state was left out that is allowed and could be reached."""
+        return self._width is None and self._space.complete and self.excluded == np.inf
+
+    def without_plan(self, why: str) -> InfeasibleError | NothingFoundError:
+        """Return the error that says that the visited states have no plan, and why.
+
+        Only of a complete search it is that none is allowed.
+        """
+        if self.complete:
+            return InfeasibleError(why)
+        return NothingFoundError(f"{why} among the states that were looked at; look at all")
 
     def _all(self) -> Iterator[Part]:
         return (part for parts in self._parts for part in parts.values())

@@ -291,6 +291,8 @@ class OrderStates:
             moves = new.placed(len(part[0]), _renumbered(old, new.problem, states[rows]))
             yield key, moves._replace(source=rows[moves.source])
 
+    complete = True  # no order or move is left out
+
     @property
     def floors(self) -> bool:
         """Whether there are scenarios."""

@@ -41,7 +41,7 @@ from seqopt.plan.calling.formulation import (
 )
 from seqopt.plan.judge._bare._claims import Claim, as_layers
 from seqopt.plan.judge._bare._judging import judge_instance
-from seqopt.plan.judge._infeasible import confirmed
+from seqopt.plan.judge._infeasible import claimed, confirmed
 from seqopt.plan.judge._orders import finds_better_order
 from seqopt.plan.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan.judge.schedules import judge_schedule
@@ -234,14 +234,14 @@ def _selected(
         selection = called(name, partial(_judged, problem), StatePath, solve)
     except InfeasibleError as error:
         left = float(options.get("seconds", math.inf)) - (time.perf_counter() - start)
-        why = confirmed(twin, name, left)
+        why = confirmed(twin, name, left, exact=formulation.looks_at_all)
         standing = problem.standing
-        if isinstance(why, SolverError) and standing is not None and standing.curing is not None:
-            why = InfeasibleError(
-                f"claimed by {name}, and not proven: {error} in which all states stand while "
-                "mortar cures, though some are once it has; more robots may help, or mortar with "
-                "some bond from 0 s on"
+        if type(why) is SolverError and standing is not None and standing.curing is not None:
+            said = (
+                f"{error} in which all states stand while mortar cures, though some are once it "
+                "has; more robots may help, or mortar with some bond from 0 s on"
             )
+            why = claimed(name, said, exact=formulation.looks_at_all)
         raise why from None
     for kept in [*vars(problem)]:  # whatever it left behind, but counts of what was computed
         if kept not in (*(f.name for f in fields(problem)), *COUNTED):
@@ -310,7 +310,7 @@ def _selected_order(
             ) from None
         if some is False and problem.down is None:  # whose whole may be beyond limits
             raise
-        raise InfeasibleError(f"claimed by {found.name}, and not proven: {error}") from None
+        raise claimed(found.name, str(error), exact=found.looks_at_all) from None
     return _with_numbers(found.name, said)
 
 

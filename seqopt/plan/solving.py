@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import recipe_of
-from seqopt.errors import ProblemError
+from seqopt.errors import NothingFoundError, ProblemError
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.scenarios import ScenarioLayers, engine_for, in_scenarios
@@ -71,7 +71,7 @@ def _with_postures(problem: Problem, plan: Plan, solved: Callable[[Problem], Pla
     for fewer in (count for count in _FEWER if count < most):
         try:
             other = solved(_narrowed(problem, plan, fewer))
-        except ProblemError:
+        except (ProblemError, NothingFoundError):
             continue
         found = _found(other)
         if not found.unreached:

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph import Explorer, Graph, lexicographic
-from seqopt.graph._budgets import budget_bounds, within_budgets
+from seqopt.graph._budgets import budget_bounds, is_beyond, within_budgets
 from seqopt.graph._explore import Moves
 from seqopt.graph.duality import _sum_bound, lexicographic_bounds
 from seqopt.graph.paths import distances, reached
@@ -202,3 +202,39 @@ def test_a_path_within_a_budget_is_found_and_bounded(graph, cap):
         assert found.values[0] == found.bounds[0] == able[0][0]
     proven = budget_bounds(graph, found.values, found.bounds, ((cap,), found.prices))
     assert proven[0] >= found.bounds[0] - 1e-6 * abs(found.bounds[0])
+
+
+@given(graph=graphs(goals=3), caps=st.tuples(st.integers(0, 6), st.integers(0, 6)))
+@few
+def test_whether_a_path_is_within_two_budgets_is_decided(graph, caps):
+    """Mixtures of paths may be where no path is; the judge believes neither."""
+    graph = replace(graph, peaks=(graph.peaks[0], False, False))
+    able = [
+        values
+        for values in (values_of(graph, moves) for moves in simple_paths(graph))
+        if values[1] <= caps[0] and values[2] <= caps[1]
+    ]
+    if not able:
+        with pytest.raises(InfeasibleError, match="no path is within all budgets"):
+            within_budgets(graph, caps)
+        return
+    assert not is_beyond(graph, caps)
+    found = within_budgets(graph, caps)
+    assert all(value <= cap for value, cap in zip(found.values[1:], caps, strict=True))
+    assert found.bounds[0] <= min(able)[0] * (1 + 1e-9) + 1e-12
+
+
+def test_where_labels_are_too_many_it_is_open(monkeypatch):
+    """Two ways, each within one of two budgets, whose mean is within both."""
+    rows = np.array([0, 0], dtype=np.int32), np.array([1, 1], dtype=np.int32)
+    amounts = np.array([[1.0, 0.0, 4.0], [1.0, 4.0, 0.0]])
+    graph = Graph(*rows, amounts, (True, False, False), np.array([False, True]))
+    assert not is_beyond(graph, (3.0, 3.0))
+    assert is_beyond(graph, (1.9, 1.9))  # no mixture is either
+    with pytest.raises(InfeasibleError):
+        within_budgets(graph, (3.0, 3.0))
+    monkeypatch.setattr("seqopt.graph._budgets.LABELS", 0)
+    with pytest.raises(NothingFoundError, match="mixtures of plans are within all budgets"):
+        within_budgets(graph, (3.0, 3.0))
+    with pytest.raises(InfeasibleError):
+        within_budgets(graph, (1.9, 1.9))

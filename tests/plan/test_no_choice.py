@@ -10,13 +10,19 @@ import pytest
 
 from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import InfeasibleError, MemoryShortError, ProblemError, SolverError
+from seqopt.errors import (
+    InfeasibleError,
+    MemoryShortError,
+    NothingFoundError,
+    ProblemError,
+    SolverError,
+)
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.calling import formulation as registry
-from seqopt.plan.calling.formulation import Selection, find_formulation
+from seqopt.plan.calling.formulation import FormulationKind, Selection, find_formulation
 from seqopt.plan.solving import solve
 from seqopt.responses import _blocks as batches
 from seqopt.scene.arch import ArchShape, arch_scene
@@ -121,17 +127,50 @@ def test_that_there_is_no_choice_is_not_believed(problem):
         solve(problem, replace(find_formulation("overlap_dp"), solve=says_so))
 
 
-def test_that_budgets_conflict_is_proven_or_claimed():
-    """Two moves of two candidates; a budget that one choice keeps, and one that none does."""
+HEURISTIC = FormulationKind.HEURISTIC
+
+
+@pytest.mark.parametrize(
+    ("bounds", "kind", "error", "said"),
+    [
+        ((0.5,), None, InfeasibleError, "every choice uses at least 1 of 'b0'"),
+        ((0.5,), HEURISTIC, InfeasibleError, "every choice uses at least 1 of 'b0'"),
+        ((1.5,), None, SolverError, "labels says that no choice is .* and some are"),
+        ((3.0, 3.0), HEURISTIC, SolverError, "labels says that no choice is .* and some are"),
+        ((2.4, 2.4), HEURISTIC, InfeasibleError, "2.4 of 'b0' and 2.4 of 'b1' cannot be kept"),
+    ],
+)
+def test_that_budgets_conflict_is_proven(bounds, kind, error, said):
+    """Two moves of two candidates; budgets that some choices keep, and some that none does."""
     costs = LayeredCosts((np.ones(2),) * 2, (np.zeros((1, 2)), np.zeros((2, 2))))
-    formulation = replace(find_formulation("labels"), solve=says_so)
-    for bound, said in (
-        (0.5, "every choice uses at least 1 of 'b'"),
-        (1.5, "claimed by labels, an"),
-    ):
-        budget = Budget("b", (np.array([0.5, 2.0]),) * 2, costs.shared, bound)
-        with pytest.raises(InfeasibleError, match=said):
-            solve(CostProblem(costs, (budget,)), formulation)
+    labels = find_formulation("labels")
+    formulation = replace(labels, solve=says_so, kind=kind or labels.kind)
+    budgets = tuple(
+        Budget(f"b{k}", (np.array([0.5, 2.0])[:: 1 - 2 * k],) * 2, costs.shared, bound)
+        for k, bound in enumerate(bounds)
+    )
+    with pytest.raises(error, match=said) as caught:
+        solve(CostProblem(costs, budgets), formulation)
+    assert type(caught.value) is error
+
+
+@pytest.mark.parametrize(
+    ("kind", "error", "said"),
+    [
+        (FormulationKind.EXACT, InfeasibleError, "claimed by labels, and not proven: no choice"),
+        (HEURISTIC, NothingFoundError, "labels found none, and there may be one: no choice"),
+    ],
+)
+def test_a_heuristic_only_says_that_it_found_none(monkeypatch, kind, error, said):
+    """Where the judge gives up, as here with no partial choice kept, an exact one claims it."""
+    monkeypatch.setattr("seqopt.plan.judge._budget_proof.MOST", 0)
+    costs = LayeredCosts((np.ones(2),) * 2, (np.zeros((1, 2)), np.zeros((2, 2))))
+    both = [(np.array([0.5, 2.0])[::turn],) * 2 for turn in (1, -1)]
+    budgets = tuple(Budget(f"b{k}", b, costs.shared, 2.5) for k, b in enumerate(both))
+    formulation = replace(find_formulation("labels"), solve=says_so, kind=kind)
+    with pytest.raises(error, match=said) as caught:
+        solve(CostProblem(costs, budgets), formulation)
+    assert type(caught.value) is error
 
 
 def test_an_exit_does_not_leave_through_solve(problem):

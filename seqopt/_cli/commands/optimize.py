@@ -70,7 +70,7 @@ from seqopt._cli.words.optimizing import (
     WORKERS,
 )
 from seqopt._files import csv_text
-from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph.states.states import States
 from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation
 from seqopt.plan.judge.certificate import TOLERANCE
@@ -257,6 +257,8 @@ def _from_empty(whole: Problem | None, plan: Plan, choose: Callable[[Problem], P
         return f"{done}; from {site} the best is {_values(choose(whole))}"
     except InfeasibleError:
         return f"{done}; from {site} there is no plan"
+    except NothingFoundError:
+        return f"{done}; from {site} no plan was found"
 
 
 def _values(plan: Plan) -> str:

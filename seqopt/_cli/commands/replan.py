@@ -36,7 +36,7 @@ from seqopt._cli.words.given import plan_folder
 from seqopt._cli.words.optimizing import AIM, TIME
 from seqopt._cli.words.where import Place
 from seqopt._files import parse_json, read_text
-from seqopt.errors import FileError, InfeasibleError, StepError
+from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepError
 from seqopt.plan._other.replan import compared, without
 from seqopt.plan.plan import Plan
 from seqopt.responses._tolerance import is_tolerance, value_text
@@ -228,7 +228,7 @@ def _with_another(base: argparse.Namespace, scene: Scene, asked: int) -> str:
         with_robots(scene, count)
         base.robots = str(count)
         found = optimize.find(base)
-    except (InfeasibleError, StepError):
+    except (InfeasibleError, NothingFoundError, StepError):
         return ""
     return f"; or with one more robot that reaches every node: {found.plan.result}"
 

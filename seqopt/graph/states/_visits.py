@@ -210,6 +210,11 @@ class FreeStates:
         return _joined(self.problem.space.onward(level, states), states)
 
     @property
+    def complete(self) -> bool:
+        """Whether no move is left out."""
+        return self.regrips
+
+    @property
     def floors(self) -> bool:
         """Whether a state that one scenario rules out is not asked of the next."""
         return bool(self.problem.each)

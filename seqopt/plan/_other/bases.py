@@ -20,7 +20,7 @@ import pandas as pd
 from seqopt.arms._permits import permits, within_reach
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Terse, Vector
-from seqopt.errors import InfeasibleError, ProblemError, SceneError
+from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SceneError
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _moved
 from seqopt.problem.problem import Problem
@@ -150,7 +150,8 @@ def choose_bases(
 
     ``problem``: of robots without arms; ``scene``: with arms, at any bases; ``places``: by robot;
     others stay where they are; ``solved``: returns the proven plan of a problem. Raises
-    `InfeasibleError` if no set allows a plan; `ProblemError` if there are too many sets.
+    `InfeasibleError` if no set allows a plan; `NothingFoundError` if that is open; `ProblemError`
+    if there are too many sets.
     """
     sets = [*_sets(scene, places)]
     if len(sets) > _MOST:
@@ -220,6 +221,17 @@ class Tried:
         self._rows: list[dict[str, object]] = []
         self._left: list[tuple[float, ...]] = []  # bounds of sets whose best plan is not proven
 
+    def _none(self, why: str) -> InfeasibleError | NothingFoundError:
+        """Return the error that says why there is no plan, or that none was found."""
+        return (
+            NothingFoundError(f"{why} as far as is known") if self._left else InfeasibleError(why)
+        )
+
+    def _open(self, error: NothingFoundError) -> tuple[str, tuple[float, ...]]:
+        """Return what to say of a problem of which no plan was found: it may have any."""
+        self._left.append((-inf,))
+        return f"no plan was found: {error}", (-inf,)
+
     @property
     def _proven(self) -> bool:
         """Whether no set that was looked at allows a better plan."""
@@ -255,7 +267,7 @@ class _Search(Tried):
             said = {name: str(base) for name, base in bases.items()}
             self._rows.append({**said, "outcome": outcome, **self._named(bound)})
         if self._plan is None or self._of is None:
-            raise InfeasibleError(
+            raise self._none(
                 f"bases: none of {len(sets)} sets of bases allows a plan; give other places"
             )
         return FoundBases(self._plan, self._of, pd.DataFrame(self._rows), self._proven)
@@ -293,10 +305,11 @@ class _Search(Tried):
             find_postures(scene, self._problem.resources.cache, self._tell)
             problem = _moved(self._problem, scene)
             plan = self._solved(problem)
-        except InfeasibleError:
-            return "no plan", (inf,)
-        except SceneError as error:
-            return f"no plan: {error}", (inf,)
+        except NothingFoundError as error:
+            return self._open(error)
+        except (InfeasibleError, SceneError) as error:
+            why = "" if isinstance(error, InfeasibleError) else f": {error}"
+            return f"no plan{why}", (inf,)
         if plan.arms is not None and plan.arms.postures.unreached:
             self._left.append(bound := _bound(plan))
             return "no plan that keeps postures was found", bound

@@ -15,7 +15,7 @@ from math import comb, inf
 import pandas as pd
 
 from seqopt.arrays import Terse
-from seqopt.errors import InfeasibleError, ProblemError, StepError
+from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError
 from seqopt.plan._other.bases import Tried
 from seqopt.plan.judge._proof import Proof
 from seqopt.plan.plan import Plan
@@ -85,7 +85,8 @@ def fewest_props(
 
     ``problem``: whose plans are compared by the worst or the total of states; ``candidates``: at
     different nodes; ``solved``: returns the proven plan of a problem. Raises `InfeasibleError` if
-    no set allows a plan, `ProblemError` if too many have to be looked at.
+    no set allows a plan, `NothingFoundError` if that is open, `ProblemError` if too many have to be
+    looked at.
     """
     if problem.orders is not None:
         raise ProblemError("aim props: they are chosen for one order; leave out the search of it")
@@ -124,7 +125,7 @@ class _Search(Tried):
                     f"aim props: {_MOST} sets were looked at, and none of up to {size} props was "
                     "found to allow a plan; allow fewer nodes with --props-among"
                 )
-        raise InfeasibleError(
+        raise self._none(
             f"props: none of {sets} sets of up to {count} props allows a plan; allow other nodes, "
             "or loosen a rule or limit"
         )
@@ -172,6 +173,8 @@ class _Search(Tried):
             return self._kept(problem, self._solved(problem))
         except (InfeasibleError, StepError) as error:
             return f"no plan: {error}", (inf,)
+        except NothingFoundError as error:
+            return self._open(error)
 
     def _wanted(self) -> tuple[float, ...]:
         """Return what the first goal of a plan must not exceed, if states say so."""

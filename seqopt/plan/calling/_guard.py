@@ -348,7 +348,7 @@ def _infeasible_confirmed(problem: PlacementProblem, formulation: Formulation) -
         if problem.budgets:
             from seqopt.plan.judge._infeasible import refusal  # noqa: PLC0415  # seldom needed
 
-            raise refusal(problem, formulation.name) from None
+            raise refusal(problem, formulation.name, exact=formulation.looks_at_all) from None
         raise SolverError(
             f"formulation {formulation.name} says that no choice is allowed, and some are: {error}"
         ) from None

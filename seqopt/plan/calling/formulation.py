@@ -253,6 +253,11 @@ class Formulation:
         return f"<Formulation {self.name}: {self.summary} ({self.kind.value}, {what})>"
 
     @property
+    def looks_at_all(self) -> bool:
+        """Whether it may say that there is no plan, not only that it found none."""
+        return self.kind is not FormulationKind.HEURISTIC
+
+    @property
     def window_options(self) -> dict[str, int | str] | None:
         """Options with which it looks at one window after the other; None if it never does."""
         never = self.windowed is None and self.reads is not Reads.WINDOW

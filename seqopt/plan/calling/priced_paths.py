@@ -16,7 +16,7 @@ import numpy as np
 from scipy import sparse
 
 from seqopt.arrays import Bools, Floats, FrozenValue
-from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
+from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.layers.costs import (
     TINY,
     Budget,
@@ -173,7 +173,8 @@ def stopped(
     ``aim``: what to minimize; ``bound``: a better one that is known; ``why``: what to say where no
     choice within the budgets is at hand. Result: with the cheapest candidate of each move that
     leads on; where budgets forbid it, with the choice that takes least of one of them. Raises
-    `InfeasibleError` if no choice is allowed; `SolverError` if none of these is within all budgets.
+    `InfeasibleError` if no choice is allowed; `TimeUpError`, or `NothingFoundError` with a reason,
+    if none of these is within all budgets.
     """
     costs = aim.costs(problem)
     for choice in _choices(problem, costs):
@@ -182,7 +183,7 @@ def stopped(
             return Selection(choice, value, max(bound, _at_least(costs, aim)), end=End.STOPPED)
     known = f" (no choice is below {bound:.6g})" if np.isfinite(bound) else ""
     if why:
-        raise SolverError(
+        raise NothingFoundError(
             f"{why} before any choice within all budgets was found; give it more time"
         )
     raise TimeUpError(f"no choice within all budgets was found yet{known}; give more")

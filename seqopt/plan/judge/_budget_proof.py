@@ -86,8 +86,14 @@ def least_within(
     case, given = _case(problem, value, claimed, scale)
     prices, bound = _climbed(case, given)
     if value - bound > SLACK * scale:
-        bound = max(bound, _laid_down(case, prices))
+        bound = max(bound, _laid_down(case, prices)[0])
     return value if value - bound <= SLACK * scale else bound
+
+
+def is_kept(problem: PlacementProblem) -> bool:
+    """Return whether a choice is found that keeps all budgets; costs say which are allowed."""
+    case, prices = _case(problem, 1.0, {}, 1.0)
+    return _laid_down(case, np.zeros_like(prices))[1]
 
 
 def _case(
@@ -150,8 +156,11 @@ def _least(case: _Case, prices: Floats) -> tuple[float, Floats]:
     return least, over
 
 
-def _laid_down(case: _Case, prices: Floats) -> float:
-    """Return the least that a choice within the budgets costs, or bounds it, from the end back."""
+def _laid_down(case: _Case, prices: Floats) -> tuple[float, bool]:
+    """Return the least that a choice within the budgets costs, or bounds it, from the end back.
+
+    And whether one was found that costs less than the answer.
+    """
     arcs = case.priced(prices)
     begun = [np.array([-float(prices @ case.caps)])]
     for arc in arcs:
@@ -173,7 +182,7 @@ def _laid_down(case: _Case, prices: Floats) -> float:
             order = np.argsort(now.bound, kind="stable")
             aside = min(aside, float(now.bound[order[MOST]]))
             now = now.of(order[:MOST])
-    return min(aside, float(now.cost.min(initial=case.value)))
+    return min(aside, float(now.cost.min(initial=case.value))), len(now.at) > 0
 
 
 def _kept(case: _Case, arc: Floats, begun: Floats, now: _Parts) -> tuple[Ints, Ints, Floats]:

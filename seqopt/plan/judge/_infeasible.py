@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from itertools import chain, combinations, islice
 
@@ -12,7 +13,8 @@ import numpy as np
 
 from seqopt.arrays import Ints
 from seqopt.engines.registry import recipe_of
-from seqopt.errors import InfeasibleError, SeqoptError, SolverError
+from seqopt.errors import InfeasibleError, NothingFoundError, SeqoptError, SolverError
+from seqopt.graph._budgets import within_budgets
 from seqopt.graph._counted import least_by_counts
 from seqopt.graph._explore import Explorer
 from seqopt.graph.layers.costs import Budget, LayeredCosts, _array_by_array, _where_allowed
@@ -21,7 +23,7 @@ from seqopt.graph.paths import distances, least_peak, tied
 from seqopt.graph.scenarios import engine_for
 from seqopt.graph.states._visits import barred, explore
 from seqopt.graph.states.states import States
-from seqopt.plan.judge._budget_proof import least_within, too_small
+from seqopt.plan.judge._budget_proof import is_kept, least_within, too_small
 from seqopt.plan.judge._proof import Proof
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.search._margin_search import WORST, StandingLook, bisected, with_margin
@@ -51,21 +53,39 @@ def smallest_conflict(problem: PlacementProblem) -> tuple[Budget, ...]:
 
 def _conflict(costs: LayeredCosts, budgets: tuple[Budget, ...]) -> bool:
     """Return whether it is proven that no allowed choice keeps all budgets."""
-    nothing = _where_allowed(costs, _array_by_array(np.zeros_like, costs))
-    return least_within(CostProblem(nothing, budgets), 1.0, {}, 1.0) >= PROVEN
+    return least_within(_of_budgets(costs, budgets), 1.0, {}, 1.0) >= PROVEN
 
 
-def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
+def _of_budgets(costs: LayeredCosts, budgets: tuple[Budget, ...]) -> CostProblem:
+    """Return the problem of keeping budgets, at no cost."""
+    return CostProblem(_where_allowed(costs, _array_by_array(np.zeros_like, costs)), budgets)
+
+
+def claimed(name: str, why: str, *, exact: bool) -> InfeasibleError | NothingFoundError:
+    """Return the error of a formulation, by name, where it is not proven that there is no plan.
+
+    ``exact``: whether it looks at all plans, and so claims that none is allowed; else it found
+    none.
+    """
+    if exact:
+        return InfeasibleError(f"claimed by {name}, and not proven: {why}")
+    return NothingFoundError(f"{name} found none, and there may be one: {why}")
+
+
+def refusal(problem: PlacementProblem, name: str, *, exact: bool) -> SeqoptError:
     """Return the error that says which budgets no choice keeps, or that this is claimed alone.
 
-    ``problem``: some choice is allowed, and it is claimed that none is within all budgets;
-    ``name``: of the formulation that claims it.
+    ``problem``: some choice is allowed, and it is said that none is within all budgets; ``name``,
+    ``exact``: of the formulation that says so, as of `claimed`. Result: a `SolverError` where one
+    is.
     """
     found = smallest_conflict(problem)
-    if not found:
-        return InfeasibleError(
-            f"claimed by {name}, and not proven: no choice is within all budgets; raise a bound"
+    if not found and is_kept(_of_budgets(problem.sums, problem.budgets)):
+        return SolverError(
+            f"formulation {name} says that no choice is within all budgets, and some are"
         )
+    if not found:
+        return claimed(name, "no choice is within all budgets; raise a bound", exact=exact)
     if len(found) == 1:
         return too_small(found[0], least_sum(_where_allowed(problem.sums, found[0])))
     named = [f"{budget.bound:.6g} of {budget.name!r}" for budget in found]
@@ -76,6 +96,7 @@ def refusal(problem: PlacementProblem, name: str) -> InfeasibleError:
     )
 
 
+ALLOWED = "says that no plan is allowed, and some are"
 STEPS = (Goal(Measure.STEPS),)
 IGNORED = "payload=ignored"
 PAYLOADS = "robots that carry more"  # where states must stand, held by what robots carry
@@ -120,11 +141,14 @@ class Look:
         return StandingLook(replace(problem, goals=STEPS, standing=None, settled=()), self.tell)
 
 
-def confirmed(problem: States, name: str, seconds: float = np.inf) -> SeqoptError:
+def confirmed(
+    problem: States, name: str, seconds: float = np.inf, *, exact: bool = True
+) -> SeqoptError:
     """Return the error that says why no plan is allowed, once it is proven that none is.
 
-    ``name``: of the formulation that says so; ``seconds``: after which what is not proven is called
-    claimed, and no more help is sought. Result: the latter where a plan is allowed.
+    ``name``, ``exact``: of the formulation that says so, as of `claimed`; ``seconds``: after which
+    what is not proven is called claimed, and no more help is sought. Result: a `SolverError` where
+    a plan is allowed, a `NothingFoundError` where it is open whether some states stand.
     """
     end, capped = time.perf_counter() + seconds, problem.goals[len(problem.aims) :]
     steps = replace(_with_any_margin(problem), goals=(*STEPS, *capped))
@@ -133,21 +157,32 @@ def confirmed(problem: States, name: str, seconds: float = np.inf) -> SeqoptErro
         if barred(steps) is None:
             found = Look(end)(steps)
             if found.whole and capped:
-                return _over_budget(steps, found, name)
+                return _over_budget(steps, found, name, exact=exact)
             if found.whole:
-                return SolverError(f"formulation {name} says that no plan is allowed, and some are")
+                return SolverError(f"formulation {name} {ALLOWED}")
             hint = {level: rows for level, _, rows in found.graph().states}
         proven = Proof(steps, hint).is_impossible()
     except _LateError:
         proven = False
     bare = replace(problem, goals=problem.aims, budgets=())
     why = _why_impossible(bare, end - time.perf_counter())
-    return InfeasibleError(why if proven else f"claimed by {name}, and not proven: {why}")
+    if proven:
+        return InfeasibleError(why)
+    undecided = sum(each.stability.undecided for each in steps.each or (steps,) if each.demands)
+    if undecided:
+        return NothingFoundError(f"{undecided} grip sets neither stand nor fall for sure: {why}")
+    return claimed(name, why, exact=exact)
 
 
-def _over_budget(problem: States, found: Explorer, name: str) -> SeqoptError:
+def _over_budget(problem: States, found: Explorer, name: str, *, exact: bool) -> SeqoptError:
     """Return the error that names what each budget needs at least, where plans exist without."""
     graph, states = found.graph()
+    if not problem.is_timed:
+        with suppress(InfeasibleError, NothingFoundError):
+            spent = within_budgets(graph, problem.budgets).values[-len(problem.budgets) :]
+            pairs = zip(problem.goals[-len(spent) :], spent, strict=True)
+            one = ", ".join(f"{goal} {value:.6g}" for goal, value in pairs)
+            return SolverError(f"formulation {name} {ALLOWED}: {one}")
     words, proven = [], False
     for k, cap in enumerate(problem.budgets, start=len(problem.aims)):
         if problem.goals[k].measure is Measure.MAKESPAN:  # what it is at best takes a search
@@ -158,12 +193,11 @@ def _over_budget(problem: States, found: Explorer, name: str) -> SeqoptError:
             words.append(f"{cap:g} s of makespan are allowed; --aim makespan finds the least")
             continue
         least = distances(graph, graph.amounts[:, k])[graph.ends].min()
-        words.append(f"{problem.goals[k]} is at least {least:.6g}, and {cap:g} is allowed")
+        alone = " by itself" if least <= tied(cap) else ""
+        words.append(f"{problem.goals[k]} is at least {least:.6g}{alone}, and {cap:g} is allowed")
     proven = proven or Proof(problem, {level: rows for level, _, rows in states}).is_impossible()
-    claim = "" if proven else f"claimed by {name}, and not proven: "
-    return InfeasibleError(
-        f"{claim}{problem.title}: no plan is within all budgets; {', '.join(words)}"
-    )
+    why = f"{problem.title}: no plan is within all budgets; {', '.join(words)}"
+    return InfeasibleError(why) if proven else claimed(name, why, exact=exact)
 
 
 def _with_any_margin(problem: States) -> States:

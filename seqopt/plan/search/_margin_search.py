@@ -11,6 +11,7 @@ import numpy as np
 
 from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError
+from seqopt.graph._budgets import within_budgets
 from seqopt.graph._explore import Explorer
 from seqopt.graph.paths import FAILS, PASSES, _lazy_path
 from seqopt.graph.states._visits import FreeStates
@@ -34,7 +35,8 @@ def best_margin(
     ``value``: with which plans exist in which every state is proven to stand; ``bound``: with which
     none does; ``rest``: of the goals after it, with the demand that all stand with that value;
     ``states``: of a plan that does, level and state, one of few steps.
-    Raises `InfeasibleError` if there is no plan, whatever the margin.
+    Raises `InfeasibleError` if there is no plan, whatever the margin; `NothingFoundError` if it is
+    open whether there is one within several budgets.
     """
     name, look = problem.goals[0].response, StandingLook(problem, tell)
     if problem.demands and not look.exists(look.demanding(WORST[name])):
@@ -49,7 +51,8 @@ class StandingLook:
     def __init__(self, problem: States, tell: Callable[[Explorer], object]) -> None:
         self._problem = problem
         self._first: States | None = None  # with whom all others share their proofs
-        steps = replace(problem, goals=STEPS, budgets=())
+        self._budgets = problem.budgets
+        steps = replace(problem, goals=(*STEPS, *problem.goals[len(problem.aims) :]))
         self._found = Explorer(FreeStates(steps), tell=tell)
         self._found.rise()
         self._tell, self.found = tell, list[State]()
@@ -84,11 +87,34 @@ class StandingLook:
             return asked.recalled(*self._part(part, rows))
 
         tell = partial(self._tell, self._found)
-        path = _lazy_path(self._graph, self._parts, known, ask, recall, tell)
+        if self._budgets:
+            path = self._within(known, ask, tell)
+        else:
+            path = _lazy_path(self._graph, self._parts, known, ask, recall, tell)
         if path is None:
             return False
         self.found = [(level, *state.tolist()) for level, _, state in self._visited.of(path)]
         return True
+
+    def _within(
+        self, known: Ints, ask: Callable[[int, Ints], Ints], tell: Callable[[], object]
+    ) -> tuple[int, ...] | None:
+        """Return a path within the budgets of states that stand; None if there is none.
+
+        ``known``, ``ask``, ``tell``: as of `_lazy_path`.
+        """
+        while True:
+            tell()
+            left = self._graph.only(known[self._graph.target] != FAILS)
+            try:
+                path = np.array(within_budgets(left, self._budgets).path)
+            except InfeasibleError:
+                return None
+            open_ = path[known[path] == 0]
+            if not len(open_):
+                return tuple(path.tolist())
+            for row in open_.tolist():
+                known[row] = ask(int(self._parts[row]), np.array([row]))[0]
 
     def _part(self, part: int, rows: Ints) -> tuple[int, Ints]:
         level, _, states = self._states[part]

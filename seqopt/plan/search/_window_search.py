@@ -27,7 +27,13 @@ from seqopt._interrupts import answered
 from seqopt.arrays import Floats, Ints, Terse
 from seqopt.engines.interface import Fields, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.errors import InfeasibleError, MemoryShortError, ProblemError, SolverError, TimeUpError
+from seqopt.errors import (
+    InfeasibleError,
+    MemoryShortError,
+    NothingFoundError,
+    ProblemError,
+    TimeUpError,
+)
 from seqopt.graph.layers._partial_costs import PartialCosts, floor_of
 from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.interface import CostProblem
@@ -78,10 +84,10 @@ def search_windows(
     """Choose every open grip of a build, one move after the other, by ascending brick counts.
 
     ``problem``: its own responses are not computed; ``fields``: whether those of steps are noted.
-    Raises `SolverError` if a move has no candidate left after the choices before it, while others
-    may have led on, or if time is over before the last move is chosen; `MemoryShortError` if there
-    is not the memory for what it looks at; `KeyboardInterrupt`, with the nodes that were chosen so
-    far as its text.
+    Raises `NothingFoundError` if a move has no candidate left after the choices before it, while
+    others may have led on; `TimeUpError` if time is over before the last move is chosen;
+    `MemoryShortError` if there is not the memory for what it looks at; `KeyboardInterrupt`, with
+    the nodes that were chosen so far as its text.
     """
     walk = _Walk(problem)
     try:
@@ -159,7 +165,7 @@ class _Walk:
         if k:
             costs = np.where(_possible_after(self._schedule, k, self.choice[-1]), costs, np.inf)
         if not np.isfinite(costs).any():
-            raise SolverError(
+            raise NothingFoundError(
                 f"move {k + 1}, step {move.step}: {move.robot} has no allowed grip after the "
                 "choices before it; relax a limit, or let a formulation look at all choices"
             )
@@ -288,7 +294,7 @@ class _Pairs:
         rows = [self._free(k, sizes) for k in range(len(sizes))]
         try:
             first = search_windows(problem)
-        except SolverError:  # move by move it is a dead end; other choices may lead on
+        except NothingFoundError:  # move by move it is a dead end; other choices may lead on
             first = WindowSearch(alone_steps(problem), (), ())
         self._alone = first.alone
         self.models = sum(part.evaluation.models for part in first.explored)

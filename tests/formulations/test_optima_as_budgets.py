@@ -1,0 +1,232 @@
+"""A proven optimum of a sum, given back as a budget, has a plan; less than it has none.
+
+However plans are found: only a search that looked at everything says that there is none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import seqopt
+from formulations.states._search import exact_best, narrow
+from seqopt.errors import InfeasibleError, NothingFoundError, SolverError
+from seqopt.graph._explore import Explorer
+from seqopt.graph.layers.layers import travel
+from seqopt.graph.states._visits import FreeStates
+from seqopt.graph.states.states import build_states, within
+from seqopt.plan.calling.formulation import FormulationKind, find_formulation
+from seqopt.plan.solving import layers_of, states_of
+from seqopt.sequence.rules import FreeRules
+from tests.brute_force import ONES
+from tests.builders import small_arch
+from tests.times.builders import engine_of
+
+FACTORS = (1.0, 1.000001, 1.02, 1.1)
+SUMS = ("sum(T_max)", "sum(M_sup)", "travel", "steps", "regrips")
+UP, DOWN = FreeRules(), FreeRules(direction="take-down")
+slow = pytest.mark.slow
+
+
+@cache
+def posed(bricks, moves, orders=None):
+    """A problem of a small arch, by rules or the name of a schedule."""
+    scene = small_arch(bricks)
+    engine = seqopt.make_engine("compliance", scene)
+    found = moves if isinstance(moves, FreeRules) else seqopt.three_robot_loop(engine.network)
+    return seqopt.pose(engine, found, ONES, "minmax", orders=orders)
+
+
+def words(name, cap):
+    return f"{name}={cap!r}{'m' if name == 'travel' else 's' if name == 'makespan' else ''}"
+
+
+def check(problem, name, formulation, factors=FACTORS):
+    """The optimum is a budget that a plan keeps; a tenth less is one that none does."""
+    best = seqopt.solve(problem.but(goals=name))
+    assert best.status == "optimal"
+    least = best.objective[name]
+    for factor in factors:
+        capped = problem.but(budgets=words(name, factor * least))
+        plan = seqopt.solve(capped, formulation)
+        assert plan.objective[name] <= factor * least * (1 + 1e-6)
+    heuristic = find_formulation(formulation).kind is FormulationKind.HEURISTIC
+    none = NothingFoundError if problem.orders and heuristic else InfeasibleError
+    if least > 0:
+        with pytest.raises(none):
+            seqopt.solve(problem.but(budgets=words(name, 0.9 * least)), formulation)
+
+
+@pytest.mark.parametrize("formulation", ["schedule_search", "path_beam"])
+@pytest.mark.parametrize("name", SUMS)
+@pytest.mark.parametrize(
+    ("bricks", "moves"), [(5, UP), (4, DOWN), (5, "loop")], ids=["up", "down", "loop"]
+)
+def test_states_have_a_plan_within_every_optimum(bricks, moves, name, formulation):
+    check(posed(bricks, moves), name, formulation)
+
+
+@pytest.mark.parametrize("name", SUMS)
+@pytest.mark.parametrize("aim", ["sum", "steps,minmax", "sum(D_max)"])
+def test_so_they_have_for_any_aim(name, aim):
+    """Where a sum is to be small, prices of budgets have to find a plan at the edge of them."""
+    problem = posed(5, UP).but(goals=aim)
+    least = seqopt.solve(problem.but(goals=name)).objective[name]
+    for factor in FACTORS:
+        plan = seqopt.solve(problem.but(budgets=words(name, factor * least)))
+        assert plan.objective[name] <= factor * least * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("formulation", ["order_search", "path_beam"])
+@pytest.mark.parametrize("name", ["sum(T_max)", "travel", "steps", "regrips"])
+def test_orders_have_a_plan_within_every_optimum(name, formulation):
+    check(posed(3, UP, "tied"), name, formulation, factors=FACTORS[::3])
+
+
+@pytest.mark.parametrize("name", ["makespan", "sum(T_max)", "regrips"])
+@pytest.mark.parametrize("formulation", ["makespan_labels", "makespan_flow"])
+def test_builds_in_time_have_a_plan_within_every_optimum(name, formulation):
+    engine = engine_of(3, 3)
+    problem = seqopt.pose(engine, FreeRules(), ONES, "makespan")
+    least = seqopt.solve(problem.but(goals=name)).objective[name]
+    for factor in FACTORS:
+        aim = "minmax" if name == "makespan" else "makespan"
+        capped = problem.but(goals=aim, budgets=words(name, factor * least))
+        try:
+            plan = seqopt.solve(capped, formulation)
+        except NothingFoundError:  # of a bound alone
+            assert find_formulation(formulation).kind is FormulationKind.BOUND
+            continue
+        assert plan.objective[name] <= factor * least * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("name", ["travel", "steps", "regrips"])
+def test_scenarios_have_a_plan_within_every_optimum(name):
+    scene = small_arch(4)
+    drawn = seqopt.scenarios(scene, count=2, seed=1).scenes
+    check(posed(4, UP).but(scenarios=drawn), name, "schedule_search", factors=FACTORS[::3])
+
+
+@pytest.mark.parametrize(
+    ("bricks", "name", "orders"),
+    [
+        (3, "sum(M_sup)", None),
+        pytest.param(4, "sum(T_max)", None, marks=slow),
+        pytest.param(3, "sum(M_sup)", "tied", marks=slow),
+    ],
+)
+def test_margins_are_the_best_within_budgets(bricks, name, orders):
+    """The plan of the least bond takes more than the budget: another one keeps it."""
+    problem = posed(bricks, UP, orders).but(goals="bond")
+    least = seqopt.solve(problem.but(goals=name, stands="epoxy")).objective[name]
+    plan = seqopt.solve(problem.but(budgets=words(name, 1.000001 * least)))
+    assert plan.objective[name] <= 1.000002 * least
+    assert plan.objective["bond"] > seqopt.solve(problem).objective["bond"]
+    with pytest.raises(InfeasibleError):
+        seqopt.solve(problem.but(budgets=words(name, 0.9 * least)))
+
+
+@pytest.mark.parametrize("formulation", ["labels", "overlap_mip", "lagrangian", "overlap_lp"])
+def test_candidates_have_a_choice_within_every_optimum(formulation):
+    problem = layers_of(posed(6, "loop").but(goals=()))
+    posed_way = travel(problem, np.inf)
+    least = least_spent(problem, posed_way)
+    kind = find_formulation(formulation).kind
+    for factor in FACTORS:
+        capped = replace(problem, budgets=(replace(posed_way, bound=factor * least),))
+        try:
+            plan = seqopt.solve(capped, formulation)
+        except SolverError:  # a mixture of choices, or none was met: never infeasible
+            assert kind is FormulationKind.BOUND
+            continue
+        assert posed_way.spent(plan.choice) <= factor * least * (1 + 1e-6)
+    tight = replace(problem, budgets=(replace(posed_way, bound=0.9 * least),))
+    with pytest.raises(InfeasibleError, match="every choice uses at least"):
+        seqopt.solve(tight, formulation)
+
+
+def least_spent(problem, budget):
+    """The least that any choice takes of a budget, by a shortest path of its own."""
+    reached = np.zeros(1)
+    for single, shared in zip(budget.single, budget.shared, strict=True):
+        reached = (reached[:, None] + shared).min(axis=0) + single
+    return float(reached.min())
+
+
+def test_pairs_of_optima_have_the_plans_that_they_are_of():
+    """What two sums take of one plan is kept by it, whatever mixtures of others do."""
+    problem = posed(5, UP)
+    for aim in ("sum(M_sup),travel", "travel,sum(T_max)", "sum(T_max),sum(M_sup)"):
+        one = seqopt.solve(problem.but(goals=aim)).objective
+        for factor in FACTORS:
+            caps = [words(name, factor * value) for name, value in one.items()]
+            plan = seqopt.solve(problem.but(budgets=caps))
+            assert all(plan.objective[n] <= factor * v * (1 + 1e-6) for n, v in one.items())
+
+
+def test_a_narrow_search_finds_none_and_says_no_more():
+    """The states of least worst step have no plan within the budget; others have."""
+    problem = posed(6, UP)
+    least = seqopt.solve(problem.but(goals="sum(T_max)")).objective["sum(T_max)"]
+    capped = within(
+        build_states(problem.engine, UP, ONES, "minmax"), {"sum(T_max)": 1.000001 * least}
+    )
+    few = Explorer(FreeStates(capped, regrips=False), width=2)
+    assert few.rise()
+    with pytest.raises(NothingFoundError) as caught:
+        exact_best(few, capped.budgets)
+    assert not isinstance(caught.value, InfeasibleError)
+    assert narrow(capped, 2, lambda _: None) is None
+    every = Explorer(FreeStates(capped))
+    assert every.rise()
+    assert exact_best(every, capped.budgets)[1].values[1] <= 1.000002 * least
+    tight = replace(capped, budgets=(0.9 * least,))
+    with pytest.raises(InfeasibleError):
+        exact_best(every, tight.budgets)
+    low = Explorer(FreeStates(capped))
+    assert low.rise(1.01 * seqopt.solve(problem).objective["minmax"])
+    with pytest.raises(NothingFoundError):  # states above the threshold were left out
+        exact_best(low, tight.budgets)
+
+
+def test_the_two_errors_never_stand_for_each_other():
+    assert not issubclass(NothingFoundError, InfeasibleError)
+    assert not issubclass(InfeasibleError, NothingFoundError)
+    assert not issubclass(InfeasibleError, SolverError)
+
+
+def denies(problem, **_):
+    raise InfeasibleError("no plan is within all budgets")
+
+
+def test_that_none_is_within_budgets_is_not_believed():
+    """The judge looks for one itself, and names what it takes."""
+    problem = posed(4, UP)
+    least = seqopt.solve(problem.but(goals="sum(T_max)")).objective["sum(T_max)"]
+    capped = states_of(problem.but(budgets=words("sum(T_max)", 1.1 * least)))
+    fake = replace(find_formulation("schedule_search"), name="fake", solve=denies)
+    with pytest.raises(SolverError, match=r"fake says .* and some are: sum\(T_max\) [\d.]+$"):
+        seqopt.solve(capped, fake)
+
+
+def test_the_message_says_what_each_budget_needs_and_that_both_are_too_little():
+    problem = posed(6, UP)
+    one = {n: seqopt.solve(problem.but(goals=n)).objective[n] for n in ("sum(T_max)", "travel")}
+    caps = [words(name, 1.0001 * value) for name, value in one.items()]
+    with pytest.raises(InfeasibleError, match=r"^free .* least [\d.]+ by itself, and") as caught:
+        seqopt.solve(problem.but(budgets=caps))
+    assert str(caught.value).count("by itself") == 2
+
+
+@slow
+@pytest.mark.parametrize("factor", FACTORS)
+def test_the_reference_arch_has_one(factor):
+    free = {"schedule": "free", "criterion": "worst-ratio-published"}
+    least = seqopt.optimize("arch25", aim="sum(T_max)", **free).objective["sum(T_max)"]
+    budgets = [f"sum(T_max)={factor * least!r}"]
+    plan = seqopt.optimize("arch25", aim="minmax", budgets=budgets, **free)
+    assert plan.objective["sum(T_max)"] <= factor * least * (1 + 1e-6)
+    assert plan.status == "optimal"
