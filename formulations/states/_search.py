@@ -282,7 +282,10 @@ def after_margins(problem: States, search: Search, tell: Watching) -> StatePath:
         return StatePath(tuple(states), (value,), (bound,))
     try:
         after = after_margins(rest, search, tell)
-    except InfeasibleError as error:  # with another margin there may be one
+    except InfeasibleError as error:
+        if not (problem.is_timed and problem.budgets):
+            raise
+        # margins are not sought within budgets of time: with another one there may be a plan
         raise NothingFoundError(f"with the best {problem.goals[0]}, {error}") from None
     prices = ((0.0,) * len(problem.budgets), *after.prices) if problem.budgets else ()
     objective, bounds = (value, *after.objective), (bound, *after.bound)
