@@ -61,7 +61,7 @@ def optimize(
     formulation: str | None = None,
     engine: str = USUAL,
     *,
-    limits: Sequence[Limit] = (),
+    limits: Sequence[Limit | str] | str = (),
     **options: Any,
 ) -> Plan:
     """Choose where robots hold over a whole build, or every step of a free schedule.
@@ -78,8 +78,9 @@ def optimize(
         A name in `seqopt.formulations`; here and above, `DEFAULTS` say what is taken otherwise.
     engine : str
         A name in `seqopt.engines.registry.ENGINES`; ``"auto"`` uses the simplest sufficient model.
-    limits : sequence of Limit
-        Bounds that no step may exceed, whether or not a grip is open in it.
+    limits : sequence of Limit or str
+        Bounds that no step may exceed, whether or not a grip is open in it, also in words:
+        ``"payload"``, ``"F_largest=300"``, ``"linear_range=any"``.
     **options
         ``aim``, ``stands``, ``budgets``, ``scenarios`` and ``over`` of `seqopt.pose`, in words;
         ``order``, which may be ``"search"``; ``mortar``, ``robots``, ``candidates``; of
@@ -110,7 +111,7 @@ def _asked(
     scene: Scene | str | Path,
     schedule: Schedule | Path | str | None,
     given: tuple[Criterion | str | None, str, str | None],
-    limits: Sequence[Limit],
+    limits: Sequence[Limit | str] | str,
     options: dict[str, Any],
 ) -> Problem:
     """Return the problem; what options say of it is taken out of them."""

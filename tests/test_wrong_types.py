@@ -74,8 +74,8 @@ WEIGHTS, SCALES = (("T_max", 0.0, 1.0),), (("T_max", 1.0, 0.0),)
 COARSE = RankSum("own", (("T_max", 1.0),), (("T_max", 1.0),), resolution=(("T", 0.0),))
 
 WRONG = {
-    "limits 'payload': give values": lambda: seqopt.optimize(SCENE, limits="payload"),
-    "limits 'payload': give": lambda: seqopt.optimize(SCENE, "free", limits="payload"),
+    "limit heavy does not exist; give": lambda: seqopt.optimize(SCENE, limits="heavy"),
+    "limits 5: give": lambda: seqopt.optimize(SCENE, "free", limits=5),
     "limits [5]: give values": lambda: seqopt.pose(ENGINE, LOOP, EQUATIONS, limits=[5]),
     "schedule 5: give a Schedule": lambda: seqopt.optimize(SCENE, 5),
     "cache is 5; give the path of a folder": lambda: seqopt.optimize(SCENE, cache=5),

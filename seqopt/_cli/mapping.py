@@ -10,13 +10,14 @@ from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
 from seqopt._cli.outputs import figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import wrapped
-from seqopt._cli.values import count_word, mortar_word, number_word
+from seqopt._cli.values import count_word, mortar_word
 from seqopt._cli.words.given import plan_name
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.engines.registry import USUAL, make_engine, versions
 from seqopt.errors import ProblemError, SceneError, SeqoptError
 from seqopt.network.build import build_network
+from seqopt.problem._limit_words import number_word
 from seqopt.report._failures import AXIS_WORDS, Builds, cure_words, failure_page, usual_builds
 from seqopt.scene._checks import MOST_BRICKS
 from seqopt.scene._counts import scene_of_bricks

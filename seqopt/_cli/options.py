@@ -44,7 +44,8 @@ def declare(takes: Takes, about: Mapping[str, str], **more: Any) -> None:
 
 LIMIT = {
     "--limit LIMIT ...": "what no step may exceed: payload (of every robot), or RESPONSE=VALUE in "
-    "SI units, as F_largest=300; also where no grip is open"
+    "SI units, as F_largest=300; also where no grip is open. Plans keep the linear range wherever "
+    "one does: linear_range=any lifts that, 0.5 asks for half of it in every step"
 }
 RULE = {
     "--rule NAME=VALUE ...": "what robots may do: least_grips=N (2, from the second brick on), "

@@ -14,7 +14,6 @@ from seqopt._cli.values import (
     asked_standing,
     count_word,
     parse_criterion,
-    parse_limits,
     parse_numbers,
     parse_robots,
     parse_rules,
@@ -26,6 +25,7 @@ from seqopt.errors import ProblemError, StepError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.plan.calling.formulation import On, find_formulation
+from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.problem import (
     Orders,
     Problem,
@@ -117,7 +117,7 @@ def asked_problem(options: argparse.Namespace) -> Asked:
     if getattr(options, "durations", ()):
         scene = in_seconds(options, scene)
     find_postures(scene, getattr(options, "cache", None), options.tell)
-    words: dict[str, Any] = {"limits": parse_limits(options.limit, scene)}
+    words: dict[str, Any] = {"limits": parse_limits(options.limit, scene, "--limit")}
     budgets = getattr(options, "budget", [])
     (parse_caps if of_states else parse_budgets)(budgets)  # said before anything is built
     aim = known = unseen = None

@@ -14,11 +14,11 @@ from seqopt.contact.curing import Curing, _find_curing
 from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
 from seqopt.errors import ProblemError, SceneError, SeqoptError, StepError, did_you_mean
 from seqopt.plan.calling.formulation import Formulation, as_formulation
+from seqopt.problem._limit_words import LARGEST, NAMES, number_word, split_word
 from seqopt.problem.criteria import Among, Ranked, RankSum
-from seqopt.problem.requirements import NEVER, Criterion, Limit, payload_limits
+from seqopt.problem.requirements import NEVER, Criterion
 from seqopt.problem.standing import Standing
 from seqopt.responses._choices import CHOICE_RESPONSES
-from seqopt.responses.quantities import TOLERANCE
 from seqopt.responses.resources import Resources
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
@@ -30,23 +30,9 @@ from seqopt.workflow import DEFAULTS
 BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
 SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
 MOST_WORKERS = 1024
-LARGEST = 1e100  # number: products of larger ones overflow
-_LENGTHS = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9, "m": 1.0}
 COUNTS = ("least_grips", "regrips")
 UNBOUND = {("regrips", "any"): None, ("placers", "any"): (), ("candidates", "all"): ""}
 RULES = ("newest", "payload", "ending", "placers", "candidates", *COUNTS)
-
-
-def number_word(text: str, where: str, *, zero: bool = False) -> float:
-    """Return a positive number, or zero too; ``where`` is the argument, for messages."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = -1.0
-    if not 0 < value <= LARGEST and not (zero and value == 0):
-        most = f" up to {LARGEST:g}" if value > LARGEST else ""
-        raise ProblemError(f"{where}: {text!r} is not a positive number{' or zero' * zero}{most}")
-    return value
 
 
 def speed_seconds(text: str | None) -> float:
@@ -86,20 +72,12 @@ def _known_word(
     return name
 
 
-def _split_word(text: str) -> tuple[str, str]:
-    """Return a response, whose brackets may hold anything, and the number after ``=``, if any."""
-    end = text.rfind("]") + 1
-    name, _, number = text[end:].partition("=")
-    return text[:end] + name, number
-
-
-def _response_word(name: str, where: str) -> str:
-    known = (*CHOICE_RESPONSES, TOLERANCE)
-    if name not in (*known, "F_each") and not name.startswith("F_"):
-        criteria = (*CRITERIA, *CHOICE_RESPONSES, "F_each")
-        names = criteria if where == "--criteria" else ("payload", *known)
+def _response_word(name: str) -> str:
+    if name not in (*NAMES, "F_each") and not name.startswith("F_"):
+        names = (*CRITERIA, *CHOICE_RESPONSES, "F_each")
         hint = did_you_mean(name, names)
-        raise ProblemError(f"{where} {name} does not exist{hint}; give {', '.join(names)}, F_ROBOT")
+        known = ", ".join(names)
+        raise ProblemError(f"--criteria {name} does not exist{hint}; give {known}, F_ROBOT")
     return name
 
 
@@ -175,35 +153,11 @@ def parse_numbers(
     """Return positive numbers by name, each from ``NAME=VALUE``; any name is known by default."""
     out: dict[str, float] = {}
     for text in texts:
-        name, value = _split_word(text)
+        name, value = split_word(text)
         if known is not None:
             _known_word(name, known, f"{where} {text}", advice=advice)
         out[name] = number_word(value, f"{where} {text}", zero=zero)
     return out
-
-
-def parse_limits(texts: Sequence[str | Limit], scene: Scene) -> tuple[Limit, ...]:
-    """Return limits, each from ``payload``, of the scene's robots, or ``RESPONSE=VALUE``, SI."""
-    out: list[Limit] = []
-    for text in texts:
-        if isinstance(text, Limit):  # of Python
-            out.append(text)
-        elif text == "payload":
-            out += payload_limits(scene)
-        else:
-            name, value = _split_word(text)
-            if name == "payload":
-                raise ProblemError(f"--limit {text}: give payload alone, and values with --payload")
-            response = _response_word(name, "--limit")
-            read = length_word if response == TOLERANCE else number_word
-            out.append(Limit(response, read(value, f"--limit {text}")))
-    return tuple(out)
-
-
-def length_word(text: str, where: str) -> float:
-    """Return a positive length, m, from words such as ``0.4mm``; ``where``: for messages."""
-    unit = next((unit for unit in _LENGTHS if text.endswith(unit)), "")
-    return number_word(text.removesuffix(unit), where) * _LENGTHS.get(unit, 1.0)
 
 
 def parse_time_limit(text: str | None) -> float:
@@ -323,8 +277,8 @@ def parse_criterion(text: str | Criterion, crown: str | None = None) -> Criterio
         return CRITERIA[text]
     terms = []
     for part in BETWEEN.split(text):
-        name, weight = _split_word(part)
-        response = _response_word(name, "--criteria")
+        name, weight = split_word(part)
+        response = _response_word(name)
         terms.append((response, number_word(weight or "1", f"--criteria {part}")))
     return RankSum(text, tuple(terms), tuple(terms))
 

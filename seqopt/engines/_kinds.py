@@ -8,8 +8,14 @@ from enum import Enum
 
 from seqopt.contact._elastic_limits import ElasticLimits
 from seqopt.engines.interface import Engine, NamedEngine, SerialEngine
+from seqopt.scene.scene import Scene
 
 FAR = 0.1  # motion over a brick's length beyond which a structure has gone
+
+
+def linear_limit(scene: Scene) -> float:
+    """Return the displacement up to which a linear model holds, m: a tenth of the smallest side."""
+    return FAR * min(min(brick.dimensions) for brick in scene.bricks)
 
 
 class Level(Enum):

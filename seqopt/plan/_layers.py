@@ -11,7 +11,7 @@ from seqopt.errors import ProblemError, SolverError, StepError
 from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers, steps_over, travel
-from seqopt.graph.scenarios import ScenarioLayers
+from seqopt.graph.scenarios import ScenarioLayers, engine_for
 from seqopt.plan.calling._guard import require_fit, require_proof, require_time, select
 from seqopt.plan.calling.formulation import (
     End,
@@ -25,10 +25,12 @@ from seqopt.plan.calling.formulation import (
     timed,
 )
 from seqopt.plan.judge._posture_rules import check_postures
+from seqopt.plan.judge._shape_rules import check_shape
 from seqopt.plan.judge.certificate import _require_anew, certify_partial, judge
 from seqopt.plan.plan import Plan
 from seqopt.problem.criteria import Among
 from seqopt.problem.problem import Aim, AskedBudget
+from seqopt.problem.requirements import LINEAR_RANGE
 from seqopt.sequence.steps import Step
 
 CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, without budgets
@@ -169,9 +171,19 @@ def _checked(steps: tuple[Step, ...], graph: PlacementProblem) -> tuple[Step, ..
     try:
         if isinstance(nominal, Layers):
             check_postures(nominal.schedule.scene, steps)
+            _check_shape(graph, nominal, steps)
     except StepError as error:
         raise SolverError(f"a choice is not allowed: {error}") from error
     return steps
+
+
+def _check_shape(graph: PlacementProblem, nominal: Layers, steps: Sequence[Step]) -> None:
+    """Raise a `SolverError` if steps leave the linear range in any scenario and may not."""
+    if any(limit.label == LINEAR_RANGE for limit in nominal.limits):
+        scenes = graph.scenes if isinstance(graph, ScenarioLayers) else ()
+        own = (engine_for(nominal.engine, scene) for scene in scenes)
+        for engine in own if scenes else (nominal.engine,):
+            check_shape(engine, steps, nominal.limits)
 
 
 def _from_cache(graph: PlacementProblem) -> Iterator[Layers]:

@@ -197,15 +197,15 @@ def solve_states(graph: States, formulation: Formulation, run: Run) -> Plan:
     told = {} if run.progress is None else {"progress": run.progress}
     limit = {} if math.isinf(run.time_limit) else {"seconds": run.time_limit}
     with keep(graph.resources.executor, graph.resources.workers):
-        return _solved(graph, formulation, {**run.options, **told, **limit}, proof=run.proof)
+        return _solved(graph, formulation, run, {**run.options, **told, **limit})
 
 
 def _solved(
-    problem: States, formulation: Formulation, options: Mapping[str, Any], *, proof: bool
+    problem: States, formulation: Formulation, run: Run, options: Mapping[str, Any]
 ) -> Plan:
     start, twin = time.perf_counter(), replace(problem)  # which no formulation can reach
-    selection = _selected(formulation, problem, twin, options)
-    solved = time.perf_counter()
+    selection = _selected(formulation, (problem, twin), options, explain=run.explains)
+    solved, proof = time.perf_counter(), run.proof
     if proof and "progress" in options:
         options["progress"]("proving that no plan is better")
     steps = steps_in_hands(twin.space, selection.states, selection.grips)
@@ -223,18 +223,22 @@ def _judged(problem: States) -> States:
 
 
 def _selected(
-    formulation: Formulation, problem: States, twin: States, options: Mapping[str, Any]
+    formulation: Formulation,
+    problems: tuple[States, States],
+    options: Mapping[str, Any],
+    *,
+    explain: bool,
 ) -> StatePath:
     """Return what a formulation says, with numbers where numbers belong; or why there is none."""
-    start, name = time.perf_counter(), formulation.name
+    (problem, twin), start, name = problems, time.perf_counter(), formulation.name
     solve = partial(formulation.solve, problem, **options)
     if barred(problem) is not None:  # what every plan passes is asked before any is sought
-        raise confirmed(twin, name, float(options.get("seconds", math.inf)))
+        raise confirmed(twin, name, float(options.get("seconds", math.inf)), explain=explain)
     try:
         selection = called(name, partial(_judged, problem), StatePath, solve)
     except InfeasibleError as error:
         left = float(options.get("seconds", math.inf)) - (time.perf_counter() - start)
-        why = confirmed(twin, name, left, exact=formulation.looks_at_all)
+        why = confirmed(twin, name, left, exact=formulation.looks_at_all, explain=explain)
         standing = problem.standing
         if type(why) is SolverError and standing is not None and standing.curing is not None:
             said = (

@@ -20,6 +20,8 @@ from seqopt.graph.orders import MOST_PARTS, AllOrders, OrderStates
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
 from seqopt.graph.states._visits import barred, explore, steps_of, steps_with, with_held
 from seqopt.graph.states.states import States
+from seqopt.plan._range import best_front, leaves
+from seqopt.plan._rounding import _rounded_up, _rounding_steps
 from seqopt.plan.calling._guard import called, readable, text
 from seqopt.plan.calling.formulation import Formulation, On, as_formulation
 from seqopt.plan.judge._infeasible import confirmed
@@ -27,14 +29,13 @@ from seqopt.plan.judge._orders import finds_better_order
 from seqopt.plan.judge.schedules import plan_values
 from seqopt.plan.solving import graph_of, states_of
 from seqopt.problem.problem import Measure, Problem
+from seqopt.responses._range import Moved
+from seqopt.responses.table import OUTSIDE
 from seqopt.scene.scene import Order
 from seqopt.sequence.rules import Ending
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.work._workers import free_memory
 from seqopt.work.progress import Tell, with_progress
-
-DIGITS = 9  # after the first
-EDGE = 1e-9  # of a rounding step: how far above a multiple a value still counts as it
 
 
 class _StateFront:
@@ -231,32 +232,6 @@ def _require_memory(found: Explorer) -> None:
         raise ProblemError("pareto: the states of all orders do not fit the memory; give an order")
 
 
-def _rounding_steps(names: Sequence[str], rounding: Mapping[str, float] | None) -> Floats:
-    """Return what every number is rounded up to multiples of; zero where it is not.
-
-    Result (k,). Raises `ProblemError` if a name is none of these, or a step is no positive number.
-    """
-    for name, step in (rounding or {}).items():
-        if name not in names or not 0 < step < np.inf:
-            known = ", ".join(names)
-            raise ProblemError(f"round {name}={step:g}: give a positive step for one of {known}")
-    return np.array([(rounding or {}).get(name, 0.0) for name in names])
-
-
-def _rounded_up(values: Floats, steps: Floats) -> Floats:
-    """Return values rounded up to multiples of steps, others rounded to ten digits.
-
-    What differs by less than ten digits is the same: no plan is better by an error of rounding.
-
-    ``values`` (..., k); ``steps`` (k,): zero where no step is given. Result (..., k).
-    """
-    safe = np.where(steps > 0, steps, 1.0)
-    size = np.abs(np.where((values != 0) & np.isfinite(values), values, 1.0))
-    digit = 10.0 ** (np.floor(np.log10(size)) - DIGITS)
-    plain = np.where(np.isfinite(values), np.round(values / digit) * digit, values)
-    return np.where(steps > 0, np.ceil(values / safe - EDGE) * safe, plain)
-
-
 TOLERANCE = 1e-6  # of a value: how far a point may be from what the engine says of its plan
 
 
@@ -313,7 +288,8 @@ class Front(Terse):
     then ``steps`` and ``regrips`` of its plan where they are none of these; ``steps``: the plan of
     every row; ``engines``: what computes its responses, of the scene in its build order;
     ``complete``: whether it was proven that no further point exists; ``seconds``: by stage, s:
-    solve, verify.
+    solve, verify; ``moved``: how far plans move nodes, over the limit of the linear range, where
+    that was asked; ``beyond``: why some leave it, in a few words.
     """
 
     table: pd.DataFrame
@@ -321,10 +297,15 @@ class Front(Terse):
     engines: tuple[Engine, ...]
     complete: bool
     seconds: Mapping[str, float]
+    moved: tuple[Moved, ...] = ()
+    beyond: str = ""
 
     def __repr__(self) -> str:
         whole = "complete" if self.complete else "not complete"
-        return f"<Front: {len(self.table)} plans, {whole}; {', '.join(self.table.columns)}>"
+        outside = f"{OUTSIDE}: " * any(map(leaves, self.moved))
+        return (
+            f"<Front: {outside}{len(self.table)} plans, {whole}; {', '.join(map(str, self.table))}>"
+        )
 
 
 def find_front(
@@ -338,15 +319,29 @@ def find_front(
     """Return the Pareto set of a problem, its points recomputed and its completeness judged.
 
     ``problem``: whose goals are all to be small at once; ``rounding``: what numbers are rounded up
-    to multiples of, by name, SI units, which thins the set; of a problem that is posed.
+    to multiples of, by name, SI units, which thins the set; of a problem that is posed. Its plans
+    keep the linear range if any does, unless a limit on ``linear_range`` says otherwise.
     ``seconds``: after which the points found are returned; ``progress``: told how far it is, in a
     few words or as a `seqopt.work.Stage`. Raises `InfeasibleError` if no plan is allowed;
     `SolverError` if a plan is not worth what is claimed, or the set lacks a point.
     """
-    start = time.perf_counter()
     formulation = as_formulation(formulation, On.FRONTS)
-    if isinstance(problem, Problem):
-        problem = _posed(problem, rounding)
+    if not isinstance(problem, Problem):
+        return _front_of(problem, formulation, seconds, progress)
+    end = time.perf_counter() + seconds
+
+    def found(asked: Problem) -> Front:
+        graph, left = _posed(asked, rounding), max(0.0, end - time.perf_counter())
+        return _front_of(graph, formulation, left, progress)
+
+    return best_front(problem, found)
+
+
+def _front_of(
+    problem: _FrontProblem, formulation: Formulation, seconds: float, progress: Tell
+) -> Front:
+    """Return the Pareto set of a problem, judged."""
+    start = time.perf_counter()
     twin, name = problem.anew(), formulation.name  # which no formulation can reach
     solve = partial(formulation.solve, problem, seconds=seconds, progress=progress)
     found = _found(name, (problem, twin), solve)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from seqopt.contact.mortar import Mortar
+from seqopt.engines._kinds import OpeningEngine
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError
@@ -32,11 +33,20 @@ from seqopt.plan.calling.formulation import (
 )
 from seqopt.plan.judge.certificate import TOLERANCE, Certificate
 from seqopt.problem.problem import Aim, Problem, judged_by
-from seqopt.problem.requirements import Excess, overloads
+from seqopt.problem.requirements import LIMIT_TOLERANCE, Excess, _said_limits, overloads
 from seqopt.problem.standing import Standing
 from seqopt.responses._choices import window_models
+from seqopt.responses._range import Moved
 from seqopt.responses._tolerance import value_text
-from seqopt.responses.table import _Columns, _response_columns, _table_of, step_fields
+from seqopt.responses.table import (
+    FAR_OFF,
+    OUTSIDE,
+    Departure,
+    _Columns,
+    _response_columns,
+    _table_of,
+    step_fields,
+)
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.site import Site
@@ -79,6 +89,11 @@ class Plan(ShownBuild):
         The build order, where it was sought.
     arms : KeptPostures or None
         The postures of arms; None where no robot has one, or a graph was solved.
+    moved : Moved or None
+        How far steps move nodes over the limit of the linear range, in the worst scenario; None
+        where a graph was solved.
+    beyond : str
+        Why it leaves the linear range although plans that keep it are preferred; empty otherwise.
 
     Examples
     --------
@@ -101,11 +116,34 @@ class Plan(ShownBuild):
     looked_at: int | None = None
     order: FoundOrder | None = None
     arms: KeptPostures | None = None
+    moved: Moved | None = None
+    beyond: str = ""
 
     def __repr__(self) -> str:
         what = f"{self.scene_name!r}, {self.method!r}, " if self.steps else ""
         count = f"{len(self.steps)} steps" if self.steps else f"{len(self.nodes)} nodes"
-        return f"Plan({what}by {self.formulation.name}: {count}, {self.result})"
+        outside = f"{OUTSIDE}: " if self.outside else ""
+        return f"Plan({outside}{what}by {self.formulation.name}: {count}, {self._value})"
+
+    @property
+    def is_far(self) -> bool:
+        """Whether nodes are known to move farther than the linear range allows."""
+        return self.moved is not None and self.moved.share > 1 + LIMIT_TOLERANCE
+
+    @property
+    def outside(self) -> bool:
+        """Whether steps leave the linear range in any way: then what is computed means little."""
+        opens = self.moved is not None and isinstance(self.engine, OpeningEngine)
+        return self.is_far or bool(self.steps and not opens and self.departures)
+
+    @cached_property
+    def departures(self) -> tuple[Departure, ...]:
+        """The limits of the linear range that steps leave, in the scene or in any scenario."""
+        found = self._within.departures(self._columns)
+        if self.moved is None or not self.is_far or any(d.what == FAR_OFF for d in found):
+            return found
+        said = f"{self.moved.share:.4g} times what the linear range allows, in a scenario"
+        return (Departure(FAR_OFF, said, (self.moved.step,)), *found)
 
     @property
     def layers(self) -> Layers:
@@ -232,12 +270,21 @@ class Plan(ShownBuild):
         )
         exact = judged_exact and self.formulation.kind is not FormulationKind.HEURISTIC
         if exact or proof.gap <= TOLERANCE:
-            return Status.OPTIMAL
-        return Status.CLAIMED if proof.claimed_gap <= TOLERANCE else Status.FEASIBLE
+            return Status.OUTSIDE if self.is_far else Status.OPTIMAL
+        if proof.claimed_gap <= TOLERANCE:
+            return Status.OUTSIDE if self.is_far else Status.CLAIMED
+        return Status.FEASIBLE
 
     @property
     def result(self) -> str:
-        """The value of the plan, and what is proven about it, in words."""
+        """The value of the plan, and what is proven about it, in words.
+
+        Where steps leave the linear range, it says so first.
+        """
+        return f"{OUTSIDE}: {self._value}" if self.outside else self._value
+
+    @property
+    def _value(self) -> str:
         if isinstance(self.graph, States | Instance):
             values = ", ".join(
                 f"{name} {value_text(name, v)}" for name, v in self.objective.items()
@@ -410,8 +457,8 @@ class Plan(ShownBuild):
 def _summarized(plan: Plan) -> dict[str, object]:
     """Return the summary of a plan, with the same keys whatever it was chosen from."""
     graph, proof, scene = plan.graph, plan.certificate, plan.engine.network.scene
-    asked = _states_asked(graph) if isinstance(graph, States) else _layers_asked(plan)
-    narrowed = plan.among and plan.status.endswith("optimal")
+    asked = _states_asked(plan, graph) if isinstance(graph, States) else _layers_asked(plan)
+    narrowed = plan.among and "optimal" in plan.status
     return {
         "scene": scene.name,
         "schedule": plan.method,
@@ -453,13 +500,19 @@ def _layers_asked(plan: Plan) -> dict[str, object]:
         "criterion": layers.criterion.name,
         **layers.criterion.settings,
         "scenarios": len(graph.scenes) if isinstance(graph, ScenarioLayers) else 0,
-        "limits": {limit.response: limit.bound for limit in layers.limits},
+        "limits": _limits_asked(plan),
         "rules": {},
         "stands": None,
     }
 
 
-def _states_asked(graph: States) -> dict[str, object]:
+def _limits_asked(plan: Plan) -> dict[str, object]:
+    """Return the limits that were asked for, as people say them."""
+    asked = plan.problem if isinstance(plan.problem, Problem) else plan._of_scene
+    return _said_limits(asked.limits)
+
+
+def _states_asked(plan: Plan, graph: States) -> dict[str, object]:
     """Return what was asked of states."""
     rules, stands = graph.rules, None
     if graph.standing is not None:
@@ -469,7 +522,7 @@ def _states_asked(graph: States) -> dict[str, object]:
         "aims": list(graph.names[: len(graph.aims)]),
         **judged_by(graph.goals, graph.criterion),
         "scenarios": len(graph.scenarios),
-        "limits": {limit.response: limit.bound for limit in graph.limits},
+        "limits": _limits_asked(plan),
         "rules": {} if isinstance(rules, Schedule) else rules.described(graph.network.scene),
         "stands": stands,
     }

@@ -17,14 +17,16 @@ from seqopt._archives import Archive
 from seqopt._files import parse_json, read_bytes, write_bytes
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import FileError, ProblemError, StepError
-from seqopt.graph._explore import Visited
+from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.paths import _to_go
-from seqopt.graph.states._visits import explore
+from seqopt.graph.states._visits import barred, explore
 from seqopt.graph.states.states import States
 from seqopt.plan.judge._infeasible import confirmed
 from seqopt.plan.judge._policy import check_policy
 from seqopt.plan.solving import states_of
 from seqopt.problem.problem import Problem
+from seqopt.problem.requirements import LINEAR_RANGE
+from seqopt.responses.table import OUTSIDE
 from seqopt.scene._checks import short
 from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence.site import Site
@@ -89,6 +91,9 @@ class Policy(FrozenValue):
         The state that the best move leads to; -1 where the build has ended, or cannot end.
     checked : int
         How many moves the judge compared with the values of the first goal, which they prove.
+    keeps_range : bool
+        Whether all states are within the linear range; also where that limit is lifted. Otherwise
+        no build keeps it.
     """
 
     goals: tuple[str, ...]
@@ -101,10 +106,12 @@ class Policy(FrozenValue):
     values: Floats
     following: Ints
     checked: int = 0
+    keeps_range: bool = True
 
     def __repr__(self) -> str:
         stuck = f", {self.dead_ends} without an end" if self.dead_ends else ""
-        return f"<Policy: {len(self.bricks)} states{stuck}, {', '.join(self.goals)}>"
+        outside = "" if self.keeps_range else f"{OUTSIDE}: "
+        return f"<Policy: {outside}{len(self.bricks)} states{stuck}, {', '.join(self.goals)}>"
 
     @property
     def dead_ends(self) -> int:
@@ -217,7 +224,7 @@ class Policy(FrozenValue):
 
     def content(self) -> bytes:
         """Return what `save` writes."""
-        names = ("goals", "robots", "kinds", "checked")
+        names = ("goals", "robots", "kinds", "checked", "keeps_range")
         told = {name: getattr(self, name) for name in names}
         arrays = {name: getattr(self, name) for name in ARRAYS}
         arrays["held"] = _small(self.held)
@@ -239,7 +246,7 @@ class Policy(FrozenValue):
 
 def _checked(told: Any, archive: Archive, where: str) -> Policy:
     """Return a policy whose arrays go together; a `FileError` names one that does not."""
-    names = ("goals", "robots", "kinds", "checked")
+    names = ("goals", "robots", "kinds", "checked", "keeps_range")
     if not isinstance(told, dict) or {*told} != {*names}:
         raise FileError(f"{where}: told is {short(told)}; {', '.join(names)} belong there")
     goals, robots, kinds = (told[name] for name in names[:3])
@@ -263,10 +270,12 @@ def _checked(told: Any, archive: Archive, where: str) -> Policy:
         if numbers.size and not least <= int(numbers.min()) <= int(numbers.max()) <= most:
             raise FileError(f"{where}: {name} goes beyond {least} to {most}")
     columns = held.shape[1] - len(every)
-    if columns not in (0, 1) or np.isnan(values).any() or type(told["checked"]) is not int:
+    kept = (type(told["checked"]), type(told["keeps_range"])) == (int, bool)
+    if columns not in (0, 1) or np.isnan(values).any() or not kept:
         raise FileError(f"{where}: held, values or checked are not of {len(every)} robots")
-    content = order, nodes, bricks, held, values, following
-    return Policy(tuple(goals), tuple(robots), tuple(map(tuple, kinds)), *content, told["checked"])
+    named = tuple(goals), tuple(robots), tuple(map(tuple, kinds))
+    arrays = order, nodes, bricks, held, values, following
+    return Policy(*named, *arrays, told["checked"], told["keeps_range"])
 
 
 def _are_lists(value: object) -> bool:
@@ -288,7 +297,8 @@ def find_policy(
 ) -> Policy:
     """Return what is best from every state that the builds of a free schedule reach.
 
-    The aims of ``problem`` have at most one worst step, which totals may precede and follow. With
+    The aims of ``problem`` have at most one worst step, which totals may precede and follow. States
+    are within the linear range if any build is, unless a limit on it says otherwise. With
     ``proof`` a second version of the rules and responses computed anew check every move. Raises
     `ProblemError` if aims are margins or totals over scenarios, or there are budgets;
     `InfeasibleError`, with why, if no build reaches an end; `SolverError` if the check finds a move
@@ -304,20 +314,30 @@ def find_policy(
     >>> str(policy.best(seqopt.Site(0)))
     'rob1 places brick 1 and holds it at node 2'
     """
-    states = _states_with_policy(problem)
     tell("looking at every state")
-    found = explore(states)
-    if not found.whole:
+    within = problem if problem.says_range else problem.within_range(1.0)
+    states, found = _explored(within)
+    if found is None and within is not problem:
+        states, found = _explored(problem)
+    if found is None:
         raise confirmed(replace(states), "the policy")
     found.refine()
     visited = found.graph()
-    policy = _of_graph(states, visited)
+    kept = any(limit.label == LINEAR_RANGE for limit in states.limits)
+    policy = replace(_of_graph(states, visited), keeps_range=kept or problem.lifts_range)
     if not proof:
         return policy
     tell("proving that no move is better")
     levels = np.concatenate([np.full(len(rows), level) for level, _, rows in visited.states])
     table = levels, policy.held, policy.values[:, 0], policy.following
     return replace(policy, checked=check_policy(states, *table))
+
+
+def _explored(problem: Problem) -> tuple[States, Explorer | None]:
+    """Return the states of a problem, and those that builds reach; None where none ends."""
+    states = _states_with_policy(problem)
+    found = None if barred(states) is not None else explore(states)
+    return states, found if found is not None and found.whole else None
 
 
 def _states_with_policy(problem: Problem) -> States:

@@ -9,6 +9,7 @@ to one, with which every plan keeps them.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.scenarios import ScenarioLayers, engine_for, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
 from seqopt.plan._layers import solve_layers, with_budgets
+from seqopt.plan._range import best_within
 from seqopt.plan._status import KeptPostures
 from seqopt.plan.calling.formulation import Formulation, On, Run, as_formulation
 from seqopt.plan.plan import Plan
@@ -152,7 +154,7 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     moves: Schedule | FreeRules,
     criterion: Criterion,
     goals: Sequence[Goal] | str = (),
-    limits: Sequence[Limit] = (),
+    limits: Sequence[Limit | str] | str = (),
     *,
     budgets: Sequence[str] | str = (),
     stands: Standing | Mortar | str | None = None,
@@ -172,8 +174,9 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
         As ``"minmax,steps"``, over states; by default the sum of the costs of open grips or the
         largest, as the formulation minimizes, and of rules the worst step.
     limits, budgets, stands, scenarios, over, orders, also, resources : optional
-        As of `Problem`: ``"travel=3.5m"``, ``"dry"``, `seqopt.scenarios`, ``"cvar=0.9"`` (or
-        ``worst-peak``, ``worst-total``), ``"tied"`` or ``"any"``.
+        As of `Problem`: ``"F_largest=300"`` or ``"linear_range=any"``, ``"travel=3.5m"``,
+        ``"dry"``, `seqopt.scenarios`, ``"cvar=0.9"`` (or ``worst-peak``, ``worst-total``),
+        ``"tied"`` or ``"any"``.
 
     Returns
     -------
@@ -443,11 +446,19 @@ def _solved(problem: Any, formulation: Formulation | str | None, run: Run) -> Pl
             "take another formulation"
         )
 
-    def solved(asked: Problem) -> Plan:
-        return _solver(on)(graph_of(asked, on), found, run)
+    end = time.perf_counter() + run.time_limit
 
-    plan = _with_postures(problem, solved(problem), solved)
-    return replace(plan, problem=problem)
+    def best(asked: Problem) -> Plan:
+        own = asked is problem  # else the same within the linear range, in the time that is left
+        left = run.time_limit if own else max(0.0, end - time.perf_counter())
+        how = replace(run, time_limit=left, explains=own)
+
+        def solved(one: Problem) -> Plan:
+            return _solver(on)(graph_of(one, on), found, how)
+
+        return _with_postures(asked, solved(asked), solved)
+
+    return replace(best_within(problem, best), problem=problem)
 
 
 def _able(problem: Problem) -> tuple[On, ...]:

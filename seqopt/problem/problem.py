@@ -21,7 +21,9 @@ from seqopt.contact.mortar import find_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.network.network import Network
+from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.requirements import (
+    LINEAR_RANGE,
     Criterion,
     Limit,
     _prop_limits,
@@ -364,7 +366,8 @@ class Problem(Shown):
         What is to be small, the most important first; empty where the formulation says whether
         the sum of the costs of open grips or the largest counts.
     limits : tuple of Limit
-        Bounds that no step may exceed, whether or not a grip is open in it.
+        Bounds that no step may exceed, whether or not a grip is open in it. Without one on
+        ``linear_range``, plans keep the linear range wherever any does.
     budgets : tuple of str
         Caps on totals over the build, in words.
     stands : Standing or None
@@ -450,11 +453,27 @@ class Problem(Shown):
         cls, engine: Engine, moves: Schedule | FreeRules, criterion: Criterion, **words: Any
     ) -> Problem:
         """Return a problem of what is asked, in values or in words, as of `seqopt.pose`."""
-        return cls(engine, moves, criterion, **_in_values(words))
+        return cls(engine, moves, criterion, **_in_values(words, engine))
 
     def but(self, **words: Any) -> Problem:
         """Return the same problem with something else asked, in values or in words."""
-        return replace(self, **_in_values(words))
+        return replace(self, **_in_values(words, self.engine))
+
+    @property
+    def says_range(self) -> bool:
+        """Whether the limit of the linear range is asked for, or lifted."""
+        return any(limit.response == LINEAR_RANGE for limit in self.limits)
+
+    @property
+    def lifts_range(self) -> bool:
+        """Whether it is lifted: then plans need not keep it even where some do."""
+        return self.says_range and all(
+            math.isinf(limit.bound) for limit in self.limits if limit.response == LINEAR_RANGE
+        )
+
+    def within_range(self, share: float) -> Problem:
+        """Return the same problem whose steps keep within a share of the linear range."""
+        return replace(self, limits=(*self.limits, Limit(LINEAR_RANGE, share)))
 
     @cached_property
     def graphs(self) -> dict[str, Any]:
@@ -471,8 +490,11 @@ def _with_prop_limits(limits: tuple[Limit, ...], engine: Engine) -> tuple[Limit,
     return (*kept, *_prop_limits(network.scene))
 
 
-def _in_values(words: Mapping[str, Any]) -> dict[str, Any]:
+def _in_values(words: Mapping[str, Any], engine: Engine) -> dict[str, Any]:
     """Return values in the place of words, by what they are about."""
+    network = getattr(engine, "network", None)
+    if "limits" in words and isinstance(network, Network):  # else it is refused later
+        words = {**words, "limits": parse_limits(words["limits"], network.scene)}
     return {name: READ[name](value) if name in READ else value for name, value in words.items()}
 
 

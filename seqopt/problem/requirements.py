@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Terse
+from seqopt.engines._kinds import linear_limit
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import make_engine, recipe_of
 from seqopt.errors import MechanismError, ProblemError, StepError
@@ -224,6 +225,8 @@ class Criterion(Protocol):
 
 
 LIMIT_TOLERANCE = 1e-9  # by which a response may exceed a limit, over the limit's size
+LINEAR_RANGE = "linear_range"  # the largest displacement over that up to which the model holds
+LIFTED = "any"  # in words, where that is no limit
 
 
 @dataclass(frozen=True)
@@ -233,9 +236,10 @@ class Limit:
     Parameters
     ----------
     response : str
-        A name as in `seqopt.problem.criteria`, or ``tolerance``.
+        A name as in `seqopt.problem.criteria`, ``tolerance`` or ``linear_range``.
     bound : float
-        SI units; of a tolerance, which no step may stay below, m.
+        SI units; of a tolerance, which no step may stay below, m; of the linear range a share of
+        it. By default plans keep within 1 wherever any does; infinite lifts that.
 
     Raises
     ------
@@ -262,6 +266,17 @@ class Limit:
             raise ProblemError(f"limit {self.response}: its bound is NaN; give a number")
         if is_tolerance(self.response) and not self.bound > 0:
             raise ProblemError(f"limit tolerance={self.bound:g}: give a length above zero, m")
+        if self.response == LINEAR_RANGE and not self.bound > 0:
+            raise ProblemError(f"limit linear_range={self.bound:g}: give a share above zero")
+
+    @property
+    def label(self) -> str:
+        """What people call it."""
+        return self.response
+
+    def shown(self, value: float) -> float:
+        """Return a value of the response as people read it."""
+        return value
 
     @property
     def counted(self) -> float:
@@ -271,6 +286,42 @@ class Limit:
     def exceeded(self, values: Floats) -> Bools:
         """Return where values exceed the limit; NaN, as of a robot without a grip, does not."""
         return np.asarray(values > self.counted + LIMIT_TOLERANCE * abs(self.counted))
+
+
+@dataclass(frozen=True)
+class _RangeLimit(Limit):
+    """The limit of the linear range as steps are compared with it: on ``D_max``, m.
+
+    ``unit``: the displacement up to which the model holds, m.
+    """
+
+    unit: float = 1.0
+
+    @property
+    def label(self) -> str:
+        return LINEAR_RANGE
+
+    def shown(self, value: float) -> float:
+        return value / self.unit
+
+
+def _step_limits(given: Sequence[Limit] | Limit, scene: Scene) -> tuple[Limit, ...]:
+    """Return limits as steps are compared with them: of the linear range in meters, or lifted."""
+    far, out = linear_limit(scene), list[Limit]()
+    for limit in as_limits(given):
+        if limit.response != LINEAR_RANGE:
+            out.append(limit)
+        elif math.isfinite(limit.bound):
+            out.append(_RangeLimit("D_max", limit.bound * far, far))
+    return tuple(out)
+
+
+def _said_limits(limits: Sequence[Limit]) -> dict[str, object]:
+    """Return bounds by the names of limits, as words and JSON have them."""
+    return {
+        limit.label: limit.shown(limit.bound) if math.isfinite(limit.bound) else LIFTED
+        for limit in limits
+    }
 
 
 def as_limits(given: Sequence[Limit] | Limit) -> tuple[Limit, ...]:
@@ -376,7 +427,8 @@ class Excess:
         if self.limit.response == PROP_EXCESS:
             return f"a prop bears up to {self.largest:.1f} N more than it may, or pulls ({where})"
         if not self.robot:
-            return f"{self.limit.response} is up to {self.largest:.6g} of {bound:.6g} ({where})"
+            most, bound = self.limit.shown(self.largest), self.limit.shown(bound)
+            return f"{self.limit.label} is up to {most:.6g} of {bound:.6g} ({where})"
         return (
             f"{self.robot} holds up to {self.largest:.1f} N, more than its payload of "
             f"{bound:g} N ({where})"

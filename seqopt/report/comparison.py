@@ -16,26 +16,28 @@ from seqopt.errors import ProblemError, SeqoptError, StepError
 from seqopt.graph.layers.costs import TINY
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import rank_choice, under_both
-from seqopt.graph.states.states import build_states
 from seqopt.plan._layers import on_the_way
+from seqopt.plan._range import keeping
 from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.calling.formulation import On, formulations
+from seqopt.plan.calling.formulation import Formulation, On, find_formulation, formulations
 from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.plan import Plan
-from seqopt.plan.solving import solve
+from seqopt.plan.solving import pose, solve
 from seqopt.problem._arms import arm_faults
 from seqopt.problem.criteria import RankSum, WorstRatio
 from seqopt.problem.problem import Aim, Problem
-from seqopt.problem.requirements import Criterion, _prop_faults, overloads
+from seqopt.problem.requirements import LINEAR_RANGE, Criterion, Limit, _prop_faults, overloads
 from seqopt.report._speed._measure import speed_accuracy
 from seqopt.report._speed._table import SpeedTable
 from seqopt.responses._enough import Enough, what_was_enough
+from seqopt.responses._range import Moved
 from seqopt.responses._tolerance import COLUMN, is_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
 from seqopt.responses.resources import Resources
 from seqopt.responses.table import Departure, LinearRange, analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, FreeRules
+from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import MOST, find_schedule, parse_plan
 from seqopt.sequence.steps import _idle_note
 from seqopt.sequence.three_robots import modified_sequential
@@ -244,22 +246,44 @@ def _plans(
     engine: Engine, criterion: Criterion, progress: Tell, robots: Sequence[str]
 ) -> tuple[dict[str, Plan], Layers | None, str]:
     """Return the plans of all formulations and the problem of the loop, or why there is none."""
-    network, plans = engine.network, {}
+    network = engine.network
     count = len(robots) or min(len(network.scene.robots), MOST)
-    try:
-        loop = find_schedule(network, robots=robots)  # whose refusal says most
-        if count >= MOST:
-            progress(Stage("comparing", 0.0))
-            modified = candidate_layers(engine, modified_sequential(network, robots[:3]), criterion)
-            plans["modified-sequential"] = on_the_way(solve(modified, "cascade"))
-        known = formulations(On.LAYERS)
-        problem = candidate_layers(engine, loop, criterion, resources=Resources(progress=progress))
-        for done, (name, formulation) in enumerate(known.items()):
-            progress(Stage("comparing", (done + 1) / (len(known) + 1)))
+
+    def solved(
+        schedule: Schedule, named: Mapping[str, Formulation], limits: Sequence[Limit] = ()
+    ) -> tuple[dict[str, Plan], Layers]:
+        means = Resources(progress=progress)
+        problem, plans = candidate_layers(engine, schedule, criterion, limits, (), means), {}
+        for done, (name, formulation) in enumerate(named.items()):
+            progress(Stage("comparing", (done + 1) / (len(named) + 1)))
             plans[name] = on_the_way(solve(problem, formulation))
+        return plans, problem
+
+    def kept(
+        schedule: Schedule, named: Mapping[str, Formulation]
+    ) -> tuple[dict[str, Plan], Layers]:
+        """Within the linear range, if one of the plans leaves it and all can keep it."""
+        found, again = solved(schedule, named), (Limit(LINEAR_RANGE, 1.0),)
+        return keeping(found, _farthest(found[0]), lambda: solved(schedule, named, again))[0]
+
+    try:
+        loop, plans = find_schedule(network, robots=robots), dict[str, Plan]()  # it says most
+        if count >= MOST:
+            cascade = {"modified-sequential": find_formulation("cascade")}
+            plans, _ = kept(modified_sequential(network, robots[:3]), cascade)
+        others, problem = kept(loop, formulations(On.LAYERS))
     except (StepError, ProblemError) as error:
         return {}, None, str(error)
-    return plans, problem, ""
+    return plans | others, problem, ""
+
+
+def _farthest(plans: Mapping[str, Plan]) -> Moved:
+    """Return how far plans move nodes, over the limit of the linear range, by their tables."""
+    shift = RESPONSES["D_max"]
+    return max(
+        Moved(float(np.max(plan._columns[shift.column])) / shift.scale / plan._within.far, 0)
+        for plan in plans.values()
+    )
 
 
 def largest(scene: Scene, table: pd.DataFrame) -> dict[str, float]:
@@ -387,7 +411,7 @@ def _free_plan(
     """Return the shortest free schedule with the smallest worst step, or why there is none."""
     try:
         rules = FreeRules(robots=tuple(robots))
-        problem = build_states(engine, rules, criterion, "minmax,steps")
+        problem = pose(engine, rules, criterion, "minmax,steps")
         return solve(problem, "schedule_search", time_limit=PATIENCE, progress=progress), []
     except SeqoptError as error:
         return None, [f"{FREE}: {error}"]

@@ -18,7 +18,7 @@ import pandas as pd
 from seqopt.arrays import Floats, Ints
 from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
-from seqopt.engines._kinds import FAR, ChoosingEngine, OpeningEngine
+from seqopt.engines._kinds import ChoosingEngine, OpeningEngine, linear_limit
 from seqopt.engines.interface import Engine, Fields, Want, _empty_site
 from seqopt.errors import MechanismError, SceneError, SolverError
 from seqopt.network.network import Network
@@ -51,6 +51,7 @@ _Columns: TypeAlias = "Mapping[str, Sequence[Any]] | pd.DataFrame"
 _Held = tuple[int, int, tuple[int, ...]]
 """Number of a step, its bricks, and what is held."""
 OUTSIDE = "outside the linear range"
+FAR_OFF = "displacement"
 REMEDY = (
     "Do not rely on numbers outside the linear range. Check sizes, densities and stiffnesses of "
     "the scene; make joints stiffer, let robots hold more or other nodes, or set a limit on D_max. "
@@ -95,7 +96,7 @@ class LinearRange:
     @property
     def far(self) -> float:
         """The limit of displacements, m."""
-        return FAR * min(min(brick.dimensions) for brick in self._network.scene.bricks)
+        return linear_limit(self._network.scene)
 
     def departures(
         self, table: _Columns, fields: Iterable[Fields] | None = None
@@ -121,7 +122,7 @@ class LinearRange:
         within = f", more than {length_text(far)}, a tenth of the smallest side of a brick"
         deformed = f"{{:.3g}} times its thickness, more than {_STRAIN:g} times".format
         found = (
-            ("displacement", moved, far, lambda most: length_text(most) + within),
+            (FAR_OFF, moved, far, lambda most: length_text(most) + within),
             ("rotation", turned, _TURN, f"{{:.3g}} rad, more than {_TURN:g} rad".format),
             ("deformation of a joint", strained, _STRAIN, deformed),
             ("stress in a joint", stressed, 0.0, lambda most: _STRESSED.format(most / 1e6)),

@@ -227,14 +227,22 @@ FREE = ("optimize", "--schedule", "free", "--aim", "steps")
 def test_commands_say_it_first_and_tell_scripts(capsys, tmp_path, small_soft, words):
     out = tmp_path / ("out.csv" if words[0] == "analyze" else "out")
     asked = [words[0], small_soft, *words[1:], "--out", str(out)]
-    assert main(asked) == 0
-    assert capsys.readouterr().out.startswith("outside the linear range: ")
+    chosen = words[0] in ("optimize", "pareto")  # where the range is a limit, which none keeps
+    assert main(asked) == int(chosen)
+    said, err = capsys.readouterr()
+    assert said.startswith("outside the linear range: ")
+    assert ("seqopt: outside the linear range: no plan keeps it; " in err) == chosen
     strict = ["--strict"] if words[0] in ("analyze", "compare") else []
     asked = asked if words[0] in ("optimize", "pareto") else asked[:-2]  # else it writes no files
-    assert main([*asked, "--json", *strict]) == len(strict)
+    assert main([*asked, "--json", *strict]) == int(bool(strict) or chosen)
     said, err = capsys.readouterr()
     assert json.loads(said)["outside_linear_range"]
-    assert ("seqopt: outside the linear range: " in err) == bool(strict)
+    assert ("seqopt: outside the linear range: " in err) == (bool(strict) or chosen)
+    if chosen:
+        assert main([*asked, "--limit", "linear_range=any"]) == 0
+        said, err = capsys.readouterr()
+        assert said.startswith("outside the linear range: ")
+        assert "seqopt: " not in err
     if words[0] in ("optimize", "pareto"):
         assert json.loads((out / "summary.json").read_text("utf-8"))["outside_linear_range"]
     if words[0] != "analyze":

@@ -12,11 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seqopt._cli.main import main
-from seqopt._cli.values import parse_criterion, parse_limits
+from seqopt._cli.values import parse_criterion
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.layers import candidate_layers, steps_over
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
+from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.requirements import Limit, payload_limits
 from seqopt.report.comparison import compare
 from seqopt.responses._choices import CHOICE_RESPONSES

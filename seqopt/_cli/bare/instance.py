@@ -13,13 +13,13 @@ from seqopt._cli.options import WRITTEN, declare
 from seqopt._cli.outputs import keep_apart
 from seqopt._cli.posing import asked_problem
 from seqopt._cli.screens import question
-from seqopt._cli.values import number_word
 from seqopt._cli.words.given import file_name, take
 from seqopt.errors import ProblemError
 from seqopt.graph.instances._files import WRITERS, save_instance
 from seqopt.plan._compiled import compile_instance
 from seqopt.plan.calling.formulation import find_formulation
 from seqopt.plan.judge._bare._claims import first_stage
+from seqopt.problem._limit_words import number_word
 
 DESCRIPTION = (
     "Write the graph of a problem: its nodes and arcs, what they take, what is to be small and "

@@ -35,7 +35,7 @@ from seqopt._cli.options import (
 )
 from seqopt._cli.outputs import keep_apart, put_table
 from seqopt._cli.screens import question
-from seqopt._cli.values import length_word, parse_time_limit
+from seqopt._cli.values import parse_time_limit
 from seqopt._files import write_bytes
 from seqopt._interrupts import ending
 from seqopt.arms.reach import find_postures
@@ -44,6 +44,7 @@ from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.registry import provenance
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
+from seqopt.problem._limit_words import length_word
 from seqopt.problem.requirements import _prop_faults
 from seqopt.responses._enough import what_was_enough
 from seqopt.responses._staged import Placing, staged_fields

@@ -9,10 +9,10 @@ from seqopt._cli.answer import Answer
 from seqopt._cli.asked import posture_trouble, scene_facts
 from seqopt._cli.options import POSTURES, WRITTEN, declare, form_options
 from seqopt._cli.screens import question
-from seqopt._cli.values import number_word
 from seqopt._cli.words.given import plan_folder
 from seqopt._files import require_apart, write_text
 from seqopt.problem._arms import arm_faults
+from seqopt.problem._limit_words import number_word
 from seqopt.scene.scene import Scene
 from seqopt.sequence.exports._tasks import Postures
 from seqopt.sequence.exports.formats import EXPORTS, LOST, TASKS, export_plan, read_folder

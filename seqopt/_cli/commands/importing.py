@@ -8,9 +8,10 @@ from seqopt._cli.answer import Answer
 from seqopt._cli.asked import scene_facts, size_line
 from seqopt._cli.options import declare, form_options
 from seqopt._cli.screens import question
-from seqopt._cli.values import count_word, number_word
+from seqopt._cli.values import count_word
 from seqopt._files import require_apart, write_text
 from seqopt.errors import ProblemError
+from seqopt.problem._limit_words import number_word
 from seqopt.scene.imports._content import UNITS, UPS, Given
 from seqopt.scene.imports.formats import FORMATS, import_scene
 from seqopt.scene.library.common import JointLaw

@@ -9,8 +9,10 @@ from seqopt._cli.options import declare, form_options
 from seqopt._cli.screens import question
 from seqopt._cli.words.where import read_place
 from seqopt.errors import StepError
+from seqopt.plan._range import NONE_KEEPS
 from seqopt.plan.policy import FILE, Advice, Policy
 from seqopt.responses._tolerance import value_text
+from seqopt.responses.table import OUTSIDE
 from seqopt.scene.scene_file import load_scene
 
 DESCRIPTION = (
@@ -49,6 +51,7 @@ def run(options: argparse.Namespace) -> Answer:
         "rest": dict(advice.values),
         "then": advice.site.described(scene),
         "proven": policy.checked,
+        "keeps_linear_range": policy.keeps_range,
     }
     return Answer(facts=facts, text="\n".join(_lines(advice, policy)))
 
@@ -60,4 +63,5 @@ def _lines(advice: Advice, policy: Policy) -> list[str]:
     proof = "the table was not checked"
     if policy.checked:
         proof = f"{policy.checked:,} moves prove that nothing has a lower {first}"
-    return [str(advice), f"the rest takes: {values}; {proof}"]
+    outside = [] if policy.keeps_range else [f"{OUTSIDE}: {NONE_KEEPS}"]
+    return [*outside, str(advice), f"the rest takes: {values}; {proof}"]

@@ -6,7 +6,7 @@ import argparse
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, isfinite
 from typing import TYPE_CHECKING, Any
@@ -78,9 +78,9 @@ from seqopt.plan.plan import Plan
 from seqopt.plan.solving import solve, usual
 from seqopt.problem._arms import faults_in_words
 from seqopt.problem.problem import Problem
-from seqopt.problem.requirements import OWN, overloads
+from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, OWN, overloads
 from seqopt.responses._tolerance import value_text
-from seqopt.responses.table import _Columns
+from seqopt.responses.table import OUTSIDE, _Columns
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
@@ -265,7 +265,7 @@ def _values(plan: Plan) -> str:
     """Return the values of a plan and how many steps it has, in words."""
     values = [f"{name} {value_text(name, v)}" for name, v in plan.objective.items()]
     steps = [] if "steps" in plan.objective else [f"{len(plan.steps)} steps"]
-    return ", ".join([*values, *steps])
+    return f"{OUTSIDE}: " * plan.is_far + ", ".join([*values, *steps])
 
 
 def _props(
@@ -348,7 +348,16 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
         status=Status.INTERRUPTED if stopped else Status.DONE,
     )
     unreached = () if plan.arms is None else faults_in_words(plan.arms.postures)
-    return strictly(answer, options, over, plan.departures, found.verdicts, unreached)
+    answer = strictly(answer, options, over, plan.departures, found.verdicts, unreached)
+    return answer if found.asked.problem.lifts_range else _in_range(answer, plan)
+
+
+def _in_range(answer: Answer, plan: Plan) -> Answer:
+    """Return an answer whose status says it if a plan leaves the limit of the linear range."""
+    if not plan.is_far or answer.status is not Status.DONE:
+        return answer
+    said = f"seqopt: {OUTSIDE}: {plan.beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
+    return replace(answer, failures=(*answer.failures, said), status=Status.DOES_NOT_HOLD)
 
 
 def _enough_payload(scene: Scene, table: _Columns) -> tuple[str, ...]:
@@ -373,7 +382,8 @@ def _said(found: Found) -> str:
     if plan.order is not None:
         values = ", ".join(f"{name} {value_text(name, v)}" for name, v in plan.objective.items())
         bound = plan.order.bound_said
-        return f"{how}: {values}, {plan.status}, {bound}; {len(plan.steps)} steps"
+        outside = f"{OUTSIDE}: " if plan.outside else ""
+        return f"{how}: {outside}{values}, {plan.status}, {bound}; {len(plan.steps)} steps"
     if found.trial is not None:
         unseen = found.trial.summary()["unseen"]
         return (
@@ -404,6 +414,7 @@ def _proof(plan: Plan) -> str:
     if proof.states:
         looked += f" and {proof.states:,} state{'s' * (proof.states > 1)}"
     other = "no other plan among these" if plan.among else "no other plan"
+    other = f"{OUTSIDE}, where {other}" if plan.is_far else other
     better = (
         "is better" if plan.gap <= TOLERANCE else f"is better by more than {100 * plan.gap:.3g} %"
     )

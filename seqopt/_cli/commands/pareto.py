@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pandas as pd
 
-from seqopt._cli.answer import Answer
+from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import asked_prover, level_notes, marked, refused, scene_facts
 from seqopt._cli.options import (
     BEST,
@@ -37,15 +37,15 @@ from seqopt._showing import PAGE
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.graph.states.states import States
 from seqopt.plan.build import GivenSequence
 from seqopt.plan.front import Front, find_front, pick
 from seqopt.plan.solving import states_of
 from seqopt.problem.problem import Problem, judged_by
+from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, _said_limits
 from seqopt.report._pages import front_page
 from seqopt.report.comparison import fixed_methods, shown_table, worst_of
 from seqopt.responses._tolerance import value_text
-from seqopt.responses.table import LinearRange, analyze, builds_in_words
+from seqopt.responses.table import OUTSIDE, LinearRange, analyze, builds_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.three_robots import SCHEDULES
@@ -137,7 +137,7 @@ def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Ans
     scene = free.engine.network.scene
     methods = fixed_methods(free.engine)
     provers = {own: asked_prover(options, own.network) for own in {*front.engines}}
-    files, left = _front_files(front, free, methods, provers, options)
+    files, left = _front_files(front, problem, methods, provers, options)
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
     if options.out and not options.pick:
@@ -166,7 +166,11 @@ def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Ans
         written=written,
         notes=(*level_notes(free.engine), *refused(next(iter(provers.values()))), *missing),
     )
-    return marked(answer, left)
+    answer = marked(answer, left)
+    if not front.beyond:
+        return answer
+    said = f"seqopt: {OUTSIDE}: {front.beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
+    return replace(answer, failures=(said,), status=Status.DOES_NOT_HOLD)
 
 
 def _write_picked(
@@ -186,13 +190,13 @@ def _write_picked(
 
 def _front_files(
     front: Front,
-    free: States,
+    problem: Problem,
     methods: Mapping[str, pd.DataFrame],
     provers: Mapping[Engine, BuildProver],
     options: argparse.Namespace,
 ) -> tuple[dict[str, bytes | str], tuple[str, ...]]:
     """Return the files of a Pareto set by name, and which points leave the linear range."""
-    engine, tell = free.engine, options.tell
+    engine, free, tell = problem.engine, states_of(problem), options.tell
     ways = [*zip(front.engines, front.steps, strict=True)]
     tables = [analyze(own, steps) for own, steps in with_progress("analyzing plans", ways, tell)]
     tell("drawing and writing the page")
@@ -207,7 +211,7 @@ def _front_files(
         "schedule": str(options.schedule),
         "aims": [str(goal) for goal in free.goals],
         **judged_by(free.goals, free.criterion),
-        "limits": {limit.response: limit.bound for limit in free.limits},
+        "limits": _said_limits(problem.limits),
     }
     summary = {
         "points": len(front.steps),

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from seqopt._cli.values import number_word
 from seqopt._files import read_table, read_text
 from seqopt.errors import ProblemError, did_you_mean
 from seqopt.plan._other.bases import Base, facing, grid, level_axis
+from seqopt.problem._limit_words import number_word
 from seqopt.scene._checks import LARGEST_NUMBER
 from seqopt.scene.scene import Scene
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from seqopt._cli.values import number_word
 from seqopt.errors import SceneError, did_you_mean
+from seqopt.problem._limit_words import number_word
 from seqopt.scene._checks import short
 from seqopt.scene._props import Prop
 from seqopt.scene.scene import Scene

@@ -27,7 +27,7 @@ from seqopt.problem.requirements import (
     ResponsesAsked,
     SceneFacts,
     _excesses,
-    as_limits,
+    _step_limits,
     robots_of,
 )
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, StepChoices
@@ -325,7 +325,8 @@ def candidate_layers(
         PROP_EXCESS,
         *map(robot_response, robots_of(engine, schedule, criterion)),
     }
-    asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), as_limits(limits), tuple(also))
+    own = _step_limits(limits, engine.network.scene)
+    asked = ResponsesAsked(criterion.for_scene(SceneFacts(engine)), own, tuple(also))
     names = {name for move in schedule.moves for name in asked(move.bricks)}
     if unknown := {name for name in names if not is_tolerance(name)} - known:
         why = f"does not exist{did_you_mean(min(unknown), known)}"

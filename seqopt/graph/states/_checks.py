@@ -9,14 +9,14 @@ from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.problem import STATE_RESPONSES
-from seqopt.problem.requirements import Criterion, Limit, SceneFacts, as_limits
+from seqopt.problem.requirements import Criterion, Limit, SceneFacts, _step_limits
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, robot_response
 
 
 def checked_limits(limits: Sequence[Limit], network: Network) -> tuple[Limit, ...]:
     """Return limits that are all on what a state has."""
-    limits = as_limits(limits)
+    limits = _step_limits(limits, network.scene)
     robots = {robot_response(robot.name) for robot in network.scene.robots}
     for limit in limits:
         _require(limit.response, {*STATE_RESPONSES, PROP_EXCESS, *robots}, "limit")

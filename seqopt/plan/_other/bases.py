@@ -21,6 +21,7 @@ from seqopt.arms._permits import permits, within_reach
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Terse, Vector
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SceneError
+from seqopt.plan._range import best_of_several
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _moved
 from seqopt.problem.problem import Problem
@@ -158,8 +159,8 @@ def choose_bases(
         raise ProblemError(
             f"bases: {len(sets)} sets of bases, and up to {_MOST} are looked at; give fewer places"
         )
-    search = _Search(problem, solved, tell)
-    return search.found([(s, _standing(scene, s)) for s in sets])
+    standing = [(s, _standing(scene, s)) for s in sets]
+    return best_of_several(problem, lambda asked: _Search(asked, solved, tell).found(standing))
 
 
 def _sets(scene: Scene, places: Mapping[str, Sequence[Base]]) -> Iterator[dict[str, Base]]:

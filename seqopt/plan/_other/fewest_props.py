@@ -17,10 +17,12 @@ import pandas as pd
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError
 from seqopt.plan._other.bases import Tried
+from seqopt.plan._range import best_of_several
 from seqopt.plan.judge._proof import Proof
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _moved, states_of
 from seqopt.problem.problem import Measure, Problem
+from seqopt.responses.table import OUTSIDE
 from seqopt.scene._props import Prop
 from seqopt.scene.scene import Scene
 from seqopt.work.progress import Tell
@@ -57,6 +59,7 @@ class FoundProps(Terse):
         looked = len(self.tried)
         where = f" at node{'s' * (self.count > 1)} {nodes}" if nodes else ""
         end = "no set of as many or fewer is better" if self.proven else "another may be better"
+        end += f", by a model {OUTSIDE}" if self.plan.outside else ""
         return (
             f"props: {self.count}{where}; {self.sets} sets of as many or fewer: {solved} solved, "
             f"{looked - solved} ruled out by a cut, {self.sets - looked} with these; {end}"
@@ -86,14 +89,18 @@ def fewest_props(
     ``problem``: whose plans are compared by the worst or the total of states; ``candidates``: at
     different nodes; ``solved``: returns the proven plan of a problem. Raises `InfeasibleError` if
     no set allows a plan, `NothingFoundError` if that is open, `ProblemError` if too many have to be
-    looked at.
+    looked at. Sets that allow a plan within the linear range come before all others, unless a limit
+    on it says otherwise.
     """
     if problem.orders is not None:
         raise ProblemError("aim props: they are chosen for one order; leave out the search of it")
     scene = problem.scene
     since = {prop: scene.since[scene.brick_of_node[prop.node].name] for prop in candidates}
     order = sorted(candidates, key=lambda prop: since[prop])
-    return _Search(problem, order, [since[prop] for prop in order], solved, tell).found()
+    bricks = [since[prop] for prop in order]
+    return best_of_several(
+        problem, lambda asked: _Search(asked, order, bricks, solved, tell).found()
+    )
 
 
 class _Search(Tried):

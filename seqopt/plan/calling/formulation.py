@@ -24,7 +24,8 @@ class Run:
     """How long a formulation may take, who is told what it finds, and which models it is given.
 
     ``time_limit``: s; ``proof``: whether the answer is proven; ``lazy``: whether only models that
-    the proof needs are solved; ``options``: of the formulation.
+    the proof needs are solved; ``options``: of the formulation; ``explains``: whether it is said
+    what helps where there is no plan.
     """
 
     time_limit: float = math.inf
@@ -32,6 +33,7 @@ class Run:
     proof: bool = True
     lazy: bool = False
     options: dict[str, Any] = field(default_factory=dict)
+    explains: bool = True
 
 
 @contextmanager

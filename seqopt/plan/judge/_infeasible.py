@@ -142,13 +142,14 @@ class Look:
 
 
 def confirmed(
-    problem: States, name: str, seconds: float = np.inf, *, exact: bool = True
+    problem: States, name: str, seconds: float = np.inf, *, exact: bool = True, explain: bool = True
 ) -> SeqoptError:
     """Return the error that says why no plan is allowed, once it is proven that none is.
 
     ``name``, ``exact``: of the formulation that says so, as of `claimed`; ``seconds``: after which
-    what is not proven is called claimed, and no more help is sought. Result: a `SolverError` where
-    a plan is allowed, a `NothingFoundError` where it is open whether some states stand.
+    what is not proven is called claimed, and no more help is sought; ``explain``: whether help is
+    sought at all. Result: a `SolverError` where a plan is allowed, a `NothingFoundError` where it
+    is open whether some states stand.
     """
     end, capped = time.perf_counter() + seconds, problem.goals[len(problem.aims) :]
     steps = replace(_with_any_margin(problem), goals=(*STEPS, *capped))
@@ -165,7 +166,9 @@ def confirmed(
     except _LateError:
         proven = False
     bare = replace(problem, goals=problem.aims, budgets=())
-    why = _why_impossible(bare, end - time.perf_counter())
+    why = "no plan is allowed"
+    if explain:
+        why = _why_impossible(bare, end - time.perf_counter())
     if proven:
         return InfeasibleError(why)
     undecided = sum(each.stability.undecided for each in steps.each or (steps,) if each.demands)
@@ -313,11 +316,11 @@ def _opening(problem: States, look: Look) -> Iterator[str]:
 
 
 def _limiting(problem: States, look: Look) -> Iterator[str]:
-    """Yield the limits without which alone there is a plan, by their responses."""
+    """Yield the limits without which alone there is a plan, by their names."""
     for limit in problem.limits:
         rest = tuple(other for other in problem.limits if other is not limit)
         if look.exists(replace(problem, limits=rest)):
-            yield limit.response
+            yield limit.label
 
 
 def _supporting(problem: States, look: Look) -> Iterator[str]:
@@ -399,14 +402,16 @@ def _enough(problem: States, way: str, look: Look) -> str:
 
 def _enough_limit(problem: States, way: str, look: Look) -> str:
     """Return how far a limit has to be raised; other ways as they are."""
-    found = [limit for limit in problem.limits if limit.response == way]
-    if not found or not (way in STATE_RESPONSES or is_tolerance(way)):
+    found = [limit for limit in problem.limits if limit.label == way]
+    name = found[0].response if found else way
+    if not found or not (name in STATE_RESPONSES or is_tolerance(name)):
         return _typed(way) if not found else PROPS if way == PROP_EXCESS else f"no limit on {way}"
     rest = tuple(limit for limit in problem.limits if limit not in found)
-    least = worst_least(replace(problem, limits=rest), way, look)
+    least = worst_least(replace(problem, limits=rest), name, look)
     if is_tolerance(way):
         return f"a tolerance of {length_text(1 / least)} instead of {length_text(found[0].bound)}"
-    return f"{way}={least:.6g} instead of {found[0].bound:g}"
+    most, bound = found[0].shown(least), found[0].shown(found[0].bound)
+    return f"{way}={most:.6g} instead of {bound:g}"
 
 
 def _carrying(problem: States, payload: float) -> States:

@@ -23,6 +23,7 @@ from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.judge._mortar_check import check_cured
 from seqopt.plan.judge._posture_rules import check_postures, check_props
 from seqopt.plan.judge._proof import BELOW, Hint, Proof
+from seqopt.plan.judge._shape_rules import check_shape
 from seqopt.plan.judge._standing_proof import proven_margins, require_margin
 from seqopt.plan.judge._time_proof import makespan, step_ends
 from seqopt.plan.judge._timed_goals import Claim
@@ -229,6 +230,7 @@ def plan_values(
     if problem.each:
         return _in_all(problem, steps, [plan_values(each, steps, claimed) for each in problem.each])
     check_props(problem.engine, steps)
+    check_shape(problem.engine, steps, problem.limits)
     columns = _state_columns(problem, steps, analyze(problem.engine, steps))
     _require_limits(problem, columns)
     margins = _margins(problem, steps)
@@ -275,7 +277,7 @@ def _require_limits(problem: States, columns: Mapping[str, np.ndarray]) -> None:
     for limit in problem.limits:
         if limit.response in columns and limit.exceeded(columns[limit.response]).any():
             at = int(np.argmax(columns[limit.response])) + 1
-            raise SolverError(f"step {at} exceeds the limit on {limit.response}")
+            raise SolverError(f"step {at} exceeds the limit on {limit.label}")
 
 
 def _margins(problem: States, steps: Sequence[Step]) -> Mapping[str, float]:

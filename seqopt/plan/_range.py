@@ -1,0 +1,127 @@
+"""Plans within the linear range, wherever any keeps it.
+
+A plan that is the best of all and keeps the range is the best that keeps it: so the range is asked
+of the plan's own steps first, and becomes a limit of the problem only where they leave it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, ClassVar, Protocol, TypeVar
+
+from seqopt.engines.interface import Engine
+from seqopt.errors import InfeasibleError, SeqoptError, message_of
+from seqopt.graph.scenarios import ScenarioLayers, engine_for
+from seqopt.graph.states.states import States
+from seqopt.plan.plan import Plan
+from seqopt.problem.problem import Problem
+from seqopt.problem.requirements import LIMIT_TOLERANCE
+from seqopt.responses._range import Moved, most_moved
+from seqopt.sequence.steps import Step
+
+NONE_KEEPS = "no plan keeps it"
+UNKNOWN = "whether any plan keeps it is not known"
+Found = TypeVar("Found")
+
+
+class _WithPlan(Protocol):
+    """The best plan of several problems, with the problem that it is of."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def plan(self) -> Plan: ...
+    @property
+    def problem(self) -> Problem: ...
+
+
+class _WithPlans(Protocol):
+    """Several plans, each of an engine."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def steps(self) -> tuple[tuple[Step, ...], ...]: ...
+    @property
+    def engines(self) -> tuple[Engine, ...]: ...
+
+
+FoundPlans = TypeVar("FoundPlans", bound=_WithPlans)
+FoundPlan = TypeVar("FoundPlan", bound=_WithPlan)
+
+
+def leaves(moved: Moved) -> bool:
+    """Return whether nodes move farther than the linear range allows."""
+    return moved.share > 1 + LIMIT_TOLERANCE
+
+
+def keeping(found: Found, moved: Moved, again: Callable[[], Found]) -> tuple[Found, str]:
+    """Return what was found if it keeps the range, or what is found within it.
+
+    ``moved``: by what was found; ``again``: finds it within the range. Where nothing is found, the
+    first stays, with a few words that say why.
+    """
+    if not leaves(moved):
+        return found, ""
+    try:
+        return again(), ""
+    except InfeasibleError:
+        return found, NONE_KEEPS
+    except SeqoptError as error:
+        return found, f"{UNKNOWN} ({message_of(error)})"
+
+
+def engines_of(plan: Plan) -> Sequence[Engine]:
+    """Return what computes responses where limits hold: of all scenarios, or of the scene."""
+    graph = plan.graph
+    if isinstance(graph, States) and graph.scenarios:
+        return graph.scenarios
+    if isinstance(graph, ScenarioLayers):
+        return [engine_for(plan.engine, scene) for scene in graph.scenes]
+    return (plan.engine,)
+
+
+def measured(plan: Plan) -> Plan:
+    """Return a plan with how far its steps move nodes."""
+    return replace(plan, moved=most_moved(engines_of(plan), plan.steps))
+
+
+def best_within(problem: Problem, solved: Callable[[Problem], Plan]) -> Plan:
+    """Return the best plan of a problem that keeps the linear range, or of all where none does.
+
+    ``solved``: returns the best plan of the problem itself, or of the same with the limit.
+    """
+    plan = measured(solved(problem))
+    if problem.says_range or plan.moved is None:
+        return plan
+    found, why = keeping(plan, plan.moved, lambda: measured(solved(problem.within_range(1.0))))
+    return replace(found, beyond=why)
+
+
+def best_of_several(problem: Problem, found: Callable[[Problem], FoundPlan]) -> FoundPlan:
+    """Return the same of a search through problems that are alike, each solved with one limit."""
+    if problem.says_range:
+        return found(problem)
+    first = found(problem.within_range(math.inf))
+    assert first.plan.moved is not None
+    best, why = keeping(first, first.plan.moved, lambda: found(problem.within_range(1.0)))
+    own = replace(best.problem, limits=problem.limits)
+    return replace(best, plan=replace(best.plan, problem=own, beyond=why), problem=own)
+
+
+def best_front(problem: Problem, found: Callable[[Problem], FoundPlans]) -> FoundPlans:
+    """Return the same of a Pareto set: all of its plans keep the range, or none can."""
+
+    def measured_front(asked: Problem) -> tuple[FoundPlans, Moved]:
+        front = found(asked)
+        pairs = zip(front.engines, front.steps, strict=True)
+        moved = tuple(most_moved((own,), steps) for own, steps in pairs)
+        return replace(front, moved=moved), max(moved, key=lambda each: each.share)
+
+    front, farthest = measured_front(problem)
+    if problem.says_range:
+        return front
+    kept, why = keeping(front, farthest, lambda: measured_front(problem.within_range(1.0))[0])
+    return replace(kept, beyond=why)

@@ -1,0 +1,266 @@
+"""The linear range as a limit of plans: kept wherever one keeps it, said where none does."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt.engines._kinds import linear_limit
+from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError, TimeUpError
+from seqopt.plan._other.fewest_props import fewest_props
+from seqopt.plan._range import NONE_KEEPS, UNKNOWN, keeping
+from seqopt.plan._status import Status
+from seqopt.plan.front import find_front
+from seqopt.plan.judge._shape_rules import check_shape
+from seqopt.plan.judge.schedules import judge_schedule
+from seqopt.plan.policy import Policy, find_policy
+from seqopt.plan.solving import states_of
+from seqopt.problem._limit_words import parse_limits
+from seqopt.problem.criteria import WeightedSum, WorstRatio
+from seqopt.problem.requirements import LINEAR_RANGE, Limit, _step_limits
+from seqopt.responses._range import Moved, most_moved
+from tests.builders import scaled, small_arch
+
+FORCES = WeightedSum("forces", (("F_largest", 1.0, 100.0), ("D_max", 1e-6, 1e-3)))  # no ties
+MOTION = WorstRatio("motion", (("D_max", 1e-5),))
+HARD, LIFTED = Limit(LINEAR_RANGE, 1.0), Limit(LINEAR_RANGE, math.inf)
+
+
+def posed(scene, criterion=FORCES, *, loop=False, **words):
+    engine = seqopt.make_engine("compliance", scene)
+    free = seqopt.FreeRules(least_grips=1, ending=words.pop("ending", "released"))
+    moves = seqopt.three_robot_loop(engine.network) if loop else free
+    if "scenarios" in words:
+        words["scenarios"] = seqopt.scenarios(scene, count=2, seed=1)
+    return seqopt.pose(engine, moves, criterion, words.pop("goals", ()), **words)
+
+
+HELD = {"goals": "minmax", "ending": "held"}  # without the end that all builds share
+KINDS = {
+    "free": (HELD, None),
+    "free, totals": (HELD | {"goals": "M_sup,regrips"}, None),
+    "budget": (HELD | {"budgets": "regrips=1"}, None),
+    "orders": (HELD | {"orders": "tied"}, None),
+    "scenarios": (HELD | {"scenarios": 2}, None),
+    "loop": ({"loop": True}, None),
+    "loop, worst step": ({"loop": True}, "minimax"),
+    "loop, no proof": ({"loop": True}, "cascade"),
+    "loop, as states": ({"loop": True, "goals": "minmax"}, None),
+    "loop, scenarios": ({"loop": True, "scenarios": 2}, None),
+    "loop, totals": ({"loop": True, "scenarios": 2, "over": "worst-total"}, None),
+}
+
+
+def moved(problem, formulation=None):
+    """The best plan of all, and how far it moves over the limit."""
+    plan = seqopt.solve(problem.but(limits=[LIFTED]), formulation)
+    return plan, plan.moved.share
+
+
+def between(words, formulation):
+    """A scene so soft that each of the best plans leaves the range, and another one keeps it.
+
+    Displacements over the limit grow with softness; forces, and so what is best, stay.
+    """
+    scene = small_arch(5 if "loop" in words else 3 if "orders" in words else 4)
+    rest = {name: word for name, word in words.items() if name not in ("goals", "budgets")}
+    aims = {"goals": f"{words['goals']},D_max"} if "goals" in words else {}
+    best = moved(posed(scene, **rest, **aims), formulation)[1]
+    goals = {"goals": "D_max"} if aims else {}
+    worst = "minimax" if "loop" in words and not aims and "over" not in words else formulation
+    least = moved(posed(scene, MOTION, **rest, **goals), worst)[1]
+    assert least < best * (1 - 1e-3), "the scene does not tell the two apart"
+    return scaled(scene, stiffness=math.sqrt(least * best))
+
+
+@pytest.mark.parametrize(
+    ("words", "formulation"), [pytest.param(*kind, id=name) for name, kind in KINDS.items()]
+)
+def test_the_best_plan_keeps_the_range_wherever_one_does(words, formulation):
+    problem = posed(between(words, formulation), **words)
+    free, far = moved(problem, formulation)
+    assert far > 1
+    plan = seqopt.solve(problem, formulation)
+    assert plan.moved.share <= 1 + 1e-9
+    assert not plan.is_far
+    assert not plan.beyond
+    assert plan.status == seqopt.solve(problem.but(limits=[HARD]), formulation).status
+    limit = Limit("D_max", linear_limit(problem.scene))
+    same = seqopt.solve(problem.but(limits=[limit]), formulation)
+    assert plan.certificate.values == pytest.approx(same.certificate.values)
+    assert plan.certificate.values >= tuple(v * (1 - 1e-9) for v in free.certificate.values)
+    assert plan.problem is problem
+    assert plan.summary()["limits"] == {}
+
+
+def test_nothing_is_solved_twice_where_the_best_plan_keeps_it():
+    problem = posed(small_arch(5), goals="T_max")
+    plan = seqopt.solve(problem)
+    lifted = seqopt.solve(posed(small_arch(5), goals="T_max", limits=[LIFTED]))
+    assert plan.models == lifted.models
+    assert plan.certificate == lifted.certificate
+    assert "D_max" not in plan.states.named
+    assert list(problem.graphs) == ["STATES"]
+    assert plan.status is lifted.status is Status.OPTIMAL
+
+
+SOFT = 1e-6
+
+
+@pytest.mark.parametrize("loop", [False, True])
+def test_where_no_plan_keeps_it_that_is_said_first(loop):
+    problem = posed(scaled(small_arch(5), stiffness=SOFT), loop=loop)
+    plan = seqopt.solve(problem)
+    assert plan.is_far
+    assert plan.beyond == NONE_KEEPS
+    assert plan.status is Status.OUTSIDE
+    assert repr(plan).startswith("Plan(outside the linear range: ")
+    assert plan.result.startswith("outside the linear range: ")
+    assert not repr(plan).endswith("optimal)")
+    assert plan.summary()["status"] == str(Status.OUTSIDE)
+    assert plan.summary()["outside_linear_range"]
+    with pytest.raises(InfeasibleError):
+        seqopt.solve(problem.but(limits=[HARD]))
+    lifted = seqopt.solve(problem.but(limits="linear_range=any"))
+    assert not lifted.beyond
+    assert lifted.status is Status.OUTSIDE
+    assert lifted.certificate.values == pytest.approx(plan.certificate.values)
+    assert json.loads(json.dumps(lifted.summary()["limits"])) == {LINEAR_RANGE: "any"}
+    share = plan.moved.share * 2
+    wide = seqopt.solve(problem.but(limits=f"linear_range={share}"))
+    assert wide.summary()["limits"] == {LINEAR_RANGE: pytest.approx(share)}
+
+
+def test_what_would_help_is_said_in_shares():
+    problem = posed(scaled(small_arch(4), stiffness=SOFT), limits=[HARD])
+    with pytest.raises(InfeasibleError, match=r"linear_range=[0-9.]+ instead of 1") as found:
+        seqopt.solve(problem)
+    share = float(str(found.value).partition("linear_range=")[2].split()[0])
+    assert seqopt.solve(problem.but(limits=[Limit(LINEAR_RANGE, share * 1.001)])).steps
+
+
+@pytest.mark.parametrize(
+    ("error", "why"),
+    [
+        (InfeasibleError("none"), NONE_KEEPS),
+        (NothingFoundError("left out"), f"{UNKNOWN} (NothingFoundError: left out)"),
+        (TimeUpError("time is over"), f"{UNKNOWN} (TimeUpError: time is over)"),
+    ],
+)
+def test_only_a_proof_says_that_no_plan_keeps_it(error, why):
+    def again():
+        raise error
+
+    assert keeping("first", Moved(1.5, 3), again) == ("first", why)
+    assert keeping("first", Moved(1.0, 3), again) == ("first", "")
+    assert keeping("first", Moved(1.5, 3), lambda: "second") == ("second", "")
+
+
+def test_scenarios_count_beside_the_scene_itself():
+    scene = between(KINDS["scenarios"][0], None)
+    problem = posed(scene, goals="minmax", scenarios=2, limits=[LIFTED])
+    plan = seqopt.solve(problem)
+    alone = [most_moved([engine], plan.steps).share for engine in plan.states.scenarios]
+    assert plan.moved.share == max(alone)
+    own = most_moved([plan.engine], plan.steps).share
+    assert own != plan.moved.share
+    stiffer = replace(plan, moved=plan.moved._replace(share=own * 0.5))  # were they softer alone
+    softer = replace(plan, moved=plan.moved._replace(share=2.0))
+    assert stiffer.is_far == (own > 2)
+    assert next(each.what for each in softer.departures) == "displacement"
+
+
+def test_the_largest_motion_is_that_of_the_table():
+    for scene in (small_arch(5), small_arch(5).with_props(seqopt.Prop(node=5))):
+        plan = seqopt.solve(posed(scene, goals="minmax"))
+        table = plan.responses()
+        most = table["D_max_1e-3mm"].max() * 1e-6 / linear_limit(scene)
+        assert plan.moved.share == pytest.approx(most, rel=1e-5)
+        assert plan.moved.step == table["step"][int(np.argmax(table["D_max_1e-3mm"]))]
+
+
+def test_the_judge_finds_by_itself_that_steps_leave_the_range():
+    words = KINDS["free"][0]
+    problem = posed(between(words, None), **words)
+    free, kept = seqopt.solve(problem.but(limits=[LIFTED])), seqopt.solve(problem)
+    limits = _step_limits([HARD], problem.scene)
+    check_shape(problem.engine, kept.steps, limits)
+    check_shape(problem.engine, free.steps, _step_limits([LIFTED], problem.scene))
+    with pytest.raises(SolverError, match="the linear range ends at"):
+        check_shape(problem.engine, free.steps, limits)
+    with pytest.raises(SolverError, match="the linear range ends at"):
+        judge_schedule(states_of(problem.but(limits=[HARD])), free.selection, free.steps)
+
+
+def test_props_are_as_few_as_a_plan_within_the_range_needs():
+    rules = seqopt.FreeRules(least_grips=0, newest="free", robots=("rob1",))
+    scene = scaled(small_arch(4), stiffness=3e-4)
+    candidates = [seqopt.Prop(node=node) for node in (3, 5, 7)]
+    engine = seqopt.make_engine("compliance", scene)
+
+    def fewest(problem, among=candidates):
+        return fewest_props(problem, among, seqopt.solve)
+
+    problem = seqopt.pose(engine, rules, FORCES, "minmax")
+    lifted, found = fewest(problem.but(limits=[LIFTED])), fewest(problem)
+    assert lifted.count == 0
+    assert lifted.plan.is_far
+    assert found.count > 0
+    assert not found.plan.is_far
+    hard = fewest(problem.but(limits=[HARD]))
+    assert (hard.count, hard.plan.objective) == (found.count, found.plan.objective)
+    assert found.problem.limits == found.plan.problem.limits == ()
+    none = fewest(problem, candidates[:0])
+    assert (none.count, none.plan.beyond) == (0, NONE_KEEPS)
+    assert "no set of as many or fewer is better, by a model outside" in none.said
+
+
+def test_a_pareto_set_keeps_it():
+    words = KINDS["free"][0]
+    problem = posed(between(words, None), goals="F_largest,T_max", ending="held")
+    lifted = find_front(problem.but(limits=[LIFTED]))
+    front = find_front(problem)
+    assert max(lifted.moved).share > 1 >= max(front.moved).share
+    assert repr(lifted).startswith("<Front: outside the linear range: ")
+    hard = find_front(problem.but(limits=[HARD]))
+    assert front.table.equals(hard.table)
+    soft = find_front(posed(scaled(small_arch(4), stiffness=SOFT), goals="F_largest,steps"))
+    assert soft.beyond == NONE_KEEPS
+
+
+def test_a_policy_keeps_it_and_says_where_none_can(tmp_path):
+    words = KINDS["free"][0]
+    problem = posed(between(words, None), **words)
+    policy, plan = find_policy(problem), seqopt.solve(problem)
+    assert policy.keeps_range
+    assert policy.checked
+    advice = policy.best(seqopt.Site(0))
+    assert advice.values["minmax"] == pytest.approx(plan.objective["minmax"])
+    soft = find_policy(posed(scaled(small_arch(3), stiffness=SOFT), **words))
+    assert not Policy.load(soft.save(tmp_path / "policy.npz")).keeps_range
+    assert repr(soft).startswith("<Policy: outside the linear range: ")
+    assert find_policy(problem.but(limits=[LIFTED])).keeps_range
+
+
+def test_words_are_the_same_in_python_and_on_the_command_line():
+    scene = small_arch(3)
+    assert parse_limits("linear_range=any", scene) == (LIFTED,)
+    assert parse_limits(["linear_range=0.5", HARD], scene) == (Limit(LINEAR_RANGE, 0.5), HARD)
+    assert parse_limits(["F_largest=300", "tolerance=0.1mm"], scene) == (
+        Limit("F_largest", 300.0),
+        Limit("tolerance", 0.1 * 1e-3),
+    )
+    problem = posed(scene, goals="minmax", limits=["payload", "linear_range=any"])
+    assert problem.lifts_range
+    assert len(problem.limits) == 1 + len(scene.robots)
+    for wrong in ("linear_range=none", "linear_range=0", "linear_rang=1", "payload=3"):
+        with pytest.raises(ProblemError, match="limit"):
+            posed(scene, goals="minmax", limits=wrong)
+    with pytest.raises(ProblemError, match="give a share above zero"):
+        Limit(LINEAR_RANGE, -1.0)
+    assert replace(HARD, bound=2.0).label == LINEAR_RANGE
