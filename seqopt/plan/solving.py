@@ -174,9 +174,8 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
         As ``"minmax,steps"``, over states; by default the sum of the costs of open grips or the
         largest, as the formulation minimizes, and of rules the worst step.
     limits, budgets, stands, scenarios, over, orders, also, resources : optional
-        As of `Problem`: ``"F_largest=300"`` or ``"linear_range=any"``, ``"travel=3.5m"``,
-        ``"dry"``, `seqopt.scenarios`, ``"cvar=0.9"`` (or ``worst-peak``, ``worst-total``),
-        ``"tied"`` or ``"any"``.
+        As of `Problem`: ``"F_largest=300"``, ``"travel=3.5m"``, ``"dry"``, `seqopt.scenarios`,
+        ``"cvar=0.9"`` (or ``worst-peak``, ``worst-total``), ``"tied"`` or ``"any"``.
 
     Returns
     -------
