@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -72,8 +72,30 @@ class Graph(FrozenValue):
         """Return the graph with some of its moves, (m,) bool; all its states stay."""
         if kept.all():
             return self
-        moves = self.source[kept], self.target[kept], self.amounts[kept]
-        return Graph(*moves, self.peaks, self.ends)
+        return self._with(
+            source=self.source[kept], target=self.target[kept], amounts=self.amounts[kept]
+        )
+
+    def bare(self, goal: int, states: Bools) -> Graph:
+        """Return the moves from some states, (n,) bool, with the amounts of one goal alone.
+
+        They lead to no others. States are numbered anew, in order; the start is one of them.
+        """
+        number, kept = np.cumsum(states, dtype=np.int32) - 1, states[self.source]
+        return self._with(
+            source=number[self.source[kept]],
+            target=number[self.target[kept]],
+            amounts=self.amounts[kept, goal : goal + 1],
+            peaks=(self.peaks[goal],),
+            ends=self.ends[states],
+        )
+
+    def _with(self, **changed: object) -> Graph:
+        """Return the graph with parts of what was checked: it is not checked again."""
+        part = object.__new__(Graph)
+        own = {field.name: getattr(self, field.name) for field in fields(Graph)}
+        part.__setstate__(own | changed)
+        return part
 
     def matrix(self, costs: Floats, kept: Bools | None = None) -> sparse.csr_array:
         """Return costs (m,) of some of the moves, (m,) bool, from states to states, (n, n).
@@ -83,9 +105,10 @@ class Graph(FrozenValue):
         source, target = self.source, self.target
         if kept is not None:
             source, target, costs = source[kept], target[kept], costs[kept]
-        starts = np.searchsorted(source, np.arange(self.states + 1, dtype=source.dtype))
+        starts = np.zeros(self.states + 1, dtype=np.int32)
+        np.cumsum(np.bincount(source, minlength=self.states), out=starts[1:])
         shape = (self.states, self.states)
-        return sparse.csr_array((costs, target, starts.astype(np.int32)), shape=shape)
+        return sparse.csr_array((costs, target, starts), shape=shape)
 
 
 class LabelProof(NamedTuple):

@@ -95,19 +95,26 @@ def least_peak(graph: Graph, goal: int) -> float:
 
 
 def _least_or_none(graph: Graph, goal: int) -> float | None:
-    """Return the least worst amount of any path, by bisection over all amounts that occur."""
-    amounts = graph.amounts[:, goal]
-    levels = np.unique(amounts)
-    low, high = 0, len(levels)
+    """Return the least worst amount of any path, by bisection over all amounts that occur.
+
+    A path that is found leaves no larger amount open. If there is none, every path leaves the
+    states that are reached: no amount is open that is less than the least of the moves out.
+    """
     if graph.ends[0]:
         return 0.0
-    while low < high:
-        middle = (low + high) // 2
-        if graph.ends[reached(graph, amounts <= levels[middle])].any():
-            high = middle
+    least, graph = None, graph.bare(goal, reached(graph))
+    open_ = graph.amounts[:, 0] if graph.ends.any() else np.zeros(0)
+    while len(open_):
+        level = np.partition(open_, len(open_) // 2)[len(open_) // 2]
+        kept = graph.amounts[:, 0] <= level
+        inside = reached(graph, kept)
+        if graph.ends[inside].any():
+            least, open_ = float(level), open_[open_ < level]
+            graph = graph.only(kept).bare(0, inside)
         else:
-            low = middle + 1
-    return None if low == len(levels) else float(levels[low])
+            out = inside[graph.source] & ~inside[graph.target]
+            open_ = open_[open_ >= graph.amounts[out, 0].min()]
+    return least
 
 
 def reached(graph: Graph, kept: Bools | None = None) -> Bools:

@@ -112,8 +112,10 @@ class _StateFront:
 
     def _below(self, bounds: Floats) -> Graph:
         """Return the moves to states whose values are all below bounds."""
-        graph = self._visited.graph
-        return graph.only(np.asarray((graph.amounts < self._peaks(bounds)).all(axis=1)))
+        graph, kept = self._visited.graph, np.ones(len(self._visited.graph.source), dtype=bool)
+        for amounts, bound in zip(graph.amounts.T, self._peaks(bounds), strict=True):
+            kept &= amounts < bound
+        return graph.only(kept)
 
     def _fewest(self, graph: Graph, bounds: Floats) -> Graph | None:
         """Return the paths with as many grips held at the end as those with the fewest moves."""
