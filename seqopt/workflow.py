@@ -79,8 +79,7 @@ def optimize(
     engine : str
         A name in `seqopt.engines.registry.ENGINES`; ``"auto"`` uses the simplest sufficient model.
     limits : sequence of Limit or str
-        Bounds that no step may exceed, whether or not a grip is open in it, also in words:
-        ``"payload"``, ``"F_largest=300"``, ``"linear_range=any"``.
+        Bounds that no step may exceed: ``"payload"``, ``"F_largest=300"``, ``"linear_range=any"``.
     **options
         ``aim``, ``stands``, ``budgets``, ``scenarios`` and ``over`` of `seqopt.pose`, in words;
         ``order``, which may be ``"search"``; ``mortar``, ``robots``, ``candidates``; of
