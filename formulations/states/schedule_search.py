@@ -192,8 +192,8 @@ class _Search:
 
     def _dives(self, threshold: float, below: float) -> bool:
         """Return whether a dive finds a better incumbent; what it visits in vain stays visited."""
-        if not np.isfinite(threshold) or (np.isinf(below) and self.incumbent):
-            return False
+        if self._wide.passes == 0 or (np.isinf(below) and self.incumbent):
+            return False  # what lies below a first threshold is seldom all that a path needs
         trial = self._wide.copy()
         if trial.dive(threshold, below):
             with suppress(InfeasibleError, NothingFoundError):  # of what stands

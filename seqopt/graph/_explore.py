@@ -108,6 +108,7 @@ class Visited(NamedTuple):
 
 
 FEW = 8  # states that a dive visits at a time
+TURNS = 2  # of a dive, over the number of levels
 BAND = 1e-5  # share of a value within which six digits do not decide
 
 
@@ -252,17 +253,20 @@ class Explorer:
     def dive(self, threshold: float = np.inf, below: float = np.inf) -> bool:
         """Visit the same states, the highest level first, until a build may end in one of them.
 
-        Few are visited at a time while that leads on, more and more where it does not.
+        Few are visited at a time while that leads on, more and more where it does not; after some
+        turns it gives up, since whole levels are visited in larger batches.
         """
         self._begin_pass(threshold, below)
         level, deepest, few = self._space.levels, -1, FEW
-        while not self.whole:
+        turns = TURNS * self._space.levels
+        while not self.whole and turns:
             found = self._eligible_on(level)
             if found is None:
                 level -= 1
                 if level < self._space.first:
                     return False
                 continue
+            turns -= 1
             key, part, fresh = found
             fresh = _least(part, fresh, few)
             self.level = level
@@ -272,7 +276,7 @@ class Explorer:
             few = FEW if level > deepest else 4 * few
             deepest = max(deepest, level)
             level = min(level + 1, self._space.levels)
-        return True
+        return self.whole
 
     def _begin_pass(self, threshold: float, below: float) -> None:
         self.threshold, self.below = max(self.threshold, threshold), below
