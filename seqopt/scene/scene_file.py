@@ -28,11 +28,12 @@ from seqopt.scene._checks import cut, short, which_fit
 from seqopt.scene._durations import Durations
 from seqopt.scene._props import Prop
 from seqopt.scene.arm import Arm
+from seqopt.scene.overlaps import overlapping
 from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Load, Reach, Robot, Side, Sphere
 from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.shape import Polyhedron
 
-_ONE_PLACE = 0.25  # distance of centroids treated as zero, over the smallest dimension
+_SHOWN = 3  # pairs of bricks that interpenetrate; more are counted
 _FAR_AWAY = 1.0  # of a joint from a brick, over the brick's largest dimension
 _THICK_BRICK = 5.0  # m; the smallest dimension of a brick whose lengths may be meant in mm
 _DENSITIES = (10.0, 30_000.0)  # kg/m³; from aerogel to the heaviest metals
@@ -41,7 +42,7 @@ _PULL = 100.0  # m/s²; ten times that of the earth
 
 def _find_warnings(scene: Scene) -> tuple[str, ...]:
     """Return what looks wrong in a scene, one line each; most scenes have none."""
-    return (*_of_units(scene), *_of_places(scene), *_of_joints(scene))
+    return (*_of_units(scene), *_of_overlaps(scene), *_of_joints(scene))
 
 
 def warn_of(scene: Scene, name: str) -> None:
@@ -65,16 +66,24 @@ def _of_units(scene: Scene) -> Iterator[str]:
         yield f"{_named(odd)}: a density of {odd[0].density:g} kg/m³ is odd; check its unit"
 
 
-def _of_places(scene: Scene) -> Iterator[str]:
-    """Yield bricks that stand where others do."""
-    from scipy.spatial import KDTree  # noqa: PLC0415  # for scenes from files only
+def _of_overlaps(scene: Scene) -> Iterator[str]:
+    """Yield bricks that interpenetrate by more than `TOLERATED`.
 
-    near = _ONE_PLACE * np.array([min(brick.dimensions) for brick in scene.bricks])
-    place = np.array([brick.position for brick in scene.bricks])
-    for i, j in sorted(KDTree(place).query_pairs(float(near.max()))):
-        if math.dist(place[i], place[j]) <= min(near[i], near[j]):
-            first, second = scene.bricks[i].name, scene.bricks[j].name
-            yield f"bricks {first} and {second} are in one place, {list(scene.bricks[i].position)}"
+    A joint without a face is checked with its bricks in `seqopt.contact.faces`: those of arches may
+    run into each other at their corners. Beams do by intent: bricks with a shape and such joints.
+    """
+    springs: tuple[Joint | Ground, ...] = (*scene.joints, *scene.grounds)
+    faceless = [spring.ends for spring in springs if spring.face is None]
+    checked, beams = {*map(frozenset, faceless)}, {end for ends in faceless for end in ends}
+    solid = [b for b in scene.bricks if b.shape is None or b.name not in beams]
+    lines = [
+        f"bricks {a} and {b} interpenetrate by {1e3 * depth:.3g} mm; move them apart"
+        for a, b, depth in overlapping(solid)
+        if frozenset((a, b)) not in checked
+    ]
+    yield from lines[:_SHOWN]
+    if len(lines) > _SHOWN:
+        yield f"{len(lines) - _SHOWN} more pairs of bricks interpenetrate"
 
 
 def _of_joints(scene: Scene) -> Iterator[str]:
@@ -278,12 +287,15 @@ def _load_stored(name: str) -> Scene:
 
 def _refuse_mesh(path: Path) -> None:
     """Raise an error that says how a mesh becomes a scene."""
-    asked = _MESHES.get(path.suffix.lower())
-    if asked is not None and path.exists():
-        out = path.with_suffix(".json").name
+    within = [path] if path.is_file() else path.glob("*.*") if path.is_dir() else ()
+    suffixes = {file.suffix.lower() for file in within} & _MESHES.keys()
+    if suffixes:
+        asked = any(_MESHES[suffix] for suffix in suffixes)
+        what = "a folder of meshes" if path.is_dir() else "a mesh"
+        out = f"{path.resolve().stem}.json"
         words = f"{'--unit m ' if asked else ''}--density 2400 --out {shlex.quote(out)}"
         raise SceneError(
-            f"scene {path}: a mesh; seqopt import {shlex.quote(str(path))} {words} makes a scene "
+            f"scene {path}: {what}; seqopt import {shlex.quote(str(path))} {words} makes a scene "
             f"of it, with its own {'unit and ' if asked else ''}density"
         )
 

@@ -19,13 +19,14 @@ from seqopt.scene.scene_file import dump_scene
 
 MOST_ROBOTS = 100
 DESCRIPTION = (
-    "Read a file of Rhino, an assembly of COMPAS, meshes, a table of boxes or a frame, say what "
-    "was assumed, and write it as a scene."
+    "Read a file of Rhino, an assembly of COMPAS, meshes in a file or a folder, a table of boxes "
+    "or a frame, say what was assumed, and write it as a scene."
 )
-USAGE = ("FILE --out SCENE.json [--unit UNIT] [other options]",)
+USAGE = ("FILE|FOLDER --out SCENE.json [--unit UNIT] [other options]",)
 EXAMPLES = (
     "seqopt import wall.obj --unit m --density 2400 --out wall.json",
     "seqopt import boxes.csv --unit mm --supports 0,1 --out house.json",
+    "seqopt import blocks --unit m --density 2400 --supports 0 --out dome.json",
 )
 
 
@@ -40,13 +41,14 @@ JOINTS = {
     "--gap M": "most that may lie between faces that touch (default: a twentieth of the thinnest "
     "block)",
     "--detect": "look for faces although the file has some",
+    "--accept-overlaps": "import blocks that interpenetrate by more than faces tolerate",
 }
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Add the arguments of ``import``."""
     basic = question(command, "What is read and written?")
-    declare(basic, {"file FILE": "what to read"})
+    declare(basic, {"file FILE": "what to read, or a folder of meshes with a block in each"})
     declare(basic, {"--out FILE": "scene to write, JSON"}, required=True)
     what = f"what the file is (default: what it looks like): {', '.join(FORMATS)}"
     basic.add_argument("--format", choices=FORMATS, metavar="NAME", help=what)
@@ -88,6 +90,7 @@ def _given(options: argparse.Namespace) -> Given:
         law=_law(options.stiffness),
         gap=_positive("--gap", options.gap),
         detect=options.detect,
+        accept_overlaps=options.accept_overlaps,
         robots=robots if robots is None else count_word(robots, "--robots", MOST_ROBOTS),
         name=options.name,
         progress=options.tell,

@@ -7,15 +7,15 @@ and all else on the graph. Who deletes a block there deletes its joints.
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from seqopt.arrays import Floats
 from seqopt.errors import SceneError
 from seqopt.scene._checks import LARGEST_NUMBER, one_of, positive, rows, short, whole_between
 from seqopt.scene.boxes import as_vector, block_brick, spring_fields, vertices_of
@@ -27,6 +27,7 @@ from seqopt.scene.imports._content import (
     Carried,
     Content,
     Entry,
+    FileBlock,
     FileJoint,
     Given,
     entry,
@@ -34,7 +35,8 @@ from seqopt.scene.imports._content import (
     mapping,
     number,
 )
-from seqopt.scene.imports._meshes import Repaired, repair_shape
+from seqopt.scene.imports._interpenetration import interpenetrating
+from seqopt.scene.imports._meshes import Repaired, repair_shape, same_points
 from seqopt.scene.imports.contacts import Contacts, _find_contacts, face_ground, face_joint
 from seqopt.scene.library.common import MASONRY, JointLaw, a_law, mobile_robots, touching_order
 from seqopt.scene.parts import Brick, Ground, Joint
@@ -44,6 +46,7 @@ from seqopt.scene.shape import Polyhedron, plane_axes
 
 _HELD = ("bricks", "joints", "grounds")  # what stands on nodes and edges
 _KEY = "seqopt"  # of the rest, among the attributes of the graph
+_SAME_MASS = 0.01  # share by which a mass and a density may differ by rounding
 _SAME = 1e-9  # by how much rounding may move a corner, over the size of the block and its distance
 
 
@@ -154,18 +157,9 @@ def _changed(
         solid = block.solid
         if name is None or not isinstance(solid, Polyhedron):
             return held.key
-        if not _same_points(solid.points, vertices_of(bricks[name])[0]):
+        if not same_points(solid.points, vertices_of(bricks[name])[0], _SAME):
             return held.key
     return None
-
-
-def _same_points(some: Floats, others: Floats) -> bool:
-    """Return whether two sets of points (n, 3) are the same but for their order and rounding."""
-    from scipy.spatial import KDTree  # noqa: PLC0415  # for files only
-
-    near = _SAME * float(np.abs(others).max() + np.ptp(others, axis=0).max())
-    pairs = ((some, others), (others, some))
-    return all(bool(np.max(KDTree(a).query(b)[0]) <= near) for a, b in pairs)
 
 
 def upward_order(
@@ -173,14 +167,22 @@ def upward_order(
     pairs: Iterable[tuple[int, int]],
     starts: Iterable[int],
     keys: Sequence[str],
+    sunk: Collection[int] = (),
 ) -> list[int]:
-    """Return blocks in an order in which each touches the ground or what stands before it."""
+    """Return blocks in an order in which each touches the ground or what stands before it.
+
+    ``sunk``: those that interpenetrate, which a wider gap does not help.
+    """
     order = touching_order(rank, pairs, starts)
-    lost = [keys[i] for i in sorted({*range(len(rank))} - {*order})]
+    lost = sorted({*range(len(rank))} - {*order})
     if lost:
+        inside = [keys[i] for i in lost if i in sunk]
+        remedy = "name supports, or allow a wider gap between faces"
+        if inside:
+            remedy = f"move {inside[0]} out of the block that it interpenetrates"
         raise SceneError(
             f"{len(lost)} blocks touch nothing that leads to the ground, the first of them "
-            f"{', '.join(lost[:5])}; name supports, or allow a wider gap between faces"
+            f"{', '.join(keys[i] for i in lost[:5])}; {remedy}"
         )
     return order
 
@@ -205,11 +207,12 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
         total = sum((block.mended for block in blocks), Counter[str]())
         said += [f"{text}: {count}" for text, count in total.items()]
         bricks = _bricks(content, given, blocks, supports, said)
+        sunk, lines = interpenetrating(content, given, blocks, bricks)
         touching = _find_contacts(content, given, blocks, bricks)
-        said += touching.said
+        said += [*lines, *touching.said]
         law = _law(content, given, touching, said)
         springs = _springs(touching, bricks, law)
-        order = _order(touching, content, bricks, said)
+        order = _order(touching, content, bricks, sunk, said)
         count = whole_between("robots", ROBOTS if given.robots is None else given.robots, 1)
         robots = mobile_robots([*bricks.values()], count)
     except SceneError as error:
@@ -241,7 +244,9 @@ def _unit(content: Content, given: Given, said: list[str]) -> float:
     if known is None and usual is None and given.unit is None:
         points = np.vstack([block.vertices for block in content.blocks])
         size = " by ".join(f"{x:.4g}" for x in np.ptp(points, axis=0)) if points.size else "0"
-        silent = given.density is None and any(b.density is None for b in content.blocks)
+        silent = given.density is None and any(
+            b.density is None and b.mass is None for b in content.blocks
+        )
         raise SceneError(
             f"it does not say its unit of length, and is {size} large; give one of "
             f"{', '.join(UNITS)} (--unit){', and a density (--density)' if silent else ''}"
@@ -299,16 +304,31 @@ def _bricks(
         said.append(f"blocks are numbered {_numbered(keys, numbers)}")
     density = None if given.density is None else positive("density", given.density, "kg/m³")
     built = [(i, block) for i, block in enumerate(content.blocks) if i not in supports]
-    silent = [block.key for _, block in built if block.density is None]
+    silent = [block.key for _, block in built if block.density is None and block.mass is None]
     if silent and density is None:
         raise SceneError(f"block {silent[0]} has no density; give one in kg/m³ (--density)")
     if silent:
         said.append(f"density of {len(silent)} blocks is {density:g} kg/m³, as given")
+    if weighed := sum(block.mass is not None for _, block in built):
+        said.append(f"density of {weighed} blocks is their mass over their volume")
     return {
-        i: block_brick(numbers[i], solid, block.density or density or 0.0)
+        i: block_brick(numbers[i], solid, _density(block, solid, density or 0.0))
         for i, block in built
         if isinstance(solid := blocks[i].solid, Polyhedron)
     }
+
+
+def _density(block: FileBlock, solid: Polyhedron, otherwise: float) -> float:
+    """Return the density of a block, kg/m³: its own, that of its mass, or another one."""
+    if block.mass is None:
+        return otherwise if block.density is None else block.density
+    found = block.mass / solid.volume
+    if block.density is not None and not math.isclose(found, block.density, rel_tol=_SAME_MASS):
+        raise SceneError(
+            f"block {block.key}: its mass of {block.mass:g} kg is {found:.4g} kg/m³ in "
+            f"{solid.volume:.4g} m³, its density {block.density:g} kg/m³; give one of both"
+        )
+    return found
 
 
 def _numbered(keys: Sequence[str], numbers: Sequence[int]) -> str:
@@ -375,7 +395,11 @@ def _faceless(joint: FileJoint, bricks: Mapping[int, Brick], law: JointLaw) -> J
 
 
 def _order(
-    touching: Contacts, content: Content, bricks: Mapping[int, Brick], said: list[str]
+    touching: Contacts,
+    content: Content,
+    bricks: Mapping[int, Brick],
+    sunk: Collection[int],
+    said: list[str],
 ) -> list[int]:
     places = [*bricks]
     row = {i: k for k, i in enumerate(places)}
@@ -392,5 +416,6 @@ def _order(
         [(row[a], row[b]) for a, b in touching.pairs if a != GROUND],
         [row[b] for a, b in touching.pairs if a == GROUND],
         [content.blocks[i].key for i in places],
+        {row[i] for i in sunk if i in row},
     )
     return [places[k] for k in order]

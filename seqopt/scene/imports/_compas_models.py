@@ -331,6 +331,10 @@ def _nearest(first: tuple[Floats, Floats], second: tuple[Floats, Floats]) -> tup
 
 
 _SOLIDS = ("mesh", "box", "polyhedron")
+_THIN = (  # of COMPAS, without a volume
+    *("line", "polyline", "polygon", "point", "pointcloud", "vector", "frame", "plane", "circle"),
+    *("ellipse", "arc", "bezier", "curve", "nurbscurve", "hyperbola", "parabola", "graph"),
+)
 _DEEPEST = 50  # lists and groups within each other
 
 
@@ -353,20 +357,35 @@ def _is_solid(value: Any) -> bool:
 
 def read_meshes(document: Any, source: str) -> Content:
     """Return meshes as blocks, under their names, or their keys in a dictionary."""
-    found = object_content(_listed(source, document, "", ""), source)
-    return replace(found, said=("a list of meshes: no supports, faces or order",))
+    left = Counter[str]()
+    solids = [*_listed(source, document, left)]
+    said = [f"{count} objects are left out: {what}" for what, count in left.items()]
+    if left and not solids:
+        raise SceneError(
+            f"{source}: {'; '.join(said)}. Lines, points and curves are no blocks: give meshes, "
+            "boxes or polyhedra, or bars as a frame (nodes, elements, materials, cross_secs)"
+        )
+    found = object_content(solids, source)
+    return replace(found, said=("a list of meshes: no supports, faces or order", *said))
 
 
-def _listed(where: str, value: Any, name: str, group: str, depth: int = 0) -> Iterator[FileBlock]:
-    """Yield the meshes of a value; a list or dictionary in another one is a group."""
+def _listed(
+    where: str, value: Any, left: Counter[str], name: str = "", group: str = "", depth: int = 0
+) -> Iterator[FileBlock]:
+    """Yield the meshes of a value; a list or dictionary in another one is a group.
+
+    ``left``: gets what is left out, and how often.
+    """
     if depth > _DEEPEST:
         raise SceneError(f"{where}: lists stand in lists more than {_DEEPEST} deep")
     if isinstance(value, list):
         for i, item in enumerate(value):
-            yield from _listed(f"{where}: mesh {i}", item, "", group or name, depth + 1)
+            yield from _listed(f"{where}: mesh {i}", item, left, "", group or name, depth + 1)
     elif isinstance(value, dict) and not kind(value) and not _is_solid(value):
         for key, item in value.items():
-            yield from _listed(f"{where}: {key}", item, key, group or name, depth + 1)
+            yield from _listed(f"{where}: {key}", item, left, key, group or name, depth + 1)
+    elif kind(value) in _THIN:
+        left[kind(value)] += 1
     else:
         own = value.get("name") if isinstance(value, dict) else None
         key = name or (own if isinstance(own, str) else "")

@@ -35,6 +35,7 @@ class FileBlock:
     faces: Sequence[Sequence[int]]  # places among the vertices
     support: bool = False  # whether it is fixed
     density: float | None = None  # kg/m³
+    mass: float | None = None  # kg
     course: float | None = None  # its place in the build; lower ones come first
     group: str = ""  # its layer or group in the file
 
@@ -113,7 +114,8 @@ class Given:
     none, kg/m³; ``supports``: keys of blocks that are fixed, or of layers and groups of blocks, in
     place of those of the file; ``law``: stiffness of joints by area, in
     place of that of the file; ``gap``: most that may lie between faces that touch, m; ``detect``:
-    whether to look for faces although the file has some; ``robots``: how many mobile robots the
+    whether to look for faces although the file has some; ``accept_overlaps``: whether blocks may
+    interpenetrate by more than faces tolerate; ``robots``: how many mobile robots the
     scene gets, three if the file has none; ``name``: of the scene; ``progress``: told how far it is
     to find faces, which takes long of many blocks.
     """
@@ -125,6 +127,7 @@ class Given:
     law: JointLaw | None = None
     gap: float | None = None
     detect: bool = False
+    accept_overlaps: bool = False
     robots: int | None = None
     name: str | None = None
     progress: Tell | None = None

@@ -139,7 +139,7 @@ def read_objects(content: bytes, source: str, form: str) -> Content:
 def _nodes(scene: Any, source: str) -> Iterator[FileBlock]:
     """Yield the meshes of a scene of trimesh, in the order of their names and numbers."""
     above, world = scene.graph.transforms.parents, scene.graph.base_frame
-    for name in sorted(scene.graph.nodes_geometry, key=_counted):
+    for name in sorted(scene.graph.nodes_geometry, key=counted):
         matrix, own = scene.graph[name]
         if not hasattr(scene.geometry[own], "faces"):
             continue  # lines and points
@@ -148,7 +148,7 @@ def _nodes(scene: Any, source: str) -> Iterator[FileBlock]:
         yield FileBlock(str(name), moved(vertices, matrix), faces.tolist(), group=group)
 
 
-def _counted(name: str) -> list[tuple[int, str]]:
+def counted(name: str) -> list[tuple[int, str]]:
     """Return what sorts names by the numbers in them: stone_2 before stone_10."""
     return [(int(part or 0), text) for text, part in re.findall(r"(\D*)(\d*)", name)]
 

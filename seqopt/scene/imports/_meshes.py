@@ -16,6 +16,7 @@ from seqopt.errors import SceneError
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import as_vectors
 from seqopt.scene.imports._content import MOST_BLOCKS, MOST_CORNERS, Content, FileBlock
+from seqopt.scene.overlaps import bounds_of
 from seqopt.scene.shape import FLAT, Polyhedron, Surface, bend, edges, fans
 
 if TYPE_CHECKING:
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 _Polygons = Sequence[Sequence[int]]
 _Edges = frozenset[tuple[int, int]]
 _LEAST = 4  # faces of a closed block
+_NAMED = 5  # things in a line; more are counted
+NO_BLOCKS = "points and lines are no blocks: give closed meshes"
 _WELD = 1e-6  # distance of vertices that are one, over the size of the block
 
 
@@ -31,19 +34,20 @@ def _split_blocks(vertices: Floats, faces: _Polygons) -> list[list[int]]:
     """Return the places of the faces of each block of a mesh.
 
     A block ends where, in the file's order, every edge has been used twice, corners in one place
-    being one. If blocks are left open so, one is what shares vertices, where these say it.
+    being one. If blocks are left open so, one is what shares vertices, where these say it. Faces
+    without edges belong to none.
     """
     place = _united(vertices)
     united = [[int(place[v]) for v in face] for face in faces]
     sides = [_edges(face) for face in united]
-    part = _parts(len(vertices), faces)
-    blocks, rest = _closed(range(len(faces)), sides)
+    part, real = _parts(len(vertices), faces), [i for i, edges in enumerate(sides) if edges]
+    blocks, rest = _closed(real, sides)
     if rest:
         alone = len({v for face in faces for v in face}) == sum(map(len, faces))
-        groups = _grouped(range(len(faces)), _parts(len(vertices), united) if alone else part)
+        groups = _grouped(real, _parts(len(vertices), united) if alone else part)
         ends = [_closed(group, sides) for group in groups]
         return [block for closed, left in ends for block in [*closed, left] if block]
-    return _once([own for block in blocks for own in _unmixed(block, sides, part)], sides)
+    return [own for block in blocks for own in _unmixed(block, sides, part)]
 
 
 def _united(vertices: Floats) -> Ints:
@@ -85,14 +89,6 @@ def _unmixed(block: list[int], sides: Sequence[_Edges], part: Ints) -> list[list
     """Return closed faces, in parts that share no vertices if each is closed too."""
     groups = _grouped(block, part)
     return [block] if any(_closed(group, sides)[1] for group in groups) else groups
-
-
-def _once(blocks: list[list[int]], sides: Sequence[_Edges]) -> list[list[int]]:
-    """Return blocks of which no two have the same faces; what stands there twice is one."""
-    found = defaultdict[frozenset[_Edges], list[int]](list)
-    for block in blocks:
-        found[frozenset(sides[i] for i in block)] += block
-    return [*found.values()]
 
 
 def _grouped(faces: Iterable[int], part: Ints) -> list[list[int]]:
@@ -151,13 +147,19 @@ def object_content(objects: Iterable[FileBlock], source: str) -> Content:
 
 def _named(blocks: list[FileBlock], source: str) -> Content:
     if not blocks:
-        raise SceneError(f"{source}: it has no faces; give closed meshes")
+        raise SceneError(f"{source}: it has no faces; {NO_BLOCKS}")
     if len(blocks) > MOST_BLOCKS:
         raise SceneError(f"{source}: {len(blocks)} blocks; {MOST_BLOCKS} is the most")
     keys = _keys([block.key for block in blocks])
+    times = Counter(block.key for block in blocks if block.key)
+    several = [
+        f"{count} closed pieces are called {name}: each is a block of its own"
+        for name, count in times.items()
+        if count > 1
+    ]
     return Content(
         tuple(replace(block, key=key) for block, key in zip(blocks, keys, strict=True)),
-        said=("a mesh: no supports, faces or order",),
+        said=("a mesh: no supports, faces or order", *several[:_NAMED]),
     )
 
 
@@ -176,6 +178,68 @@ def _compact(points: Floats, faces: _Polygons) -> tuple[Floats, tuple[tuple[int,
     used = sorted({v for face in faces for v in face})
     place = {v: i for i, v in enumerate(used)}
     return points[used], tuple(tuple(place[v] for v in face) for face in faces)
+
+
+def without_repeats(content: Content) -> Content:
+    """Return a content without blocks that repeat earlier ones, which are named.
+
+    Blocks all stay where faces or joints of the file refer to them.
+    """
+    blocks = [block for block in content.blocks if len(block.vertices)]
+    if content.faces or content.joints or content.own or len(blocks) < 2:
+        return content
+    from scipy.spatial import KDTree  # noqa: PLC0415  # slow to import, and seldom needed
+
+    bounds = np.array([bounds_of(block.vertices).reshape(6) for block in blocks])
+    near = _WELD * float(np.ptp(bounds))
+    first = dict[str, str]()
+    for i, j in sorted(KDTree(bounds).query_pairs(near)):
+        one, other = blocks[i], blocks[j]
+        alike = one.support == other.support and same_points(one.vertices, other.vertices, _WELD)
+        if alike and one.key not in first:
+            first.setdefault(other.key, one.key)
+    return replace(
+        content,
+        blocks=tuple(block for block in content.blocks if block.key not in first),
+        said=(*content.said, *(f"block {a} repeats {b} and is left out" for a, b in first.items())),
+    )
+
+
+def same_points(some: Floats, others: Floats, share: float) -> bool:
+    """Return whether two sets of points (n, 3) are the same but for their order and rounding.
+
+    ``share``: by which rounding moves a point, over the size of the set and its distance.
+    """
+    from scipy.spatial import KDTree  # noqa: PLC0415  # slow to import, and seldom needed
+
+    near = share * float(np.abs(others).max() + np.ptp(others, axis=0).max())
+    pairs = ((some, others), (others, some))
+    return all(bool(np.max(KDTree(a).query(b)[0]) <= near) for a, b in pairs)
+
+
+def join_pieces(blocks: Sequence[FileBlock], key: str) -> FileBlock:
+    """Return the pieces of a block as one: where two lie face on face, both faces go.
+
+    Raises `SceneError` if they are apart, or meet in other ways.
+    """
+    starts = np.cumsum([0, *(len(block.vertices) for block in blocks)]).tolist()
+    points = np.vstack([block.vertices for block in blocks])
+    pairs = zip(blocks, starts, strict=False)
+    faces = [tuple(v + at for v in face) for block, at in pairs for face in block.faces]
+    faces = _welded(points, faces, Counter())
+    times = Counter(frozenset(face) for face in faces)
+    outer = [face for face in faces if times[frozenset(face)] == 1]
+    vertices, sides = _compact(points, outer)
+    joined = FileBlock(key, vertices, sides)
+    why = f"its mesh is {len(blocks)} closed pieces that"
+    remedy = "unite them to one closed mesh, or give each as a block of its own"
+    if not sides or len({*_parts(len(vertices), sides).tolist()}) > 1:
+        raise SceneError(f"block {key}: {why} do not lie face on face; {remedy}")
+    try:
+        repair_shape(joined)
+    except SceneError:
+        raise SceneError(f"block {key}: {why} do not make one solid; {remedy}") from None
+    return joined
 
 
 _Loop = tuple[int, ...]
@@ -219,7 +283,19 @@ def repair_shape(block: FileBlock, *, may_be_open: bool = False) -> Repaired:
             mended[_OPEN] += 1
             both = Surface(points, (*facets.faces, *(face[::-1] for face in facets.faces)))
             return Repaired(both, both, mended)
-        raise SceneError(f"block {block.key}: {error}") from error
+        raise SceneError(f"block {block.key}: {error}{_remedy(block.key, faces)}") from error
+
+
+def _remedy(key: str, faces: Sequence[_Loop]) -> str:
+    """Return what to do about faces that bound no solid, as the end of a line."""
+    times = Counter(frozenset(edge) for face in faces for edge in edges(face)).values()
+    inner = sum(count > 2 for count in times)
+    if inner:
+        return (
+            f"; {inner} of its edges have more than two faces: delete faces inside it, unite "
+            "pieces that cut each other"
+        )
+    return f'; if it is ground, say --supports "{key}"' if 1 in times else ""
 
 
 def _plain(face: Sequence[int]) -> _Loop:

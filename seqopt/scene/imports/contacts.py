@@ -20,6 +20,7 @@ from seqopt.scene.boxes import as_vector, spring_fields
 from seqopt.scene.imports._content import GROUND, Content, FileJoint, Given
 from seqopt.scene.imports._meshes import Repaired
 from seqopt.scene.library.common import DOWN, JointLaw
+from seqopt.scene.overlaps import TOLERATED, bounds_of, near_pairs
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.shape import Polyhedron, Surface, normal_of, plane_axes
 from seqopt.work.progress import Progress, Tell
@@ -156,7 +157,8 @@ def touching_faces(
 def _found(shapes: Sequence[_Shape], gap: float, course: Progress) -> Iterator[_TouchingFace]:
     """Yield the faces over which blocks touch, pair by pair."""
     facets, done = [_facets(shape) for shape in shapes], 0
-    for tries, (i, j) in enumerate(_near(shapes, gap)):
+    bounds = [bounds_of(shape.points) for shape in shapes]
+    for tries, (i, j) in enumerate(near_pairs(bounds, gap)):
         course.add(i - done)
         done = i
         if tries == _MOST_PAIRS:
@@ -170,17 +172,6 @@ def _facets(shape: _Shape) -> _Facets:
     corners = tuple(shape.points[list(face)] for face in shape.faces)
     normals = units(np.array([normal_of(face) for face in corners]))
     return _Facets(corners, normals, np.array([face.mean(axis=0) for face in corners]))
-
-
-def _near(shapes: Sequence[_Shape], gap: float) -> Iterator[tuple[int, int]]:
-    """Yield pairs of blocks whose boxes along the axes are no farther apart than a gap."""
-    low = np.array([shape.points.min(axis=0) for shape in shapes]).reshape(-1, 3) - gap
-    high = np.array([shape.points.max(axis=0) for shape in shapes]).reshape(-1, 3)
-    for i in range(len(shapes)):
-        later = slice(i + 1, None)
-        over = ((low[later] <= high[i]) & (low[i] <= high[later])).all(axis=1)
-        for j in np.flatnonzero(over):
-            yield i, i + 1 + int(j)
 
 
 def _overlaps(first: _Facets, second: _Facets, gap: float) -> Iterator[tuple[list[Any], Any]]:
@@ -317,7 +308,6 @@ def _moments(flat: Floats) -> tuple[float, Floats, Floats]:
     return area, center, np.asarray(squares / 24)
 
 
-_GAP = 0.05  # between faces that touch, over the thinnest block
 _OFF = 0.05  # of a face from a block that it joins, over the size of the block
 _ASIDE = 1e-2  # how far beside a face a point is that tells on which side of it a block lies
 
@@ -347,8 +337,7 @@ def _find_contacts(
     """Return where blocks touch each other and the ground, which those not built belong to."""
     _require_polygons()
     solids, facets = [block.solid for block in blocks], [block.facets for block in blocks]
-    thin = min(min(brick.dimensions) for brick in bricks.values())
-    gap = _GAP * thin if given.gap is None else positive("gap", given.gap, "m")
+    gap = widest_gap(given, bricks)
     if content.faces and not given.detect:
         off = _off_blocks(content, facets, gap)
         found = [*_file_faces(content, solids)]
@@ -369,6 +358,12 @@ def _find_contacts(
         faces += _standing(bricks, facets, gap)
         said.append("no supports are named: blocks with a face at the lowest level stand there")
     return Contacts(tuple(faces), tuple(joints), tuple(said))
+
+
+def widest_gap(given: Given, bricks: Mapping[int, Brick]) -> float:
+    """Return the most that may lie between faces that touch, m."""
+    thinnest = min(min(brick.dimensions) for brick in bricks.values())
+    return TOLERATED * thinnest if given.gap is None else positive("gap", given.gap, "m")
 
 
 def _on_ground(pair: tuple[int, int], face: _FlatFace, bricks: Mapping[int, Brick]) -> list[_Held]:

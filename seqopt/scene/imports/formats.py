@@ -49,7 +49,9 @@ from seqopt.scene.imports._content import (
     number,
     point,
 )
+from seqopt.scene.imports._folders import read_folder
 from seqopt.scene.imports._mesh_files import read_3dm, read_mesh, read_obj, read_objects, read_off
+from seqopt.scene.imports._meshes import without_repeats
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import warn_of
 from seqopt.scene.shape import plane_axes
@@ -256,7 +258,7 @@ FORMATS = (*_DOCUMENTS, "boxes", "obj", "off", *_BYTES)
 
 
 def import_scene(path: str | Path, form: str | None = None, given: Given | None = None) -> Scene:
-    r"""Return the scene of a file that another program wrote.
+    r"""Return the scene of a file that another program wrote, or a folder with a block a file.
 
     ``form``: one of `FORMATS`; by default what the file looks like. ``given``: what the file does
     not say: a unit of length, a density and more. Result: its provenance says what was read and
@@ -283,7 +285,8 @@ def import_scene(path: str | Path, form: str | None = None, given: Given | None 
         raise SceneError(f"given is {short(given)}; give Given(unit=..., density=...)")
     where = Path(path)
     content = read_content(where, form)
-    scene = build_scene(content, given or Given(), printable("file", where.stem or "file"))
+    name = where.resolve().name if where.is_dir() else where.stem
+    scene = build_scene(content, given or Given(), printable("file", name or "file"))
     warn_of(scene, scene.name)
     if content.own is None and (given is None or (given.supports is None and given.up is None)):
         _warn_of_lying(scene, "z" if content.up == "y" else "y")
@@ -303,7 +306,16 @@ def _warn_of_lying(scene: Scene, up: str) -> None:
 
 
 def read_content(path: Path, form: str | None = None) -> Content:
-    """Return what a file says, in one of `FORMATS`; by default in that which it looks like."""
+    """Return what a file says, in one of `FORMATS`; by default in that which it looks like.
+
+    A folder has a block in each of its files.
+    """
+    if path.is_dir():
+        return without_repeats(read_folder(path, form, _SUFFIXES, _read))
+    return without_repeats(_read(path, form))
+
+
+def _read(path: Path, form: str | None = None) -> Content:
     source, suffix = str(path), path.suffix.lower().removeprefix(".")
     named = _SUFFIXES.get(suffix) if form is None else form
     if named is None or (form is not None and form not in FORMATS):
@@ -355,7 +367,7 @@ def sniffed(document: Any, source: str) -> str:
 
 _NEEDED = ("x", "y", "z", "length", "width", "height")
 _TURNS = ("roll", "pitch", "yaw")
-_COLUMNS = (*_NEEDED, *_TURNS, "name", "support", "density", "course")
+_COLUMNS = (*_NEEDED, *_TURNS, "name", "support", "density", "mass", "course")
 _YES, _NO = ("1", "true", "yes"), ("", "0", "false", "no")
 
 
@@ -394,15 +406,18 @@ def _box(where: str, key: str, row: dict[str, str]) -> FileBlock:
     from scipy.spatial.transform import Rotation  # noqa: PLC0415  # slow to import
 
     frame = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
-    density = _number(where, row, "density", "nan")
-    course = _number(where, row, "course", "nan")
+    optional = (_number(where, row, name, "nan") for name in ("density", "mass", "course"))
+    density, mass, course = (None if math.isnan(value) else value for value in optional)
+    if mass is not None and not mass > 0:
+        raise SceneError(f"{where}: mass is {mass:g}; give a positive number of kg")
     return FileBlock(
         row.get("name", "").strip() or key,
         center + 0.5 * (BOX_CORNERS * size) @ frame.T,
         BOX_FACES,
         support=_flag(where, row),
-        density=None if math.isnan(density) else density,
-        course=None if math.isnan(course) else course,
+        density=density,
+        mass=mass,
+        course=course,
     )
 
 
