@@ -26,9 +26,9 @@ from seqopt.arrays import Vector
 from seqopt.errors import SceneError, SceneWarning, did_you_mean
 from seqopt.scene._checks import cut, short, which_fit
 from seqopt.scene._durations import Durations
+from seqopt.scene._overlaps import overlapping
 from seqopt.scene._props import Prop
 from seqopt.scene.arm import Arm
-from seqopt.scene.overlaps import overlapping
 from seqopt.scene.parts import Anywhere, Brick, Ground, Joint, Load, Reach, Robot, Side, Sphere
 from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.shape import Polyhedron
@@ -42,7 +42,7 @@ _PULL = 100.0  # m/s²; ten times that of the earth
 
 def _find_warnings(scene: Scene) -> tuple[str, ...]:
     """Return what looks wrong in a scene, one line each; most scenes have none."""
-    return (*_of_units(scene), *_of_overlaps(scene), *_of_joints(scene))
+    return (*_of_units(scene), *_find_overlapping(scene), *_of_joints(scene))
 
 
 def warn_of(scene: Scene, name: str) -> None:
@@ -66,8 +66,8 @@ def _of_units(scene: Scene) -> Iterator[str]:
         yield f"{_named(odd)}: a density of {odd[0].density:g} kg/m³ is odd; check its unit"
 
 
-def _of_overlaps(scene: Scene) -> Iterator[str]:
-    """Yield bricks that interpenetrate by more than `TOLERATED`.
+def _find_overlapping(scene: Scene) -> Iterator[str]:
+    """Yield a line on each pair of bricks that interpenetrate by more than `TOLERATED`.
 
     A joint without a face is checked with its bricks in `seqopt.contact.faces`: those of arches may
     run into each other at their corners. Beams do by intent: bricks with a shape and such joints.

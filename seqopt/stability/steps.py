@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection, Sequence
 from concurrent.futures import Executor
 
 import pandas as pd
 
 from seqopt.contact.mortar import Mortar, find_mortar
-from seqopt.errors import ProblemError
+from seqopt.errors import ProblemError, SceneWarning
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import _find_overlapping
 from seqopt.sequence.steps import Step, require_steps
 from seqopt.stability._step_verdicts import each_stability, find_margins, stability_row
 from seqopt.stability.assessment import Stability
 from seqopt.work.progress import Tell, with_progress
+
+_KEY = "_overlapping"
 
 
 def assess_steps(
@@ -53,6 +57,11 @@ def assess_steps(
     ProblemError
         If there cannot be so many workers.
 
+    Warns
+    -----
+    SceneWarning
+        If bricks interpenetrate, which no verdict takes into account; once for each network.
+
     Examples
     --------
     >>> import seqopt
@@ -62,12 +71,25 @@ def assess_steps(
     ['stands', 'stands']
     """
     network, steps, asked = network_of(network), require_steps(steps), find_margins(margins)
+    _warn_of_overlaps(network)
     if not (hasattr(workers, "submit") or (isinstance(workers, int) and workers > 0)):
         raise ProblemError(f"workers is {workers!r}; give a whole number from 1, or an executor")
     shared = (None, workers) if isinstance(workers, int) else (workers, 1)
     found = each_stability(network, steps, find_mortar(mortar), asked, shared=shared)
     told = with_progress("assessing steps", steps, progress)
     return tuple(result for result, _ in zip(found, told, strict=True))
+
+
+def _warn_of_overlaps(network: Network) -> None:
+    """Warn once, for a scene that was not read from a file, of bricks that interpenetrate."""
+    if _KEY not in vars(network):
+        vars(network)[_KEY] = found = [*_find_overlapping(network.scene)]
+        for line in found:
+            warnings.warn(
+                f"scene {network.scene.name}: {line}, or no verdict is worth anything",
+                SceneWarning,
+                stacklevel=3,
+            )
 
 
 def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.DataFrame:

@@ -31,7 +31,9 @@ def with_part(kind, index, **change):
 ODD = {
     "joint (2, 3): it lies 1e+06 m from brick 2": with_part("joints", 1, position=(1e6, 0.0, 0.0)),
     "ground end of brick 1: it lies": with_part("grounds", 0, position=(0.0, 3.0, 0.0)),
-    "bricks 2 and 4 are in one place": with_part("bricks", 3, position=SCENE.bricks[1].position),
+    "bricks 2 and 4 interpenetrate by 89.6 mm": with_part(
+        "bricks", 3, position=SCENE.bricks[1].position
+    ),
     "brick 1: dimensions of [246.0, 116.0, 53.0] m look like millimeters": with_part(
         "bricks", 0, dimensions=(246.0, 116.0, 53.0)
     ),

@@ -12,9 +12,8 @@ from seqopt.errors import SolverError
 from seqopt.graph.states.states import States
 from seqopt.problem.standing import Standing, StandingSets, slack
 from seqopt.sequence.steps import Step
-from seqopt.stability._step_verdicts import step_verdicts
+from seqopt.stability._step_verdicts import each_stability, step_verdicts
 from seqopt.stability.assessment import MARGINS, Stability, Verdict
-from seqopt.stability.steps import assess_steps
 
 SURE = 1e-3  # rad, or as a share: how far the cone program may be from what forces prove
 
@@ -101,7 +100,7 @@ def certified(problem: States, steps: Sequence[Step]) -> tuple[Stability, ...]:
     mortar = (problem.standing or Standing()).mortar
     for step in steps:
         if (step.bricks, step.grips) not in problem.certified:
-            (result,) = assess_steps(problem.network, [step], mortar, MARGINS)
+            (result,) = each_stability(problem.network, [step], mortar, MARGINS)
             problem.certified[step.bricks, step.grips] = result
     return tuple(problem.certified[step.bricks, step.grips] for step in steps)
 

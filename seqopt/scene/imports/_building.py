@@ -209,7 +209,7 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
         bricks = _bricks(content, given, blocks, supports, said)
         sunk, lines = interpenetrating(content, given, blocks, bricks)
         touching = _find_contacts(content, given, blocks, bricks)
-        said += [*lines, *touching.said]
+        said = [*lines, *said, *touching.said]
         law = _law(content, given, touching, said)
         springs = _springs(touching, bricks, law)
         order = _order(touching, content, bricks, sunk, said)

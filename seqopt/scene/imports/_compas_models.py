@@ -339,14 +339,21 @@ _DEEPEST = 50  # lists and groups within each other
 
 
 def is_meshes(document: Any) -> bool:
-    """Return whether a document is a mesh of COMPAS, or a list or dictionary of such."""
+    """Return whether a document is a mesh of COMPAS, or a list or dictionary of such.
+
+    Lines and what else has no volume count, to be told so.
+    """
     if isinstance(document, list):
         return True
     if not isinstance(document, dict) or not document:
         return False
-    return _is_solid(document) or all(
-        isinstance(value, list) or _is_solid(value) for value in document.values()
+    return _is_geometry(document) or all(
+        isinstance(value, list) or _is_geometry(value) for value in document.values()
     )
+
+
+def _is_geometry(value: Any) -> bool:
+    return _is_solid(value) or kind(value) in _THIN
 
 
 def _is_solid(value: Any) -> bool:

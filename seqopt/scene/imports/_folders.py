@@ -66,8 +66,8 @@ def _one_block(file: Path, content: Content, said: list[str]) -> FileBlock:
     if len(content.blocks) == 1:
         return replace(content.blocks[0], key=file.stem)
     try:
-        block = join_pieces(content.blocks, file.stem)
+        block, how = join_pieces(content.blocks, file.stem)
     except SceneError as error:
         raise SceneError(f"{file}: {error}") from None
-    said.append(f"block {block.key} is {len(content.blocks)} pieces that are joined to one")
+    said.append(how)
     return block

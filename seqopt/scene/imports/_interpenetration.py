@@ -7,10 +7,10 @@ from dataclasses import replace
 from itertools import islice
 
 from seqopt.errors import SceneError
+from seqopt.scene._overlaps import Overlap, find_overlaps
 from seqopt.scene.imports._content import Content, Given
 from seqopt.scene.imports._meshes import Repaired
-from seqopt.scene.imports.contacts import widest_gap
-from seqopt.scene.overlaps import Overlap, find_overlaps
+from seqopt.scene.imports.contacts import _widest_gap
 from seqopt.scene.parts import Brick
 from seqopt.scene.shape import Polyhedron
 
@@ -26,7 +26,7 @@ def interpenetrating(
     Raises `SceneError` unless the user accepts them. A gap that is wider than by default makes no
     overlap right, so that it counts where it is narrower.
     """
-    most = min(widest_gap(way, bricks) for way in (given, replace(given, gap=None)))
+    most = min(_widest_gap(way, bricks) for way in (given, replace(given, gap=None)))
     found = islice(_pairs(content, given, blocks, most), _MOST)
     overlaps = sorted(
         ((pair, each) for pair, each in found if {*pair} & bricks.keys()),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -14,9 +14,9 @@ from scipy.sparse.csgraph import connected_components
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import SceneError
 from seqopt.scene._checks import short
+from seqopt.scene._overlaps import bounds_of
 from seqopt.scene.boxes import as_vectors
 from seqopt.scene.imports._content import MOST_BLOCKS, MOST_CORNERS, Content, FileBlock
-from seqopt.scene.overlaps import bounds_of
 from seqopt.scene.shape import FLAT, Polyhedron, Surface, bend, edges, fans
 
 if TYPE_CHECKING:
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 _Polygons = Sequence[Sequence[int]]
 _Edges = frozenset[tuple[int, int]]
+_Loop = tuple[int, ...]
 _LEAST = 4  # faces of a closed block
 _NAMED = 5  # things in a line; more are counted
 NO_BLOCKS = "points and lines are no blocks: give closed meshes"
@@ -217,32 +218,52 @@ def same_points(some: Floats, others: Floats, share: float) -> bool:
     return all(bool(np.max(KDTree(a).query(b)[0]) <= near) for a, b in pairs)
 
 
-def join_pieces(blocks: Sequence[FileBlock], key: str) -> FileBlock:
-    """Return the pieces of a block as one: where two lie face on face, both faces go.
+def join_pieces(blocks: Sequence[FileBlock], key: str) -> tuple[FileBlock, str]:
+    """Return the pieces of a block as one, and how that was done.
 
-    Raises `SceneError` if they are apart, or meet in other ways.
+    Where two lie face on face, both faces go. So do faces between corners of closed pieces that
+    close nothing themselves. Raises `SceneError` if pieces are apart, or meet in other ways.
     """
-    starts = np.cumsum([0, *(len(block.vertices) for block in blocks)]).tolist()
     points = np.vstack([block.vertices for block in blocks])
-    pairs = zip(blocks, starts, strict=False)
-    faces = [tuple(v + at for v in face) for block, at in pairs for face in block.faces]
-    faces = _welded(points, faces, Counter())
-    times = Counter(frozenset(face) for face in faces)
+    start, pieces = 0, list[list[_Loop]]()
+    for block in blocks:
+        pieces.append([tuple(v + start for v in face) for face in block.faces])
+        start += len(block.vertices)
+    welded = iter(_welded(points, [face for piece in pieces for face in piece], Counter()))
+    pieces = [[next(welded) for _ in piece] for piece in pieces]
+    solid = [piece for piece in pieces if not _has_rim(piece)]
+    faces = [face for piece in solid for face in piece]
+    times, corners = Counter(map(frozenset, faces)), {v for face in faces for v in face}
+    loose = [face for piece in pieces if _has_rim(piece) for face in piece]
     outer = [face for face in faces if times[frozenset(face)] == 1]
-    vertices, sides = _compact(points, outer)
-    joined = FileBlock(key, vertices, sides)
-    why = f"its mesh is {len(blocks)} closed pieces that"
+    joined = FileBlock(key, *_compact(points, outer))
+    _require_one(joined, len(blocks), apart={v for face in loose for v in face} - corners)
+    if loose:
+        return joined, f"block {key} has {len(loose)} faces that close nothing: they are left out"
+    return joined, f"block {key} is {len(blocks)} pieces that are joined to one"
+
+
+def _has_rim(faces: Sequence[_Loop]) -> bool:
+    """Return whether faces leave something open: an edge has an odd number of them."""
+    times = Counter(frozenset(edge) for face in faces for edge in edges(face))
+    return any(count % 2 for count in times.values())
+
+
+def _require_one(joined: FileBlock, count: int, apart: Collection[int]) -> None:
+    """Require pieces that were joined to be one solid. ``apart``: corners of none."""
     remedy = "unite them to one closed mesh, or give each as a block of its own"
-    if not sides or len({*_parts(len(vertices), sides).tolist()}) > 1:
-        raise SceneError(f"block {key}: {why} do not lie face on face; {remedy}")
+    whole = joined.faces and len({*_parts(len(joined.vertices), joined.faces).tolist()}) == 1
+    if apart or not whole:
+        raise SceneError(
+            f"block {joined.key}: its mesh is {count} pieces that do not lie face on face; {remedy}"
+        )
     try:
         repair_shape(joined)
     except SceneError:
-        raise SceneError(f"block {key}: {why} do not make one solid; {remedy}") from None
-    return joined
+        raise SceneError(
+            f"block {joined.key}: its mesh is {count} pieces that do not make one solid; {remedy}"
+        ) from None
 
-
-_Loop = tuple[int, ...]
 
 _CUT = "faces that are not flat are cut into triangles"
 _WELDED = "vertices in one place are united"

@@ -16,11 +16,11 @@ import numpy as np
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import FileError, SceneError
 from seqopt.scene._checks import positive, short, units
+from seqopt.scene._overlaps import TOLERATED, bounds_of, near_pairs
 from seqopt.scene.boxes import as_vector, spring_fields
 from seqopt.scene.imports._content import GROUND, Content, FileJoint, Given
 from seqopt.scene.imports._meshes import Repaired
 from seqopt.scene.library.common import DOWN, JointLaw
-from seqopt.scene.overlaps import TOLERATED, bounds_of, near_pairs
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.shape import Polyhedron, Surface, normal_of, plane_axes
 from seqopt.work.progress import Progress, Tell
@@ -337,7 +337,7 @@ def _find_contacts(
     """Return where blocks touch each other and the ground, which those not built belong to."""
     _require_polygons()
     solids, facets = [block.solid for block in blocks], [block.facets for block in blocks]
-    gap = widest_gap(given, bricks)
+    gap = _widest_gap(given, bricks)
     if content.faces and not given.detect:
         off = _off_blocks(content, facets, gap)
         found = [*_file_faces(content, solids)]
@@ -360,7 +360,7 @@ def _find_contacts(
     return Contacts(tuple(faces), tuple(joints), tuple(said))
 
 
-def widest_gap(given: Given, bricks: Mapping[int, Brick]) -> float:
+def _widest_gap(given: Given, bricks: Mapping[int, Brick]) -> float:
     """Return the most that may lie between faces that touch, m."""
     thinnest = min(min(brick.dimensions) for brick in bricks.values())
     return TOLERATED * thinnest if given.gap is None else positive("gap", given.gap, "m")

@@ -160,6 +160,52 @@ def test_a_table_of_boxes(read):
     assert "numbered from 1" in read("boxes.csv", names.replace(",90,", ",90,top")).provenance
 
 
+MASSES = "x,y,z,length,width,height,mass\n0,0,.03,.2,.1,.06,2.4\n0,0,.09,.2,.1,.06,1.92\n"
+
+
+def test_masses_of_a_table_become_densities(read):
+    """2.4 kg in 0.2 x 0.1 x 0.06 m are 2,000 kg/m³; a density beside it must agree."""
+    small = MASSES.replace(".2,.1,.06", "200,100,60").replace(".03", "30").replace(".09", "90")
+    for table, unit in ((MASSES, "m"), (small, "mm")):
+        scene = read("boxes.csv", table, Given(unit=unit))
+        assert [brick.mass for brick in scene.bricks] == pytest.approx([2.4, 1.92])
+        assert [brick.density for brick in scene.bricks] == pytest.approx([2000.0, 1600.0])
+    assert "density of 2 blocks is their mass over their volume" in scene.provenance
+    both = (
+        MASSES.replace("mass", "mass,density").replace("2.4", "2.4,2000").replace("92", "92,1600")
+    )
+    assert read("boxes.csv", both, METERS).bricks[1].density == pytest.approx(1600.0)
+    half = MASSES.replace(",1.92", ",")
+    assert [b.density for b in read("boxes.csv", half).bricks] == pytest.approx([2000.0, 2400.0])
+    with pytest.raises(SceneError, match="block 2 has no density"):
+        read("boxes.csv", half, Given(unit="m"))
+
+
+def test_a_surface_that_is_ground_is_told_how_to_say_so(read):
+    floor = "o Floor 3\nv -9 -9 0\nv 9 -9 0\nv 9 9 0\nv -9 9 0\nf -4 -3 -2 -1\n"
+    wall = obj(LOW, HIGH) + floor
+    with pytest.raises(
+        SceneError, match=r'block Floor 3: .*; if it is ground, say --supports "Flo'
+    ):
+        read("a.obj", wall)
+    scene = read("a.obj", wall, Given(unit="m", density=2400.0, supports=["Floor 3"]))
+    assert (len(scene.bricks), len(scene.joints), len(scene.grounds)) == (2, 1, 1)
+
+
+LINE = {"dtype": "compas.geometry/Line", "data": {"start": [0, 0, 0], "end": [0, 0, 3]}}
+
+
+def test_lines_are_no_blocks(read):
+    for document in ({"lines": [LINE]}, [LINE, LINE], LINE, {"a": LINE}):
+        with pytest.raises(SceneError, match=r"left out: line\. Lines, .* no blocks: give mesh"):
+            read("a.json", document)
+    scene = read("a.json", [*DOCUMENTS["meshes"], LINE])
+    assert len(scene.bricks) == 3
+    assert "1 objects are left out: line" in scene.provenance
+    with pytest.raises(SceneError, match="it has no faces; points and lines are no blocks: give c"):
+        read("a.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n")
+
+
 def test_units(read):
     document = DOCUMENTS["meshes"]
     small = read("a.json", document, Given(unit="cm", density=2400.0))
@@ -187,7 +233,9 @@ def test_what_can_be_mended_is_mended_and_said(read):
     one_turned = {**flat, "faces": [faces[0][::-1], *faces[1:]]}
     assert "all agree which side is outside: 1" in read("a.json", [one_turned]).provenance
     doubled = {**flat, "faces": [*faces, *(face[::-1] for face in faces)]}
-    assert "twice are left out: 6" in read("a.json", [doubled]).provenance
+    assert "block 1 repeats 0 and is left out" in read("a.json", [doubled]).provenance
+    each = {**flat, "faces": [side for face in faces for side in (face, face[::-1])]}
+    assert "twice are left out: 6" in read("a.json", [each]).provenance
     soup = {
         "vertices": [list(LOW.vertices[v]) for face in faces for v in face],
         "faces": [[4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 3] for i in range(6)],
@@ -235,6 +283,13 @@ def test_what_can_be_mended_is_mended_and_said(read):
         ("a.csv", BOXES.replace("yaw", "angle"), METERS, "column 'angle' is not known"),
         ("a.csv", BOXES.replace(".75,", "nan,", 1), METERS, "row 2: x is 'nan'; give a number"),
         ("a.csv", BOXES.replace("2,1,.5", "2,-1,.5"), METERS, "give positive ones"),
+        ("a.csv", MASSES.replace("2.4", "-2.4"), METERS, "row 1: mass is -2.4; give a positive nu"),
+        (
+            "a.csv",
+            MASSES.replace("mass", "mass,density").replace("2.4", "2.4,1800"),
+            METERS,
+            "block 1: its mass of 2.4 kg is 2000 kg/m³ in 0.0012 m³, its density 1800 kg/m³; give",
+        ),
         ("a.csv", BOXES.replace(",0,1", ",0,maybe"), METERS, "support is 'maybe'; give 1 or 0"),
         ("a.csv", BOXES.splitlines()[0], METERS, "0 rows; give 1 to"),
         ("a.xyz", "0 0 0\n", METERS, "its format is not known; give one of compas_assembly"),

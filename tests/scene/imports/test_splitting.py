@@ -119,11 +119,11 @@ def test_blocks_that_share_a_vertex_alone_are_two():
     assert len(keys(mesh.export(file_type="obj"))) == 2
 
 
-def test_faces_that_stand_there_twice_stay_one_block():
-    faces = lines(obj(LOW), "f")
+def test_faces_that_stand_there_twice_stay_one_block(tmp_path):
+    faces, path = lines(obj(LOW), "f"), tmp_path / "twice.obj"
     for doubled in ([*faces, *faces], [face for face in faces for _ in (0, 1)]):
-        text = "\n".join([*lines(obj(LOW), "v"), *doubled])
-        (block,) = read_obj(text, "file").blocks
+        path.write_text("\n".join([*lines(obj(LOW), "v"), *doubled]), encoding="utf-8")
+        (block,) = read_content(path).blocks
         assert repair_shape(block).solid.volume == pytest.approx(1.0)
 
 

@@ -199,12 +199,14 @@ def tapered(scene):
     return replace(scene, bricks=(*scene.bricks[:-1], made))
 
 
+@pytest.mark.filterwarnings("ignore:.*interpenetrate")  # the wedge does, as a box
 @pytest.mark.parametrize("form", ["boxes", "obj"])
 def test_what_is_said_to_be_lost_is_lost_and_nothing_else(tmp_path, form):
     """Said and not lost would be as wrong as lost and not said."""
     scene = full(tapered(with_order(running_bond(3, 2))))
     path = written(scene, form, tmp_path)
-    back = import_scene(path, given=Given(unit="m", density=2000.0, gap=1e-3))
+    given = Given(unit="m", density=2000.0, gap=1e-3, accept_overlaps=form == "boxes")
+    back = import_scene(path, given=given)
     assert [b.name for b in back.bricks] == [b.name for b in scene.bricks]
     lost = [name for name, part in PARTS.items() if name == "steps" or part(back) != part(scene)]
     assert sorted(lost) == sorted(LOST[form])

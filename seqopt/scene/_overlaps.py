@@ -1,15 +1,14 @@
 """Which solids interpenetrate, and how deep: the largest ball that lies in both.
 
-Two solids are apart if a plane parallel to a face of either passes between them. Otherwise centers
-of balls are sought in cells of the space that the bounds of both share. A cell is left out if none
-that is deep enough can lie in it; where all are left out, the solids are apart.
+Two solids are apart if a plane parallel to a face of either passes between them, or if they do not
+meet once both are eroded: all of their faces moved inward, so that what only touches parts. A ball
+is grown from a point where they still meet.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
@@ -17,18 +16,15 @@ from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.scene._checks import units
 from seqopt.scene.boxes import _separations, as_vectors, vertices_of
 from seqopt.scene.parts import Brick
-from seqopt.scene.shape import FLAT, Polyhedron, normal_of, plane_axes
+from seqopt.scene.shape import Polyhedron, normal_of, plane_axes
 from seqopt.work.progress import Progress, Tell
 
 TOLERATED = 0.05  # depth that rounding and mortar explain, over the smallest dimension
-_SLACK = 1.5  # depth from which on an overlap is found for sure, over that which is tolerated
-_CELLS = 24  # along the longest side of the space that is searched
-_MOST_CELLS = 4_000  # of one size that are cut further, the deepest
-_STARTS = 2  # from which balls are grown, of all cells of a size
+_ERODED = (0.55, 0.45)  # of two solids, over the depth; unequal, so that no faces meet in one plane
+_PARALLEL = 0.05  # of normals at a vertex: what they span less is not solved for
+_STARTS = 4  # points from which balls are grown
 _STUCK = 1e-4  # share by which a ball grows less once it is as large as can be
-_RAY, *_SIDES = plane_axes(units(np.array([0.3490658, 0.5171023, 0.7817391])))  # along no face
-_ACROSS = np.array(_SIDES)
-_CORNERS = np.array([*product((0.0, 1.0), repeat=3)])
+_RAY = units(np.array([0.3490658, 0.5171023, 0.7817391]))  # along no face, most likely
 
 
 @dataclass(frozen=True)
@@ -52,16 +48,13 @@ class Overlap:
 class _Face(FrozenValue):
     """A face that has an area: a corner, its normal and two axes in it, corners (m, 2) in these.
 
-    ``step`` (m, 2): from each corner to the next; ``bounds`` (2, 3); ``shadow`` (2, 2): bounds
-    as seen along the ray.
+    ``step`` (m, 2): from each corner to the next.
     """
 
     origin: Floats
     axes: Floats
     flat: Floats
     step: Floats
-    bounds: Floats
-    shadow: Floats
 
 
 def near_pairs(bounds: Sequence[Floats], gap: float) -> Iterator[tuple[int, int]]:
@@ -86,7 +79,7 @@ def find_overlaps(
 ) -> Iterator[Overlap]:
     """Yield pairs of solids that interpenetrate by more than what either tolerates, m.
 
-    What is deeper by half is found for sure. ``progress``: told how far it is.
+    ``progress``: told how far it is.
 
     Examples
     --------
@@ -103,25 +96,23 @@ def find_overlaps(
     course, done = Progress("looking for overlaps", len(solids), progress), 0
     for i, j in near_pairs(bounds, -min(tolerated, default=0.0)):
         course.add(i - done)
-        done = i
-        deepest = min(tolerated[i], tolerated[j])
+        done, deepest, pair = i, min(tolerated[i], tolerated[j]), (solids[i], solids[j])
         for k in (i, j):
-            faces[k] = faces.get(k) or _faces(solids[k])
+            faces[k] = faces.get(k) or _faces(solids[k].points, solids[k])
         axes = np.array([face.axes[0] for face in (*faces[i], *faces[j])]).T
-        heights = _common(*(bounds_of(solids[k].points @ axes) for k in (i, j)))
-        if (heights[1] - heights[0]).min() <= deepest:
+        if min(_shared(*(bounds_of(solid.points @ axes) for solid in pair))) <= deepest:
             continue
-        region = _common(bounds[i], bounds[j])
-        radius = _ball_in_both((faces[i], faces[j]), region, deepest / 2)
-        if radius > deepest / 2:
-            x, y, z = (region[1] - region[0]).tolist()
+        starts = _where_both(pair, deepest)
+        radius = max((_grown((faces[i], faces[j]), start) for start in starts), default=0.0)
+        if 2 * radius > deepest:
+            x, y, z = _shared(bounds[i], bounds[j]).tolist()
             yield Overlap((i, j), 2 * radius, (x, y, z))
 
 
 def overlapping(bricks: Sequence[Brick]) -> list[tuple[int, int, float]]:
     """Return the names of bricks that interpenetrate by more than `TOLERATED`, and depths, m.
 
-    The deepest come first. Bricks that are not convex are left out: they take seconds a pair.
+    The deepest come first.
     """
     thin = np.array([min(brick.dimensions) for brick in bricks])
     if all(brick.shape is None for brick in bricks):
@@ -129,82 +120,71 @@ def overlapping(bricks: Sequence[Brick]) -> list[tuple[int, int, float]]:
         deep = -apart > TOLERATED * thin[pairs].min(axis=1)
         found = [(i, j, -d) for (i, j), d in zip(pairs[deep], apart[deep].tolist(), strict=True)]
     else:
-        solids = {
-            i: Polyhedron(as_vectors(points), faces)
-            for i, (points, faces) in enumerate(map(vertices_of, bricks))
-        }
-        convex = [i for i, solid in solids.items() if _is_convex(solid)]
-        overlaps = find_overlaps([solids[i] for i in convex], TOLERATED * thin[convex])
-        found = [(convex[each.pair[0]], convex[each.pair[1]], each.depth) for each in overlaps]
+        shapes = [
+            Polyhedron(as_vectors(points), sides) for points, sides in map(vertices_of, bricks)
+        ]
+        overlaps = find_overlaps(shapes, TOLERATED * thin)
+        found = [(*each.pair, each.depth) for each in overlaps]
     found.sort(key=lambda held: -held[2])
     return [(bricks[i].name, bricks[j].name, depth) for i, j, depth in found]
 
 
-def _is_convex(solid: Polyhedron) -> bool:
-    """Return whether no vertex lies before a face, but for what makes faces flat."""
-    size = float(np.ptp(solid.points, axis=0).max())
-    return all(
-        float(((solid.points - face.origin) @ face.axes[0]).max()) <= FLAT * size
-        for face in _faces(solid)
-    )
+def _shared(some: Floats, others: Floats) -> Floats:
+    """Return by how much bounds (2, k) overlap (k,); negative where they are apart."""
+    return np.asarray(np.minimum(some[1], others[1]) - np.maximum(some[0], others[0]))
 
 
-def _common(some: Floats, others: Floats) -> Floats:
-    """Return the bounds (2, k) of what two bounds share; turned round where they are apart."""
-    return np.array([np.maximum(some[0], others[0]), np.minimum(some[1], others[1])])
-
-
-def _faces(solid: Polyhedron) -> list[_Face]:
+def _faces(points: Floats, solid: Polyhedron) -> list[_Face]:
+    """Return the faces of a solid that have an area; ``points``: where its vertices are."""
     out = []
-    for corners in (solid.points[list(face)] for face in solid.faces):
+    for corners in (points[list(face)] for face in solid.faces):
         normal = normal_of(corners)
         if normal.any():
             axes = plane_axes(units(normal))
             flat = (corners - corners[0]) @ axes[1:].T
-            step = np.roll(flat, -1, axis=0) - flat
-            seen = (bounds_of(corners), bounds_of(corners @ _ACROSS.T))
-            out.append(_Face(corners[0], axes, flat, step, *seen))
+            out.append(_Face(corners[0], axes, flat, np.roll(flat, -1, axis=0) - flat))
     return out
 
 
-def _ball_in_both(pair: Sequence[Sequence[_Face]], region: Floats, least: float) -> float:
-    """Return the radius of a largest ball in two solids, m; 0 if none has more than ``least``.
+def _where_both(pair: Sequence[Polyhedron], deepest: float) -> Floats:
+    """Return points (k, 3), up to `_STARTS`, that lie deep in two solids: none if these are apart.
 
-    ``region`` (2, 3): what the bounds of both share.
+    Where eroded solids meet, a vertex of one lies in the other, or an edge passes a face.
     """
-    wide = region + np.array([[-2.0 * least], [2.0 * least]])
-    near = [face for faces in pair for face in faces if _meet(face.bounds, wide)]
-    shadow = bounds_of((region[0] + (region[1] - region[0]) * _CORNERS) @ _ACROSS.T)
-    passed = [[face for face in faces if _meet(face.shadow, shadow)] for faces in pair]
-    centers, half = _grid(region)
-    while len(centers):
-        reach = _SLACK * least - float(np.linalg.norm(half))  # what a center has at least
-        depth = np.full(len(centers), 2 * least)
-        for face in near:
-            depth = np.minimum(depth, np.linalg.norm(centers - _foot(face, centers), axis=1))
-        for faces in ([], *passed):
-            depth = np.where(_hold(faces, centers), depth, -depth) if faces else depth
-            centers, depth = centers[depth > reach], depth[depth > reach]
-        best = np.argsort(-depth)[:_MOST_CELLS]
-        deep = best[: np.count_nonzero(depth > 0)]
-        for start in centers[deep[:: max(1, len(deep) // _STARTS)]]:
-            if (radius := _grown(pair, start)) > least:
-                return radius
-        centers = (centers[best][:, None] + half * (_CORNERS - 0.5)).reshape(-1, 3)
-        half = half / 2
-    return 0.0
+    moved = [_eroded(solid, by * deepest) for solid, by in zip(pair, _ERODED, strict=True)]
+    faces = [_faces(points, solid) for points, solid in zip(moved, pair, strict=True)]
+    found = []
+    for mine, other in ((0, 1), (1, 0)):
+        found.append(moved[mine][_hold(faces[other], moved[mine])])
+        rims = [moved[mine][list(face)] for face in pair[mine].faces]
+        start = np.vstack(rims)
+        step = np.vstack([np.roll(rim, -1, axis=0) - rim for rim in rims])
+        found += [_passed(face, start, step) for face in faces[other]]
+    points = np.vstack(found)
+    return points[:: max(1, len(points) // _STARTS)][:_STARTS]
 
 
-def _grid(region: Floats) -> tuple[Floats, Floats]:
-    """Return the centers (k, 3) of cells of a region, about cubes, and half of their sides (3,)."""
-    sides = region[1] - region[0]
-    counts = np.ceil(sides / max(sides.min(), sides.max() / _CELLS)).astype(int)
-    places = np.array([*product(*map(range, counts.tolist()))])
-    return region[0] + (places + 0.5) * sides / counts, 0.5 * sides / counts
+def _eroded(solid: Polyhedron, by: float) -> Floats:
+    """Return the vertices (V, 3) of a solid whose faces are moved inward, m."""
+    normals: list[list[Floats]] = [[] for _ in solid.points]
+    for face in solid.faces:
+        normal = normal_of(solid.points[list(face)])
+        for vertex in face if normal.any() else ():
+            normals[vertex].append(units(normal))
+    shift = [
+        np.linalg.pinv(np.array(own), rcond=_PARALLEL).sum(axis=1) if own else np.zeros(3)
+        for own in normals
+    ]
+    return np.asarray(solid.points - by * np.array(shift))
 
 
-def _meet(some: Floats, others: Floats) -> bool:
-    return bool((some[0] <= others[1]).all() and (others[0] <= some[1]).all())
+def _passed(face: _Face, start: Floats, step: Floats) -> Floats:
+    """Return where lines, from points to others (k, 3), pass a face."""
+    slope = step @ face.axes[0]
+    share = ((face.origin - start) @ face.axes[0]) / np.where(slope == 0, np.inf, slope)
+    met = start + share[:, None] * step
+    inside = (share > 0) & (share < 1) & _within(face, (met - face.origin) @ face.axes[1:].T)
+    return np.asarray(met[inside])
 
 
 def _foot(face: _Face, points: Floats) -> Floats:
@@ -240,7 +220,7 @@ def _hold(faces: Sequence[_Face], points: Floats) -> Bools:
 
 
 def _grown(pair: Sequence[Sequence[_Face]], center: Floats) -> float:
-    """Return the radius of a ball in two solids that is moved and grown until it is stuck.
+    """Return the radius of a ball in two solids that is moved and grown until it is stuck; 0: none.
 
     Each program grows it between planes through its nearest points of all faces.
     """
