@@ -121,9 +121,10 @@ def overlapping(bricks: Sequence[Brick]) -> list[tuple[int, int, float]]:
         found = [(i, j, -d) for (i, j), d in zip(pairs[deep], apart[deep].tolist(), strict=True)]
     else:
         shapes = [
-            Polyhedron(as_vectors(points), sides) for points, sides in map(vertices_of, bricks)
+            Polyhedron(as_vectors(points), tuple(map(tuple, faces)))
+            for points, faces in map(vertices_of, bricks)
         ]
-        overlaps = find_overlaps(shapes, TOLERATED * thin)
+        overlaps = find_overlaps(shapes, (TOLERATED * thin).tolist())
         found = [(*each.pair, each.depth) for each in overlaps]
     found.sort(key=lambda held: -held[2])
     return [(bricks[i].name, bricks[j].name, depth) for i, j, depth in found]
@@ -238,4 +239,4 @@ def _grown(pair: Sequence[Sequence[_Face]], center: Floats) -> float:
         found = linprog([0, 0, 0, -1], rows, away, bounds=[(None, None)] * 3 + [(0, None)])
         if found.status:
             return radius
-        center = center + found.x[:3]
+        center = center + np.asarray(found.x)[:3]

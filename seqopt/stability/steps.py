@@ -86,7 +86,7 @@ def _warn_of_overlaps(network: Network) -> None:
         vars(network)[_KEY] = found = [*_find_overlapping(network.scene)]
         for line in found:
             warnings.warn(
-                f"scene {network.scene.name}: {line}, or no verdict is worth anything",
+                f"scene {network.scene.name}: {line}: no verdict sees it",
                 SceneWarning,
                 stacklevel=3,
             )

@@ -54,7 +54,8 @@ def scene_of(name: str) -> Scene:
             return load_scene(name)
         pytest.importorskip("compas_cra")
         folder = Path(import_module("compas_cra").SAMPLE)
-        return import_scene(folder / f"{name}.json", given=Given(unit="m", density=2400.0))
+        given = Given(unit="m", density=2400.0, accept_overlaps=True)
+        return import_scene(folder / f"{name}.json", given=given)
 
 
 def states(network: Network, method: str) -> list[Step]:

@@ -11,7 +11,7 @@ import pytest
 import seqopt
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY
-from seqopt.errors import ProblemError, SceneError
+from seqopt.errors import ProblemError, SceneError, SceneWarning
 from seqopt.stability import assess
 from seqopt.stability._step_verdicts import each_stability, stability_row
 from seqopt.stability.assessment import MARGINS
@@ -48,6 +48,33 @@ def test_a_margin_is_found_alone_as_with_all_others(network, steps, wholes, marg
                 assert own == pytest.approx(other, rel=2e-3, abs=1e-6, nan_ok=True)
             else:
                 assert np.isnan(own)
+
+
+def test_bricks_that_interpenetrate_are_warned_of_once(recwarn):
+    """Bricks 1 and 3 of a wall, without a joint of theirs: every step stood without a word."""
+    wall = seqopt.load_scene("wall:columns=3,courses=1")
+    (x, y, z), *_ = (brick.position for brick in wall.bricks[2:])
+    moved = replace(wall.bricks[2], position=(x - 0.25, y, z))
+    joints = tuple(joint for joint in wall.joints if 3 not in joint.bricks)
+    ends = tuple(
+        replace(
+            end,
+            position=tuple(np.subtract(end.position, (0.25, 0, 0))),
+            anchor=tuple(np.subtract(end.anchor, (0.25, 0, 0))),
+        )
+        if end.brick == 3
+        else end
+        for end in wall.grounds
+    )
+    sunk = replace(wall, bricks=(*wall.bricks[:2], moved), joints=joints, grounds=ends)
+    network = seqopt.build_network(sunk)
+    with pytest.warns(SceneWarning, match="bricks 1 and 3 interpenetrate by 50 mm"):
+        found = assess_steps(network, seqopt.sequential(network)[:1], DRY)
+    assert len(found) == 1
+    recwarn.clear()
+    assess_steps(network, seqopt.sequential(network)[1:2], DRY)
+    assess_steps(wall, seqopt.sequential(wall)[:1], DRY)
+    assert not recwarn.list
 
 
 def test_margins_of_chosen_steps_alone(network, steps):
