@@ -57,11 +57,6 @@ def assess_steps(
     ProblemError
         If there cannot be so many workers.
 
-    Warns
-    -----
-    SceneWarning
-        If bricks interpenetrate, which no verdict takes into account; once for each network.
-
     Examples
     --------
     >>> import seqopt
@@ -70,8 +65,7 @@ def assess_steps(
     >>> [stability.verdict.value for stability in seqopt.assess_steps(network, steps, seqopt.EPOXY)]
     ['stands', 'stands']
     """
-    network, steps, asked = network_of(network), require_steps(steps), find_margins(margins)
-    _warn_of_overlaps(network)
+    network, steps, asked = _warned(network), require_steps(steps), find_margins(margins)
     if not (hasattr(workers, "submit") or (isinstance(workers, int) and workers > 0)):
         raise ProblemError(f"workers is {workers!r}; give a whole number from 1, or an executor")
     shared = (None, workers) if isinstance(workers, int) else (workers, 1)
@@ -80,8 +74,9 @@ def assess_steps(
     return tuple(result for result, _ in zip(found, told, strict=True))
 
 
-def _warn_of_overlaps(network: Network) -> None:
-    """Warn once, for a scene that was not read from a file, of bricks that interpenetrate."""
+def _warned(scene: Network | Scene) -> Network:
+    """Return the network of a scene; warn once of bricks that interpenetrate, joint or not."""
+    network = network_of(scene)
     if _KEY not in vars(network):
         vars(network)[_KEY] = found = [*_find_overlapping(network.scene)]
         for line in found:
@@ -90,6 +85,7 @@ def _warn_of_overlaps(network: Network) -> None:
                 SceneWarning,
                 stacklevel=3,
             )
+    return network
 
 
 def stability_table(steps: Sequence[Step], results: Sequence[Stability]) -> pd.DataFrame:
