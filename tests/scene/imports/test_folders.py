@@ -146,6 +146,7 @@ def test_a_block_of_pieces_face_on_face_is_welded_and_said(tmp_path):
         (cubes((0, 0, 0.1), (0.1, 0, 0.1)), "2 pieces that do not lie face on face"),
         (alone(TOWER[1]).rsplit("f ", 1)[0], "one side only; close the shape; if it is ground"),
     ],
+    ids=["apart", "on an edge", "overlapping", "open"],
 )
 def test_a_block_whose_mesh_is_none_is_named_with_what_is_wrong(tmp_path, text, said):
     path = folder(tmp_path, "obj")
