@@ -27,7 +27,7 @@ class PartialAssemblies:
     """
 
     def __init__(self, network: Network, bricks: int) -> None:
-        self.network = network
+        self.network, self.bricks = network, bricks
         self._whole = whole = bare_assembly(network, bricks)
         placed = network.scene.placed
         self._block = {node: i for i, brick in enumerate(placed) for node in brick.nodes}

@@ -62,6 +62,22 @@ Examples
 MORTARS = {"epoxy": EPOXY, "dry": DRY}
 
 
+def is_as_strong(mortar: Mortar, other: Mortar) -> bool:
+    """Return whether a mortar carries whatever another one does: what stands with that, stands.
+
+    Friction takes from what is carried in shear where a contact is pulled: there it must be equal.
+
+    >>> is_as_strong(EPOXY, DRY), is_as_strong(DRY, EPOXY)
+    (True, False)
+    """
+    slides = mortar.friction - other.friction
+    return (
+        (slides == 0 or (slides > 0 and not other.tensile_strength))
+        and mortar.tensile_strength >= other.tensile_strength
+        and mortar.cohesion >= other.cohesion
+    )
+
+
 def bond_mortar(strength: float, friction: float = _FRICTION) -> Mortar:
     """Return the mortar of a bond with the same strength in tension and in shear, Pa.
 

@@ -14,7 +14,7 @@ import pandas as pd
 
 from seqopt._files import csv_text
 from seqopt.contact._partial_assemblies import PartialAssemblies
-from seqopt.contact.mortar import DRY, EPOXY, Mortar
+from seqopt.contact.mortar import DRY, EPOXY, Mortar, is_as_strong
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.sequence.schedule_file import parse_plan
@@ -29,13 +29,13 @@ from seqopt.work.progress import Tell, with_progress
 
 SHOWN = {"dry": DRY, "epoxy": EPOXY}  # with which it is said what stands
 SCREENED = 60  # bricks up to which a program for all grips at once is quickly solved
-_SETS = 6  # grips of as many bricks, in the mean, from which on such a program pays
+_SETS = 12  # grips of as many bricks, in the mean, from which on such a program pays
 _SHARED = 5e4  # bricks in all steps from which on a process more takes less than it saves
 _State = tuple[int, Grips]  # bricks that stand, and nodes held
-_Asked = dict[str, list[Step]]  # steps by the mortar with which they are asked
 _Found = Iterator[tuple[_State, Verdict]]
 _Told = Callable[[], Iterator[Step]]  # steps, told as they are asked
 _Way = Callable[[Sequence[Step], Mortar, _Told], _Found]
+_Begun = tuple[Sequence[Step], SharedVerdicts]  # steps, and what another process finds of them
 WORDS = {Verdict.STANDS: "stands", Verdict.FALLS: "falls", Verdict.UNDECIDED: "is undecided"}
 _MANY = {Verdict.FALLS: "fall", Verdict.UNDECIDED: "are undecided"}
 
@@ -106,7 +106,8 @@ class BuildProver:
         self._known: dict[str, dict[_State, Verdict]] = {name: {} for name in mortars}
         self._parts: Network | PartialAssemblies = network
         self._most = 1  # bricks of any step so far: what is known of one may be asked again
-        self._shared: tuple[_Asked, SharedVerdicts] | None = None
+        self._crew: Crew | None = None
+        self._shared: dict[str, _Begun | None] = {}
         self.refusal = ""
 
     def of_tables(self, tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[BuildVerdicts, ...]]:
@@ -128,23 +129,24 @@ class BuildProver:
     @contextmanager
     def begun(self, steps: Sequence[Step]) -> Iterator[None]:
         """Let another process begin with a large build, while something else is done here."""
-        asked = self._new({_state(step): step for step in steps})
-        work = sum(step.bricks for each in asked.values() for step in each)
+        first = [*self._mortars][:1]
+        asked = [(name, self._new(name, steps)) for name in first]
+        work = sum(step.bricks for _, new in asked for step in new) * len(self._mortars)
         shares = work >= _SHARED and cores() > 1
         with hire(workers=2 if shares else 1, beside=True) as crew:
-            if crew is not None:
-                self._shared = self._begin(asked, crew)
+            self._crew = crew
+            self._shared = {name: self._begin(name, new) for name, new in asked}
             try:
                 yield
             finally:
-                self._shared = None
+                self._crew, self._shared = None, {}
 
-    def _begin(self, asked: _Asked, crew: Crew) -> tuple[_Asked, SharedVerdicts] | None:
-        if any(map(self._many, asked.values())):
+    def _begin(self, name: str, new: Sequence[Step]) -> _Begun | None:
+        """Share steps with another process, if there is one, and they are not many at once."""
+        if self._crew is None or self._many(new):
             return None
-        pairs = [(self._mortars[name], steps) for name, steps in asked.items()]
         try:
-            return asked, SharedVerdicts(self._network, pairs, crew)
+            return new, SharedVerdicts(self._network, [(self._mortars[name], new)], self._crew)
         except SceneError:  # said where it is asked
             return None
 
@@ -152,39 +154,49 @@ class BuildProver:
         """Ask what is not known of steps yet; return whether anything is asked at all."""
         if self.refusal:
             return False
+        distinct = [*{_state(step): step for step in steps}.values()]
         try:
-            self._ask_all({_state(step): step for step in steps})
+            for name in self._mortars:
+                self._ask_all(name, self._new(name, distinct))
         except SceneError as error:
             self.refusal = str(error)
             return False
         return bool(self._mortars)
 
-    def _ask_all(self, distinct: Mapping[_State, Step]) -> None:
-        asked = self._new(distinct)
-        if not any(asked.values()):
+    def _ask_all(self, name: str, new: Sequence[Step]) -> None:
+        """Ask of steps whether they stand with a mortar, and what that says of others."""
+        if not new:
             return
-        way_of = self._ways(asked)
-        for name, new in asked.items():
-            what, mortar = f"proving what stands, {name}", self._mortars[name]
-            tell = partial(with_progress, what, new, self._progress)
-            self._known[name].update(way_of(new)(new, mortar, tell) if new else ())
+        what, mortar = f"proving what stands, {name}", self._mortars[name]
+        tell = partial(with_progress, what, new, self._progress)
+        found = {}
+        for state, verdict in self._way(name, new)(new, mortar, tell):
+            self._known[name][state] = found[state] = verdict
+        for other, held in self._mortars.items():
+            sure = {Verdict.STANDS} if is_as_strong(held, mortar) else set()
+            sure |= {Verdict.FALLS} if is_as_strong(mortar, held) else set()
+            implied = {state: verdict for state, verdict in found.items() if verdict in sure}
+            self._known[other] = implied | self._known[other]
 
-    def _ways(self, asked: _Asked) -> Callable[[Sequence[Step]], _Way]:
+    def _way(self, name: str, new: Sequence[Step]) -> _Way:
         """Return what proves most quickly which of some steps stand."""
-        self._most = max(self._most, *(step.bricks for new in asked.values() for step in new))
-        if self._shared is not None and self._shared[0] == asked:
-            found = partial(_as_found, iter(self._shared[1]))
-            return lambda _: found
-        self._parts = PartialAssemblies(self._network, self._most)
-        one, many = (partial(way, self._parts) for way in (_one_by_one, _screened))
-        return lambda new: many if self._many(new) else one
+        self._most = max(self._most, *(step.bricks for step in new))
+        begun = self._shared.get(name) or self._begin(name, new)
+        if begun is not None and begun[0] == new:
+            return partial(_as_found, iter(begun[1]))
+        if not isinstance(self._parts, PartialAssemblies) or self._parts.bricks < self._most:
+            self._parts = PartialAssemblies(self._network, self._most)
+        return partial(_screened if self._many(new) else _one_by_one, self._parts)
 
-    def _new(self, distinct: Mapping[_State, Step]) -> _Asked:
-        """Return by mortar which steps are not known, in the order in which they are asked."""
-        return {
-            name: sorted((s for state, s in distinct.items() if state not in known), key=_asking)
-            for name, known in self._known.items()
-        }
+    def _new(self, name: str, steps: Sequence[Step]) -> list[Step]:
+        """Return the steps that are not known with a mortar, in the order in which they are asked.
+
+        Equal ones are asked once.
+        """
+        known = self._known[name]
+        return sorted(
+            {s: step for step in steps if (s := _state(step)) not in known}.values(), key=_asking
+        )
 
     def _many(self, steps: Sequence[Step]) -> bool:
         """Return whether steps are so many that a program for all grips of a brick count pays."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 
 from experiments.stability.parts.blocks import stack
-from seqopt.contact.mortar import Mortar
+from seqopt.contact.mortar import DRY, EPOXY, Mortar, is_as_strong
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND
 
@@ -30,3 +31,26 @@ def test_a_wrong_assembly_is_named(change, message):
 def test_a_wrong_mortar_is_named():
     with pytest.raises(SceneError, match=r"mortar: friction is -1.0; give a number"):
         Mortar(friction=-1.0)
+
+
+def carries(mortar, press, slide):
+    """Where a corner bears stresses: pressure, negative where it is pulled, and shear."""
+    sticks = slide <= mortar.cohesion + mortar.friction * press
+    return (press >= -mortar.tensile_strength) & sticks
+
+
+def test_a_mortar_is_as_strong_as_another_where_it_carries_all_of_it():
+    rng, levels = np.random.default_rng(5), [0.0, 0.5, 1.0]
+    names = ("friction", "tensile_strength", "cohesion")
+    every = [Mortar(**dict(zip(names, each, strict=True))) for each in product(levels, repeat=3)]
+    press, slide = rng.uniform(-1.2, 3.0, 4000), rng.uniform(0.0, 4.0, 4000)
+    borne = [carries(mortar, press, slide) for mortar in every]
+    for (weak, first), (strong, second) in product(zip(every, borne, strict=True), repeat=2):
+        assert not is_as_strong(strong, weak) or (second | ~first).all()
+    assert is_as_strong(EPOXY, DRY)
+    assert is_as_strong(Mortar(friction=1.0), Mortar(friction=0.5))
+    pulled = Mortar(friction=0.5, tensile_strength=1.0, cohesion=1.0)
+    rough = replace(pulled, friction=1.0)
+    assert not is_as_strong(rough, pulled)  # it slides where it is pulled
+    assert carries(pulled, -1.0, 0.3)
+    assert not carries(rough, -1.0, 0.3)

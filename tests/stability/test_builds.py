@@ -69,9 +69,28 @@ def test_another_process_that_begins_says_the_same(flat, builds, found, monkeypa
     monkeypatch.setattr(_builds, "cores", lambda: 2)
     prover, steps = BuildProver(flat), builds["cantilever"]
     with prover.begun(steps):
-        assert prover._shared is not None
+        assert prover._shared["dry"] is not None
         assert prover.of_builds({"cantilever": steps})["cantilever"] == found["cantilever"]
-    assert prover._shared is None
+    assert not prover._shared
+
+
+@pytest.mark.parametrize(("names", "left"), [(("dry", "epoxy"), True), (("epoxy", "dry"), False)])
+def test_what_one_mortar_proves_is_not_proven_with_another(flat, builds, monkeypatch, names, left):
+    """What stands dry stands with epoxy; what falls with epoxy falls dry, and here nothing does."""
+    asked, real = {}, _builds._one_by_one
+
+    def noted(parts, steps, mortar, tell=None):
+        asked[mortar] = {(step.bricks, step.grips) for step in steps}
+        return real(parts, steps, mortar, tell)
+
+    monkeypatch.setattr(_builds, "_one_by_one", noted)
+    prover, steps = BuildProver(flat, {name: SHOWN[name] for name in names}), builds["cantilever"]
+    (said, _) = prover.of_builds({"a": steps})["a"]
+    pairs = zip(steps, said.verdicts, strict=True)
+    open_ = {(step.bricks, step.grips) for step, v in pairs if not left or v is Verdict.FALLS}
+    assert asked[SHOWN[names[1]]] == open_
+    assert asked[SHOWN[names[0]]] == {(step.bricks, step.grips) for step in steps}
+    assert len(open_) < len(steps) or not left
 
 
 def test_what_fails_first_is_what_the_first_fallen_step_says(flat, builds, found):
