@@ -20,10 +20,11 @@ from seqopt.errors import ExtraError, ProblemError, SceneError, StepError
 from seqopt.network.network import Network
 from seqopt.plan.build import ShownBuild
 from seqopt.problem._arms import arm_faults
-from seqopt.problem.requirements import _prop_faults, overloads
+from seqopt.problem.requirements import _carrying_excesses, _prop_faults, overloads
 from seqopt.responses.table import OUTSIDE, REMEDY, _Columns
 from seqopt.scene.scene import Scene, in_order
-from seqopt.sequence.rules import with_robots
+from seqopt.sequence.rules import MOST_ROBOTS, FreeRules, _usual_grips, with_robots
+from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import AnyStep, Step, _idle_note
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability._builds import BuildProver, BuildVerdicts
@@ -131,6 +132,24 @@ def exceeded(scene: Scene, *tables: _Columns) -> tuple[str, ...]:
     """Return the payloads, also of props, that are exceeded in responses of steps, in words."""
     found = ((*overloads(scene, table), *_prop_faults(scene, table)) for table in tables)
     return tuple(str(excess) for each in found for excess in each)
+
+
+def carrying_notes(scene: Scene, steps: Sequence[Step]) -> tuple[str, ...]:
+    """Return which robots place or take away bricks that are heavier than their payload."""
+    return tuple(f"payload exceeded: {excess}" for excess in _carrying_excesses(scene, steps))
+
+
+def rule_notes(rules: FreeRules | Schedule, scene: Scene) -> tuple[str, ...]:
+    """Return which rule is looser than usual because few robots take part, if nobody gave it."""
+    if not isinstance(rules, FreeRules) or rules.least_grips is not None:
+        return ()
+    team, least = len(rules.team(scene)), rules.fewest_grips(scene)
+    robots = "1 robot takes" if team == 1 else f"{team} robots take"
+    return (
+        ()
+        if least == _usual_grips(MOST_ROBOTS)
+        else (f"rules: least_grips={least}, as {robots} part",)
+    )
 
 
 def arm_notes(scene: Scene, builds: Mapping[str, Sequence[Step]]) -> tuple[str, ...]:

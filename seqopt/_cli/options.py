@@ -48,11 +48,11 @@ LIMIT = {
     "one does: linear_range=any lifts that, 0.5 asks for half of it in every step"
 }
 RULE = {
-    "--rule NAME=VALUE ...": "what robots may do: least_grips=N (2, from the second brick on), "
-    "newest=either|placing|free (where the newest brick is held), regrips=N|any (between two "
-    "bricks), placers=NAME,NAME|any, payload=kept|ignored, ending=held|released|one-by-one (how "
-    "robots leave the finished structure), candidates=near:JOINTS|within:METERS|all (as "
-    "--candidates)"
+    "--rule NAME=VALUE ...": "what robots may do: least_grips=N (2, or 1 of two robots, from the "
+    "second brick on), newest=either|placing|free (where the newest brick is held), regrips=N|any "
+    "(between two bricks), placers=NAME,NAME|any, payload=kept|ignored, ending=held|released|"
+    "one-by-one (how robots leave the finished structure), candidates=near:JOINTS|within:METERS|"
+    "all (as --candidates)"
 }
 WHERE = {
     "--from PLAN:STEP|STATE|N": "where the build begins: after a step of a plan (its folder or CSV "

@@ -116,7 +116,7 @@ def _counted(network: Network, rules: FreeRules) -> _Counted:
     holds = () if rules.begin is None else rules.begin.holds(scene)
     holding = [own for own, r in zip(every, team, strict=True) if holds and holds[r] is not None]
     held = tuple(holding.count(own) for own, _ in kinds)
-    least = rules.least_grips - len(scene.props)
+    least = rules.fewest_grips(scene) - len(scene.props)
     return _Counted(kinds, least, rules.span(scene), held, rules.how_it_ends is not Ending.HELD)
 
 

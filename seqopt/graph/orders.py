@@ -192,7 +192,7 @@ def whole_bound(problem: AllOrders) -> float:
         for place in places
         if can_hold(scene, k, numbers[place - 1])
     ]
-    fewest = max(1, free.free_rules.least_grips - len(scene.props))
+    fewest = max(1, free.free_rules.fewest_grips(scene) - len(scene.props))
     sets = _sets(every, fewest, free.space.robots, len(numbers))
     if len(sets):
         least = float(_values(free, sets).min())

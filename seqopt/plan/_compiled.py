@@ -110,6 +110,7 @@ def _of_layers(name: str, graph: Layers | ScenarioLayers, aim: Aim | None) -> In
     names = [f"cost {k}" if len(columns) > 1 else "cost" for k in range(len(columns))]
     columns += [budget.amounts.arcs() for budget in budgets]
     nominal = graph.nominal if isinstance(graph, ScenarioLayers) else graph
+    nominal.require_possible()
     moves = nominal.schedule.moves
     states = [(0, 0)] + [(k, c) for k, move in enumerate(moves, 1) for c in move.candidates]
     firsts = [0, *accumulate((len(move.candidates) for move in moves), initial=1)]

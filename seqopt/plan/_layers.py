@@ -10,7 +10,7 @@ import numpy as np
 from seqopt.errors import ProblemError, SolverError, StepError
 from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.graph.layers.layers import Layers, steps_over, travel
+from seqopt.graph.layers.layers import Layers, _require_carried, steps_over, travel
 from seqopt.graph.scenarios import ScenarioLayers, engine_for
 from seqopt.plan.calling._guard import require_fit, require_proof, require_time, select
 from seqopt.plan.calling.formulation import (
@@ -31,6 +31,7 @@ from seqopt.plan.plan import Plan
 from seqopt.problem.criteria import Among
 from seqopt.problem.problem import Aim, AskedBudget
 from seqopt.problem.requirements import LINEAR_RANGE
+from seqopt.sequence._rule_check import check_carried
 from seqopt.sequence.steps import Step
 
 CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, without budgets
@@ -81,6 +82,8 @@ def solve_layers(graph: PlacementProblem, formulation: Formulation, run: Run) ->
     require_time(formulation, run.time_limit)
     if isinstance(graph, Layers):
         graph.require_possible()
+    elif isinstance(graph, ScenarioLayers) and isinstance(graph.nominal, Layers):
+        _require_carried(graph.nominal.schedule, (graph.nominal.schedule.scene, *graph.scenes))
     if run.lazy:
         require_proof(run.proof)
         return _solve_lazily(graph, formulation, run)
@@ -166,12 +169,14 @@ def _solve_lazily(graph: PlacementProblem, formulation: Formulation, run: Run) -
 
 
 def _checked(steps: tuple[Step, ...], graph: PlacementProblem) -> tuple[Step, ...]:
-    """Return steps in which arms can be; a `SolverError` names one in which they cannot."""
+    """Return steps in which arms can be, and robots bear bricks; else a `SolverError` says why."""
     nominal = graph.nominal if isinstance(graph, ScenarioLayers) else graph
+    worlds = graph.scenes if isinstance(graph, ScenarioLayers) else ()
     try:
         if isinstance(nominal, Layers):
             check_postures(nominal.schedule.scene, steps)
             _check_shape(graph, nominal, steps)
+            check_carried(nominal.engine.network.scene, nominal.schedule, steps, worlds)
     except StepError as error:
         raise SolverError(f"a choice is not allowed: {error}") from error
     return steps

@@ -41,7 +41,7 @@ from seqopt.plan.calling.formulation import (
 )
 from seqopt.plan.judge._bare._claims import Claim, as_layers
 from seqopt.plan.judge._bare._judging import judge_instance
-from seqopt.plan.judge._infeasible import claimed, confirmed
+from seqopt.plan.judge._infeasible import claimed, confirmed, without_order
 from seqopt.plan.judge._orders import finds_better_order
 from seqopt.plan.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan.judge.schedules import judge_schedule
@@ -313,7 +313,7 @@ def _selected_order(
                 f"formulation {found.name} says that no order has a plan, and some have"
             ) from None
         if some is False and problem.down is None:  # whose whole may be beyond limits
-            raise
+            raise without_order(problem, found.name, end - time.perf_counter()) from None
         raise claimed(found.name, str(error), exact=found.looks_at_all) from None
     return _with_numbers(found.name, said)
 

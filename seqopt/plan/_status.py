@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from seqopt.arrays import Terse
 from seqopt.plan.calling.formulation import End
-from seqopt.plan.judge.certificate import TOLERANCE
+from seqopt.plan.judge.certificate import TOLERANCE, _known_gap
 from seqopt.problem._arms import faults_in_words
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import length_text
@@ -47,7 +47,7 @@ def bare_summary(plan: Any) -> dict[str, object]:
         "objective": plan.objective,
         "bound": {n: b if isfinite(b) else None for n, b in zip(names, bounds, strict=False)},
         "gap": plan.gap,
-        "claimed_gap": None if proof is None or plan.gap is None else proof.claimed_gap,
+        "claimed_gap": None if proof is None or plan.gap is None else _known_gap(proof.claimed_gap),
         "budgets": {} if proof is None else dict(proof.spent),
         "nodes_of_path": [*plan.nodes],
         "seconds": dict(plan.seconds),

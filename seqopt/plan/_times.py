@@ -7,7 +7,7 @@ while they were softer, is left out, and so is what creeps.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from seqopt.network.network import Network
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
+from seqopt.sequence._carrying import can_carry, carried
 from seqopt.sequence._timing import StepTime, Waits, reassigned_steps, step_times
 from seqopt.sequence.schedule import Hold
 from seqopt.sequence.site import Site
@@ -155,10 +156,10 @@ def reassign(
     """Return the same grips in the same order by robots with which the build takes least.
 
     ``responses``: of the steps, as of `seqopt.analyze`. A robot may have a grip if it reaches the
-    node, gives way there as the one who had it, and carries the largest force of the grip within
-    its payload; who carried more before may go on. Where mortar cures (``waits``, ``begin``: as
-    of `step_times`) its payload is no less than that of the one who had it. A `StepError` says that
-    robots have arms.
+    node, gives way there as the one who had it, and carries the largest force of the grip, and the
+    brick that it places or takes away, within its payload; who carried more before may go on. Where
+    mortar cures (``waits``, ``begin``: as of `step_times`) its payload is no less than that of the
+    one who had it. A `StepError` says that robots have arms.
     """
     if scene.has_arms:
         raise StepError(
@@ -170,6 +171,7 @@ def reassign(
     }
     kinds = scene.grip_kinds.compliance[scene.grip_kinds.of_robot]
     turns = scene.grip_kinds.turns[scene.grip_kinds.of_robot]
+    carries = _who_carries(scene, steps)
 
     def may(robot: int, hold: Hold) -> bool:
         had = hold.robot
@@ -183,6 +185,7 @@ def reassign(
         if waits is not None and scene.robots[robot].payload < scene.robots[had].payload:
             return False
         alike = bool((kinds[robot] == kinds[had]).all() and turns[robot] == turns[had])
+        alike &= carries(robot, hold)
         return alike and force <= most and scene.robots[robot].reach.covers(position)
 
     idle = idle_robots(scene, steps)
@@ -192,3 +195,15 @@ def reassign(
         if robot.durations is not None or robot.name not in idle
     ]
     return reassigned_steps(scene, steps, may, known, waits, begin)
+
+
+def _who_carries(scene: Scene, steps: Sequence[Step]) -> Callable[[int, Hold], bool]:
+    """Return what says whether a robot bears the bricks that are placed or removed in a hold."""
+    bricks = {(each.robot, each.step): each.brick for each in carried(scene, steps)}
+    able = [can_carry((scene,), robot) for robot in range(len(scene.robots))]
+
+    def carries(robot: int, hold: Hold) -> bool:
+        both = (bricks.get((hold.robot, number)) for number in (hold.first, hold.last + 1))
+        return all(able[robot][scene.since[brick] - 1] for brick in both if brick is not None)
+
+    return carries

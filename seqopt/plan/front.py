@@ -24,7 +24,7 @@ from seqopt.plan._range import best_front, leaves
 from seqopt.plan._rounding import _rounded_up, _rounding_steps
 from seqopt.plan.calling._guard import called, readable, text
 from seqopt.plan.calling.formulation import Formulation, On, as_formulation
-from seqopt.plan.judge._infeasible import confirmed
+from seqopt.plan.judge._infeasible import confirmed, without_order
 from seqopt.plan.judge._orders import finds_better_order
 from seqopt.plan.judge.schedules import plan_values
 from seqopt.plan.solving import graph_of, states_of
@@ -209,7 +209,7 @@ class _OrderFront(_StateFront):
         if found.rise():
             return found
         if finds_better_order(self._orders, np.inf) is False:
-            raise InfeasibleError("pareto: no order of the bricks has a plan; relax a limit")
+            raise without_order(self._orders, "pareto")
         raise SolverError("pareto: the search found no plan in any order, and that is not proven")
 
     def _plan(self, found: Sequence[tuple[int, Key, Ints]]) -> _Ordered:

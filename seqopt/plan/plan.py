@@ -31,7 +31,7 @@ from seqopt.plan.calling.formulation import (
     Reads,
     Selection,
 )
-from seqopt.plan.judge.certificate import TOLERANCE, Certificate
+from seqopt.plan.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.problem.problem import Aim, Problem, judged_by
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Excess, _said_limits, overloads
 from seqopt.problem.standing import Standing
@@ -226,7 +226,7 @@ class Plan(ShownBuild):
         early = isinstance(self.selection, StatePath) and self.selection.stopped
         if self.certificate is None or (early and not isfinite(self.certificate.gap)):
             return None
-        return self.certificate.gap
+        return _known_gap(self.certificate.gap)
 
     @property
     def ended(self) -> End:
@@ -297,8 +297,9 @@ class Plan(ShownBuild):
         if self.certificate is None:
             return "not compared with the optimum"
         among = self.among if isinstance(self.graph, Layers | ScenarioLayers) else ""
-        gap = f"heuristic: {among}" if among else f"gap {100 * self.certificate.gap:.3g} %"
-        return f"objective {self.certificate.objective:.6g}, {gap}"
+        gap = f"gap {100 * _known_gap(self.certificate.gap):.3g} %"
+        proven = f"heuristic: {among}" if among else gap
+        return f"objective {self.certificate.objective:.6g}, {proven}"
 
     @property
     def choice(self) -> tuple[int, ...]:
@@ -472,7 +473,7 @@ def _summarized(plan: Plan) -> dict[str, object]:
         "objective": plan.objective,
         "bound": _bounds(plan),
         "gap": plan.gap,
-        "claimed_gap": None if proof is None or plan.gap is None else proof.claimed_gap,
+        "claimed_gap": None if proof is None or plan.gap is None else _known_gap(proof.claimed_gap),
         **plan.objectives(),
         "budgets": _spent(plan),
         "steps": len(plan.steps),
@@ -568,7 +569,9 @@ def _letting_go(plan: Plan) -> int:
     for step in reversed(plan.steps):
         props = plan.engine.network.scene.standing_props(step.bricks, held=bool(step.held))
         grips = len(step.held) + len(props)
-        if step.kind is not StepKind.RELEASE or grips >= rules.least_grips:
+        if step.kind is not StepKind.RELEASE or grips >= rules.fewest_grips(
+            plan.engine.network.scene
+        ):
             break
         count += 1
     return count

@@ -28,10 +28,12 @@ from seqopt.responses.quantities import (
     length_text,
     robot_response,
 )
-from seqopt.responses.table import _Columns, analyze, force_column
+from seqopt.responses.table import _Columns, _steps_in_table, analyze, force_column
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
+from seqopt.sequence._carrying import carried, loads
 from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.steps import AnyStep
 from seqopt.sequence.two_robots import METHODS
 
 LEVEL = 1e-9  # heights this close, over the height of the structure, are equal
@@ -418,6 +420,7 @@ class Excess:
     steps: tuple[int, ...]  # their numbers
     largest: float  # value in them, SI units
     robot: str = ""  # whose payload it is; empty for other limits
+    brick: int | None = None  # the heaviest that it places or takes away by itself, in these steps
 
     def __str__(self) -> str:
         bound, where = self.limit.bound, _steps_in_words(self.steps)
@@ -429,8 +432,10 @@ class Excess:
         if not self.robot:
             most, bound = self.limit.shown(self.largest), self.limit.shown(bound)
             return f"{self.limit.label} is up to {most:.6g} of {bound:.6g} ({where})"
+        does = "holds" if self.brick is None else "carries"
+        what = "" if self.brick is None else f" (brick {self.brick})"
         return (
-            f"{self.robot} holds up to {self.largest:.1f} N, more than its payload of "
+            f"{self.robot} {does} up to {self.largest:.1f} N{what}, more than its payload of "
             f"{bound:g} N ({where})"
         )
 
@@ -451,10 +456,28 @@ def _excesses(scene: Scene, table: _Columns, limits: Sequence[Limit]) -> tuple[E
 
 
 def overloads(scene: Scene, table: _Columns) -> tuple[Excess, ...]:
-    """Return the payloads that steps exceed, in the order of the robots; see `_excesses`."""
+    """Return the payloads that steps exceed: by grips, then by bricks that one robot carries.
+
+    ``table``: of `seqopt.analyze`. Result: each in the order of the robots.
+    """
     names = {robot_response(robot.name): robot.name for robot in scene.robots}
     found = _excesses(scene, table, payload_limits(scene))
-    return tuple(replace(excess, robot=names[excess.limit.response]) for excess in found)
+    held = tuple(replace(excess, robot=names[excess.limit.response]) for excess in found)
+    return (*held, *_carrying_excesses(scene, _steps_in_table(scene, table)))
+
+
+def _carrying_excesses(scene: Scene, steps: Sequence[AnyStep]) -> tuple[Excess, ...]:
+    """Return who carries bricks that are heavier than its payload, in the order of the robots."""
+    out, every = [], [*carried(scene, steps)]
+    for r, (robot, limit) in enumerate(zip(scene.robots, payload_limits(scene), strict=True)):
+        own, load = [each for each in every if each.robot == r], loads(scene, robot)
+        weighed = [(float(load[scene.since[each.brick] - 1]), each) for each in own]
+        over = [(load, each) for load, each in weighed if limit.exceeded(np.array(load))]
+        if over:
+            numbers = tuple(sorted(each.step for _, each in over))
+            most, worst = max(over)
+            out.append(Excess(limit, numbers, most, robot.name, worst.brick))
+    return tuple(out)
 
 
 def _prop_faults(scene: Scene, table: _Columns) -> tuple[Excess, ...]:

@@ -5,16 +5,17 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Iterator, Sequence
+from operator import itemgetter
 
 import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats
 from seqopt.problem.criteria import RankSum
-from seqopt.problem.requirements import Criterion, _prop_faults, _response_along, overloads
+from seqopt.problem.requirements import Criterion, Excess, _prop_faults, _response_along, overloads
 from seqopt.report.comparison import LARGEST, Comparison, LoopFacts
-from seqopt.responses.quantities import RESPONSES, length_text
-from seqopt.responses.table import OUTSIDE, Departure, force_column
+from seqopt.responses.quantities import RESPONSES, _plain, length_text, robot_response
+from seqopt.responses.table import OUTSIDE, Departure, _Columns, force_column
 from seqopt.scene.scene import Scene
 from seqopt.stability._builds import BuildVerdicts
 from seqopt.stability.assessment import Verdict
@@ -38,6 +39,20 @@ def _payload_shares(scene: Scene, table: pd.DataFrame) -> Floats:
     forces = table[[force_column(robot) for robot in scene.robots]].to_numpy(float)
     payloads = np.array([robot.payload for robot in scene.robots])
     return np.asarray(np.nan_to_num(np.abs(forces)) / payloads)
+
+
+def _headline(scene: Scene, table: _Columns) -> str:
+    """Return how much a robot holds and a node moves at most in a build, to three digits.
+
+    ``table``: of `seqopt.analyze`. The share is that of the payload of the robot that holds most.
+    """
+    along = [_response_along(scene, table, robot_response(robot.name)) for robot in scene.robots]
+    forces = [float(np.nanmax(each, initial=0.0)) for each in along]
+    force, robot = max(zip(forces, scene.robots, strict=True), key=itemgetter(0))
+    moved = float(np.nanmax(_response_along(scene, table, "D_max"), initial=0.0))
+    share = _plain(100 * force / robot.payload, 3)
+    said = f"largest force {_plain(force, 3)} N ({share} % of payload)"
+    return f"{said}, displacement {length_text(float(f'{moved:.3g}'))}"
 
 
 def _worst_along(
@@ -118,11 +133,18 @@ def _overloaded(scene: Scene, table: pd.DataFrame) -> list[str]:
         where = f"{len(steps):,} of {len(table):,} steps"
         out.append(
             f"payload exceeded in {where}, first in step {steps[0]} ({_robot_words(worst.robot)} "
-            f"would hold up to {worst.largest:,.0f} N and can hold {worst.limit.bound:,.4g} N)"
+            f"would {_borne(worst)} and can hold {worst.limit.bound:,.4g} N)"
         )
     for excess in _prop_faults(scene, table):
         out.append(f"a prop bears more than it may in {len(excess.steps):,} steps")
     return out
+
+
+def _borne(excess: Excess) -> str:
+    """Return what a robot would hold, or which brick it would carry by itself, in words."""
+    if excess.brick is None:
+        return f"hold up to {excess.largest:,.0f} N"
+    return f"carry {excess.largest:,.0f} N (brick {excess.brick})"
 
 
 def _carried(scene: Scene, table: pd.DataFrame) -> list[str]:

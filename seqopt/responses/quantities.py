@@ -6,6 +6,7 @@ needs. Sizes of grip forces are functions of their own, since there is one per r
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -39,6 +40,27 @@ def length_text(length: float) -> str:
         if abs(length) >= 0.9999 * size:
             return f"{length / size:.4g} {unit}"
     return f"{length * 1e3:.4g} mm"
+
+
+def _payload_text(force: float) -> str:
+    """Return a payload that is enough for a force: whole newtons, three digits at most, rounded up.
+
+    >>> _payload_text(211.9), _payload_text(12_345.0), _payload_text(212.0)
+    ('212', '12400', '212')
+    """
+    return f"{_rounded_up(force, 1.0):.10g}"
+
+
+def _rounded_up(value: float, unit: float = 0.0) -> float:
+    """Return the next number that has three digits, or is whole in a larger unit; from zero on.
+
+    >>> _rounded_up(0.45678), _rounded_up(57.2, 1.0), _rounded_up(57.0)
+    (0.457, 58.0, 57.0)
+    """
+    if not value > 0 or math.isinf(value):
+        return value
+    step = max(unit, 10.0 ** (math.floor(math.log10(value)) - 2))
+    return float(f"{math.ceil(value / step - 1e-9) * step:.12g}")
 
 
 def _plain(value: float, digits: int) -> str:

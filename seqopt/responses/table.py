@@ -37,7 +37,7 @@ from seqopt.responses.quantities import (
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import holds
-from seqopt.sequence.steps import Step, require_steps
+from seqopt.sequence.steps import Step, StepKind, require_steps
 
 _MEASURED = Want.BRICKS | Want.JOINTS | Want.SCREEN  # limits are no sharper than six digits
 _TURN = 0.1  # rad; sine and angle differ by 0.2 %, cosine and one by 0.5 %
@@ -285,6 +285,13 @@ def held_in_table(scene: Scene, table: _Columns) -> list[_Held]:
         scene.grip_numbers([_node(n) for n in row], b) for row, b in zip(nodes, bricks, strict=True)
     )
     return [*zip(map(int, table["step"]), bricks, held, strict=True)]
+
+
+def _steps_in_table(scene: Scene, table: _Columns) -> list[Step]:
+    """Return the steps of a table of `analyze`."""
+    nodes = zip(*(table[f"{robot.name}_node"] for robot in scene.robots), strict=True)
+    rows = zip(table["step"], table["type"], table["bricks"], nodes, strict=True)
+    return [Step(int(n), StepKind(k), int(b), tuple(map(_node, own))) for n, k, b, own in rows]
 
 
 def force_column(robot: Robot) -> str:

@@ -84,6 +84,8 @@ class Arm(Terse):
         checked too, at a few points; with 0, the default, only where it holds.
     keeps_apart : bool
         Whether it must not touch other arms that keep apart; False for what reach alone allows.
+    tool_mass : float
+        Of the tool, kg: the robot that places a brick, or takes it away, carries both.
     joint_stiffness : tuple of float
         Of every joint, N m/rad; N/m if it slides; empty for joints that do not give way. Where it
         is given, an arm holds each node in one posture, which makes its grip as stiff as it is.
@@ -111,6 +113,7 @@ class Arm(Terse):
     postures: int = MOST
     approach: float = 0.0
     keeps_apart: bool = True
+    tool_mass: float = 0.0
     joint_stiffness: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
@@ -122,7 +125,7 @@ class Arm(Terse):
             "fingers": not_negative,
             "approach": not_negative,
         }
-        check(self, "arm", **lengths, joint_stiffness=_stiffnesses)
+        check(self, "arm", **lengths, tool_mass=not_negative, joint_stiffness=_stiffnesses)
         settle(self, keeps_apart=kind_of("arm: keeps_apart", self.keeps_apart, bool))
         settle(self, postures=whole_between("arm: postures", self.postures, 1, MOST))
         if not self.fingers < self.tool_length:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -14,18 +14,20 @@ from seqopt.arrays import Bools, FrozenValue
 from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.scene.parts import Robot
+from seqopt.scene.scene import Scene
+from seqopt.sequence._carrying import can_carry
 from seqopt.sequence.rules import FreeRules, Newest, Payload
 from seqopt.sequence.two_robots import placing_node
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RobotKind(FrozenValue):
-    """Robots that reach the same nodes, may carry as much, and may place or not."""
+    """Robots that reach the same nodes, may carry as much, and may place the same bricks."""
 
     robots: tuple[int, ...]  # indices of the scene's robots
     reach: Bools  # (2B,); nodes that they may hold, as in ``network.inner.ravel()``
     newest: Bools  # (2B,); at which they hold a brick when they place it, and as the newest
-    places: bool  # whether they may place
+    places: Bools  # (B,); bricks in build order that they may place or take away: they carry them
     cap: float  # largest force of a grip, N
 
 
@@ -35,24 +37,26 @@ def sort_robots(
     caps: Mapping[str, float] | None = None,
     *,
     timed: bool = False,
+    worlds: Sequence[Scene] = (),
 ) -> tuple[RobotKind, ...]:
     """Return the robots that take part, by kind, in the order of their first robots.
 
     ``caps``: largest force of a robot's grip beside its payload, by its name, N; ``timed``: whether
-    those of a kind must take as long.
+    those of a kind must take as long; ``worlds``: scenes of scenarios, in which bricks weigh more.
     """
-    scene = network.scene
+    scene, kept = network.scene, rules.payload is Payload.KEPT
     alike: dict[tuple[object, ...], RobotKind] = {}
     for i in rules.team(scene):
         robot = scene.robots[i]
         own = {*chain.from_iterable(within_reach(scene, robot))}
         reach = np.array([node in own for node in node_numbers(network)])
         newest = reach if rules.newest is not Newest.PLACING else _placing(network, robot, reach)
-        places = not rules.placers or robot.name in rules.placers
-        cap = robot.payload if rules.payload is Payload.KEPT else np.inf
+        places = can_carry((scene, *worlds), i) if kept else np.ones(len(scene.placed), dtype=bool)
+        places &= not rules.placers or robot.name in rules.placers
+        cap = robot.payload if kept else np.inf
         cap = min(cap, (caps or {}).get(robot.name, np.inf))
         alone = (robot.arm and robot.name, scene.grip_kinds.of_robot[i], timed and robot.durations)
-        key = (reach.tobytes(), newest.tobytes(), places, cap, *alone)
+        key = (reach.tobytes(), newest.tobytes(), places.tobytes(), cap, *alone)
         first = alike.setdefault(key, RobotKind((), reach, newest, places, cap))
         alike[key] = replace(first, robots=(*first.robots, i))
     return tuple(alike.values())

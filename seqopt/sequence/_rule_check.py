@@ -9,22 +9,79 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import hypot
 
 from seqopt.arms._permits import reachable
 from seqopt.errors import StepError
 from seqopt.network.network import Network
-from seqopt.sequence.rules import Ending, FreeRules, Newest
-from seqopt.sequence.schedule import islands
-from seqopt.sequence.steps import Grips, Step, StepKind
+from seqopt.scene.scene import Scene
+from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload
+from seqopt.sequence.schedule import Schedule, islands
+from seqopt.sequence.site import Site
+from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
 from seqopt.sequence.two_robots import placing_node
+
+
+def too_heavy(scenes: Sequence[Scene], place: int, robots: Sequence[int]) -> str:
+    """Return which robots cannot bear a brick and their tool by themselves in a scene; or nothing.
+
+    ``place``: of the brick in build order, from 0, or from the end.
+    """
+    for scene in scenes:
+        brick, pull = scene.placed[place], hypot(*scene.gravity) * scene.weight_factor
+        weak = []
+        for robot in (scene.robots[r] for r in robots):
+            tool = 0.0 if robot.arm is None else robot.arm.tool_mass * pull
+            if brick.mass * pull + tool > robot.payload * (1 + 1e-9):
+                beside = f", its tool weighs {tool:.1f} N" if tool else ""
+                weak.append(f"{robot.name} ({robot.payload:g} N{beside})")
+        if weak:
+            weight = f"brick {brick.name} weighs {brick.mass * pull:.1f} N"
+            return f"{weight}, more than the payload of {', '.join(weak)}"
+    return ""
+
+
+def unbearable(
+    scenes: Sequence[Scene], steps: Sequence[AnyStep], begin: Site | None
+) -> dict[int, str]:
+    """Return in which steps who carries a brick cannot bear it in some scene: why, by number.
+
+    ``steps``: checked, some of their grips perhaps open; ``begin``: where they begin.
+    """
+    out: dict[int, str] = {}
+    before: tuple[object, ...] = (None,) * len(scenes[0].robots)
+    before = before if begin is None else begin.holds(scenes[0])
+    for step in steps:
+        moves = {StepKind.PLACE: -1, StepKind.REMOVE: 0}  # where the brick is among those placed
+        changed = [
+            r for r, pair in enumerate(zip(before, step.grips, strict=True)) if len({*pair}) > 1
+        ]
+        if step.kind in moves and (
+            why := too_heavy(scenes, step.bricks + moves[step.kind], changed)
+        ):
+            out[step.number] = why
+        before = step.grips
+    return out
+
+
+def check_carried(
+    scene: Scene, schedule: Schedule, steps: Sequence[Step], worlds: tuple[Scene, ...] = ()
+) -> None:
+    """Require that robots bear the bricks that they place or take away, in scenarios as well."""
+    for number, why in unbearable((scene, *worlds), steps, schedule.begin).items():
+        raise StepError(f"step {number}: {why}")
 
 
 @dataclass(frozen=True)
 class RuleBook:
-    """The rules of a free schedule in a scene."""
+    """The rules of a free schedule in a scene.
+
+    ``worlds``: the scenes of scenarios, in which bricks weigh more.
+    """
 
     network: Network
     rules: FreeRules
+    worlds: tuple[Scene, ...] = ()
 
     @cached_property
     def team(self) -> tuple[int, ...]:
@@ -70,6 +127,20 @@ class RuleBook:
                 out[r, b] = nodes
         return out
 
+    def named(self, robot: int) -> bool:
+        """Return whether a robot is one of those that may place or take away bricks."""
+        return not self.rules.placers or self.network.scene.robots[robot].name in self.rules.placers
+
+    def too_heavy(self, bricks: int, robots: Sequence[int]) -> str:
+        """Return which robots cannot bear the newest brick in a scenario, in words; or nothing."""
+        if self.rules.payload is Payload.IGNORED:
+            return ""
+        return too_heavy((self.network.scene, *self.worlds), bricks - 1, robots)
+
+    def places(self, robot: int, bricks: int) -> bool:
+        """Return whether a robot may place the newest brick, or take it away."""
+        return self.named(robot) and not self.too_heavy(bricks, (robot,))
+
     @cached_property
     def _islands(self) -> dict[int, tuple[frozenset[int], ...]]:
         counts = range(1, len(self.network.scene.placed) + 1)
@@ -85,8 +156,8 @@ class RuleBook:
             stand.clear()  # props are struck
         propped = [n for p in scene.props if (n := scene.brick_of_node[p.node].name) in stand]
         held = [scene.brick_of_node[node].name for node in grips if node is not None] + propped
-        if bricks > 1 and len(held) < self.rules.least_grips:
-            return f"{len(held)} grips, fewer than least_grips={self.rules.least_grips}"
+        if bricks > 1 and len(held) < (least := self.rules.fewest_grips(scene)):
+            return f"{len(held)} grips, fewer than least_grips={least}"
         on = any(grips[r] in self.newest_nodes[r, bricks] for r in self.team)
         on |= bricks > 0 and scene.placed[bricks - 1].name in propped
         if not on and self.rules.newest is not Newest.FREE:
@@ -138,10 +209,9 @@ class RuleBook:
 
     def _placed(self, bricks: int, grips: Grips) -> Iterator[Grips]:
         """Yield the grips after the next brick is placed."""
-        names = [robot.name for robot in self.network.scene.robots]
         for robot in self.team:
-            able = not self.rules.placers or names[robot] in self.rules.placers
-            for node in self.newest_nodes[robot, bricks] if able and grips[robot] is None else ():
+            able = grips[robot] is None and self.places(robot, bricks)
+            for node in self.newest_nodes[robot, bricks] if able else ():
                 after = _with(grips, robot, node)
                 if not self.fault(bricks, after):
                     yield after
@@ -154,8 +224,8 @@ class RuleBook:
         if len(holders) != 1:
             return
         robot = holders[0]
-        able = not self.rules.placers or scene.robots[robot].name in self.rules.placers
         after = _with(grips, robot, None)
+        able = self.places(robot, bricks)
         allowed = able and grips[robot] in self.newest_nodes[robot, bricks]
         if allowed and not self.fault(bricks - 1, after):
             yield after
@@ -181,11 +251,17 @@ class RuleBook:
         }
 
 
-def check_free(network: Network, rules: FreeRules, steps: Sequence[Step]) -> None:
-    """Require that a checked sequence keeps the rules of a free schedule, payloads aside."""
-    book = RuleBook(network, rules)
-    state = book.start
+def check_free(
+    network: Network, rules: FreeRules, steps: Sequence[Step], worlds: tuple[Scene, ...] = ()
+) -> None:
+    """Require that a checked sequence keeps the rules of a free schedule, forces of grips aside."""
+    book = RuleBook(network, rules, worlds)
+    state, heavy = book.start, dict[int, str]()
+    if rules.payload is Payload.KEPT:
+        heavy = unbearable((network.scene, *worlds), steps, rules.begun(network.scene).begin)
     for step in steps:
+        if step.number in heavy:
+            raise StepError(f"step {step.number} ({step.kind.value}): {heavy[step.number]}")
         found = [
             (bricks, grips, regrips)
             for kind, bricks, grips, regrips in book.follow(*state)

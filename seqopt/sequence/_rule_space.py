@@ -22,6 +22,7 @@ from seqopt.arms._permits import Permits, permits
 from seqopt.arrays import Bools, Floats, Ints, Terse, frozen
 from seqopt.errors import StepError
 from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
 from seqopt.sequence._robot_kinds import RobotKind, node_numbers, sort_robots
 from seqopt.sequence.rules import Ending, FreeRules, Newest
 from seqopt.sequence.schedule import islands
@@ -206,7 +207,7 @@ class FreeSpace(StateRows):
     def places(self, bricks: int, states: Ints) -> Moves:
         """Return the moves that place the next brick; a free robot then holds it."""
         nodes = np.array([2 * bricks, 2 * bricks + 1])
-        moves = self._takes(states, [nodes[k.newest[nodes] & k.places] for k in self.kinds])
+        moves = self._takes(states, [nodes[k.newest[nodes] & k.places[bricks]] for k in self.kinds])
         moves.states[:, self.robots :] = 0
         return self._lawful_only(bricks + 1, moves)
 
@@ -253,7 +254,7 @@ class FreeSpace(StateRows):
     def _lawful(self, bricks: int, states: Ints, propped: Sequence[int]) -> Bools:
         """Return the same with props at bricks, by place in build order from 0."""
         held = states[:, : self.robots]
-        least = self.rules.least_grips - len(propped) if bricks > 1 else 0
+        least = self.rules.fewest_grips(self.network.scene) - len(propped) if bricks > 1 else 0
         ok = np.asarray(self.grips(states) >= least)
         if self.rules.newest is not Newest.FREE and bricks - 1 not in propped:
             nodes = 2 * bricks + np.array([-1, 0])
@@ -392,7 +393,7 @@ class _TakeDownSpace(FreeSpace):
         on = (states[:, : self.robots].astype(np.int64) + 1) // 2 == bricks
         alone, parts = on.sum(axis=1) == 1, [Moves(np.zeros(0, np.int64), states[:0], np.zeros(0))]
         for kind, (first, end) in zip(self.kinds, self.slots, strict=True):
-            for slot in range(first, end) if kind.places else ():
+            for slot in range(first, end) if kind.places[bricks - 1] else ():
                 rows = np.flatnonzero(alone & on[:, slot])
                 rows = rows[kind.newest[states[rows, slot].astype(np.int64) - 1]]
                 new = states[rows]
@@ -411,12 +412,13 @@ def free_space(
     *,
     parks: bool = False,
     timed: bool = False,
+    worlds: Sequence[Scene] = (),
 ) -> FreeSpace:
     """Return the states of a free schedule in a scene.
 
     ``caps``: largest force of a robot's grip beside its payload, by its name, N; ``parks``: whether
     free robots stay where they were, for their travel; ``timed``: whether it counts how long robots
-    take.
+    take; ``worlds``: scenes of scenarios, in which robots must carry their bricks as well.
 
     >>> import seqopt
     >>> network = seqopt.build_network(seqopt.load_scene("arch25"))
@@ -424,7 +426,8 @@ def free_space(
     >>> space.places(0, space.start()).states.tolist()  # node 0 of its first brick is blocked
     [[2, 0, 0], [0, 2, 0], [0, 0, 2]]
     """
-    kinds, rules = sort_robots(network, rules, caps, timed=timed), rules.begun(network.scene)
+    kinds = sort_robots(network, rules, caps, timed=timed, worlds=worlds)
+    rules = rules.begun(network.scene)
     space = (_TakeDownSpace if rules.takes_down else FreeSpace)(network, rules, kinds, parks)
     base = 1 + (2 if parks else 1) * 2 * len(network.inner)
     if base**space.robots * (1 + (rules.regrips or 0)) >= 2**62:

@@ -17,6 +17,8 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import StepError
 from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
+from seqopt.sequence._carrying import can_carry, carried
 from seqopt.sequence._robot_kinds import RobotKind, node_numbers
 from seqopt.sequence._rule_space import Moves, StateRows
 from seqopt.sequence.schedule import OpenGrip, Schedule
@@ -32,6 +34,7 @@ class ScheduleSpace(StateRows):
     schedule: Schedule
     caps: Mapping[str, float]  # largest forces of robots' grips, by their names, N
     parks: bool = False  # free robots stay where they were, for their travel
+    worlds: tuple[Scene, ...] = ()  # of scenarios, in which robots must carry their bricks as well
 
     def __post_init__(self) -> None:
         base = 1 + (2 if self.parks else 1) * 2 * len(self.network.inner)
@@ -74,10 +77,19 @@ class ScheduleSpace(StateRows):
     def kinds(self) -> tuple[RobotKind, ...]:  # type: ignore[override]  # no field here
         """Every robot by itself: of a schedule none could change places."""
         every = np.ones(2 * len(self.network.inner), dtype=bool)
+        carries = every[: len(self.network.inner)]  # each step says by itself who carries which
         return tuple(
-            RobotKind((i,), every, every, places=True, cap=self.caps.get(robot.name, np.inf))
+            RobotKind((i,), every, every, carries, self.caps.get(robot.name, np.inf))
             for i, robot in enumerate(self.network.scene.robots)
         )
+
+    @cached_property
+    def _too_heavy(self) -> frozenset[int]:
+        """Numbers of the steps in which a robot carries a brick that its payload does not allow."""
+        scene = self.network.scene
+        able = [can_carry((scene, *self.worlds), robot) for robot in range(self.robots)]
+        every = carried(scene, (self._begin, *self.schedule.steps))
+        return frozenset(c.step for c in every if not able[c.robot][scene.since[c.brick] - 1])
 
     def start(self) -> Ints:
         """Return the one state before the first step, (1, robots) int."""
@@ -111,7 +123,7 @@ class ScheduleSpace(StateRows):
             after[:, robot] = np.tile(places.ravel(), len(states))
         held = self.held(after)
         kept = ~((held[:, 1:] == held[:, :-1]) & (held[:, 1:] > 0)).any(axis=1)  # a node each
-        kept &= self.for_arms(step.bricks, after)
+        kept &= self.for_arms(step.bricks, after) & (step.number not in self._too_heavy)
         source, after = source[kept], after[kept]
         way = self._ways(states[source], after) if self.parks else np.zeros(len(source))
         return ((Moves(source, after, way), step.kind is StepKind.REPOSITION),)

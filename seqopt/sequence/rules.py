@@ -16,7 +16,7 @@ from seqopt.sequence.schedule import Near
 from seqopt.sequence.site import Site
 
 FREE = "free"  # the schedule that is no list of steps
-_MOST_ROBOTS = 5
+MOST_ROBOTS = 5
 
 
 class Newest(Enum):
@@ -59,12 +59,14 @@ class FreeRules:
         Names of the robots that take part, one to five; by default all of the scene.
     placers : tuple of str
         Names of the robots that may place a brick; by default all that take part.
-    least_grips : int
-        Least number of nodes held, from the second brick on, by robots and props together.
+    least_grips : int or None
+        Least number of nodes held, from the second brick on, by robots and props together; by
+        default 2, or all robots that take part but one, if those are fewer: it places the next.
     newest : Newest or str
         Where the newest brick is held, unless a prop holds it.
     payload : Payload or str
-        Whether payloads are kept.
+        Whether payloads are kept: by every grip, and by the brick that a robot places or takes
+        away, which it carries by itself, with its tool.
     regrips : int or None
         Most grips taken between two bricks, besides those that place; by default any number.
     ending : Ending or str
@@ -98,7 +100,7 @@ class FreeRules:
 
     robots: tuple[str, ...] = ()
     placers: tuple[str, ...] = ()
-    least_grips: int = 2
+    least_grips: int | None = None
     newest: Newest = Newest.EITHER
     payload: Payload = Payload.KEPT
     regrips: int | None = None
@@ -114,7 +116,7 @@ class FreeRules:
         for name in ("robots", "placers"):
             object.__setattr__(self, name, _names(name, getattr(self, name)))
         for name in ("least_grips", "regrips"):
-            if name == "least_grips" or self.regrips is not None:
+            if getattr(self, name) is not None:
                 object.__setattr__(self, name, _count(name, getattr(self, name)))
         for name in ("begin", "finish"):
             if not isinstance(getattr(self, name), Site | None):
@@ -190,9 +192,9 @@ class FreeRules:
                     f"robot {name!r} does not exist{hint}; give some of {', '.join(known)}"
                 )
         team = {name: i for i, name in enumerate(known) if name in self.robots or not self.robots}
-        if not 1 <= len(team) <= _MOST_ROBOTS:
+        if not 1 <= len(team) <= MOST_ROBOTS:
             raise StepError(
-                f"the free schedule: {len(team)} robots take part; name one to {_MOST_ROBOTS}"
+                f"the free schedule: {len(team)} robots take part; name one to {MOST_ROBOTS}"
             )
         outside = [name for name in self.placers if name not in team]
         if outside:
@@ -200,7 +202,7 @@ class FreeRules:
                 f"rule placers: {outside[0]} takes no part; name some of {', '.join(team)}"
             )
         most = len(team) + len(scene.props)
-        if self.least_grips > most:
+        if self.least_grips is not None and self.least_grips > most:
             beside = f" and {len(scene.props)} props" if scene.props else ""
             raise StepError(
                 f"rule least_grips: {self.least_grips} grips of {len(team)} robots{beside}; "
@@ -208,13 +210,19 @@ class FreeRules:
             )
         return tuple(team.values())
 
+    def fewest_grips(self, scene: Scene) -> int:
+        """Return the least number of nodes held, from the second brick on."""
+        if self.least_grips is not None:
+            return self.least_grips
+        return _usual_grips(len(self.team(scene)))
+
     def described(self, scene: Scene) -> dict[str, object]:
         """Return the rules with their values, ready for JSON. Result: by name."""
         names = [scene.robots[i].name for i in self.team(scene)]
         return {
             "robots": names,
             "placers": list(self.placers) or names,
-            "least_grips": self.least_grips,
+            "least_grips": self.fewest_grips(scene),
             "newest": self.newest.value,
             "payload": self.payload.value,
             "regrips": "any" if self.regrips is None else self.regrips,
@@ -228,9 +236,9 @@ class FreeRules:
             },
         }
 
-    def loosened(self) -> Iterator[tuple[str, FreeRules]]:
+    def loosened(self, scene: Scene) -> Iterator[tuple[str, FreeRules]]:
         """Yield the rules with one of them loosened, and how a user says so."""
-        for least in range(self.least_grips - 1, -1, -1):
+        for least in range(self.fewest_grips(scene) - 1, -1, -1):
             yield f"least_grips={least}", replace(self, least_grips=least)
         if self.newest is Newest.PLACING:
             yield "newest=either", replace(self, newest=Newest.EITHER)
@@ -259,6 +267,15 @@ _LOOSEST = (
 )  # rules that are loosened as a whole, and how a user says so
 
 
+def _usual_grips(robots: int) -> int:
+    """Return how many nodes are held at least by default: two, while one robot is free to place.
+
+    >>> [_usual_grips(robots) for robots in (1, 2, 3, 4)]
+    [0, 1, 2, 2]
+    """
+    return max(0, min(2, robots - 1))
+
+
 def with_robots(scene: Scene, count: int) -> Scene:
     """Return a scene with one to five robots: its own first, then mobile ones.
 
@@ -269,12 +286,12 @@ def with_robots(scene: Scene, count: int) -> Scene:
     >>> [robot.name for robot in with_robots(seqopt.load_scene("arch25"), 4).robots]
     ['rob1', 'rob2', 'rob3', 'rob4']
     """
-    if not isinstance(count, Integral) or not 1 <= count <= _MOST_ROBOTS:
-        raise StepError(f"{short(count)} robots: the free schedule takes one to {_MOST_ROBOTS}")
+    if not isinstance(count, Integral) or not 1 <= count <= MOST_ROBOTS:
+        raise StepError(f"{short(count)} robots: the free schedule takes one to {MOST_ROBOTS}")
     robots = list(scene.robots[:count])
     names = {robot.name for robot in robots}
     payload = max((robot.payload for robot in scene.robots), default=float("nan"))
-    fresh = (f"rob{i}" for i in range(1, 2 * _MOST_ROBOTS + 1) if f"rob{i}" not in names)
+    fresh = (f"rob{i}" for i in range(1, 2 * MOST_ROBOTS + 1) if f"rob{i}" not in names)
     ways = [(robot.stiffness, robot.rotational_stiffness) for robot in scene.robots[:1]]
     shift, turn = ways[0] if ways else (None, None)
     more = partial(Robot, payload=payload, stiffness=shift, rotational_stiffness=turn)

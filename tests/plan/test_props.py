@@ -97,7 +97,7 @@ def test_the_tested_builds_need_props():
 
 def test_no_props_of_any_number_help_a_robot_too_weak():
     scene = weak(3, 1.0)
-    with pytest.raises(InfeasibleError, match="none of 4 sets of up to 2 props allows a plan"):
+    with pytest.raises(InfeasibleError, match=r"none of 4 sets .* brick 1 weighs 35\.9 N, more"):
         fewest_props(posed(scene), [Prop(node=3), Prop(node=4)], seqopt.solve)
 
 

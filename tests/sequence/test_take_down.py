@@ -42,7 +42,7 @@ def small_wall():
 
 def lawful(scene, rules, bricks, grips):
     held = {n for n in grips if n is not None}
-    enough = len(held) >= (rules.least_grips if bricks > 1 else 0)
+    enough = len(held) >= (rules.fewest_grips(scene) if bricks > 1 else 0)
     return bricks == 0 or (enough and bool(held & {*scene.placed[bricks - 1].nodes}))
 
 

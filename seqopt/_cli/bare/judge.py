@@ -13,7 +13,7 @@ from seqopt.errors import SolverError
 from seqopt.graph.instances._files import read_instance
 from seqopt.graph.instances.instance import Instance
 from seqopt.plan.judge._bare._judging import judge_instance
-from seqopt.plan.judge.certificate import TOLERANCE, Certificate
+from seqopt.plan.judge.certificate import TOLERANCE, Certificate, _known_gap
 
 DESCRIPTION = (
     "Check a path through an instance, and bounds on all others, with arithmetic alone. No scene "
@@ -63,8 +63,8 @@ def run(options: argparse.Namespace) -> Answer:
         "holds": True,
         "values": dict(zip(names, proof.values, strict=True)),
         "bounds": dict(zip(names, proof.bounds, strict=True)),
-        "gap": proof.gap,
-        "claimed_gap": proof.claimed_gap,
+        "gap": _known_gap(proof.gap),
+        "claimed_gap": _known_gap(proof.claimed_gap),
         "spent": dict(proof.spent),
     }
     return Answer(facts=facts, text="\n".join(_said(instance, proof)))
@@ -85,5 +85,5 @@ def _said(instance: Instance, proof: Certificate) -> list[str]:
             said = f"proven: {what}" if left <= TOLERANCE else f"proven {bound:.9g}, {what}"
         lines.append(f"  {goal.name}: {value:.9g}; {said}")
     if proof.claimed_gap < proof.gap - TOLERANCE:
-        lines.append(f"  claimed without proof: gap {100 * proof.claimed_gap:.3g} %")
+        lines.append(f"  claimed without proof: gap {100 * _known_gap(proof.claimed_gap):.3g} %")
     return lines

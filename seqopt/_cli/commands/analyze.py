@@ -45,7 +45,7 @@ from seqopt.engines.registry import provenance
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.problem._limit_words import length_word
-from seqopt.problem.requirements import _prop_faults
+from seqopt.problem.requirements import _prop_faults, overloads
 from seqopt.responses._enough import what_was_enough
 from seqopt.responses._staged import Placing, staged_fields
 from seqopt.responses._tolerance import COLUMN, stiffness_for, with_tolerances
@@ -136,6 +136,7 @@ def run(options: argparse.Namespace) -> Answer:
             *level_notes(engine),
             *within.unchecked,
             *enough.lines,
+            *(f"payload exceeded: {excess}" for excess in overloads(scene, table)),
             *(f"props: {fault}" for fault in _prop_faults(scene, table)),
             *idle_notes(scene, steps),
         ),

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
+from seqopt._cli.asked import asked_scene, asked_steps, carrying_notes, scene_facts
 from seqopt._cli.mapping import MAP, answer_map
 from seqopt._cli.options import (
     BUILT,
@@ -232,7 +232,7 @@ def run(options: argparse.Namespace) -> Answer:
             "steps": table,
         },
         **answer,
-        notes=(went_on,) if rows.taken_up else (),
+        notes=(*((went_on,) if rows.taken_up else ()), *carrying_notes(scene, steps)),
         failures=(f"seqopt: solver failed: {said}",) if len(unsure) else (),
         status=Status.FAILED if len(unsure) else status,
     )

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil, isfinite
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from seqopt._cli.answer import Answer, Status
@@ -20,6 +20,7 @@ from seqopt._cli.asked import (
     in_seconds,
     level_notes,
     refused,
+    rule_notes,
     scene_facts,
     strictly,
     waits_said,
@@ -80,6 +81,7 @@ from seqopt.problem._arms import faults_in_words
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, OWN, overloads
 from seqopt.responses._tolerance import value_text
+from seqopt.responses.quantities import _payload_text
 from seqopt.responses.table import OUTSIDE, _Columns
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule
@@ -308,12 +310,16 @@ def _how(options: argparse.Namespace, formulation: Formulation) -> dict[str, Any
 
 def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...]) -> Answer:
     """Return what a plan is worth, once it is written."""
+    from seqopt.report.text import _headline  # noqa: PLC0415  # where there is a plan
+
     plan = found.plan
     table, scene = plan._columns, plan.engine.network.scene
     stopped = plan.ended is End.INTERRUPTED
     over = () if stopped else exceeded(scene, table)
     enough = _enough_payload(scene, table) if over else ()
-    lines = [f"{_said(found)}; {written_to(options.out)}"]
+    first = f"{OUTSIDE}: " if plan.outside else ""
+    lines = [f"{first}{_headline(scene, table)}; {_value(found)}"]
+    lines += [f"{_search(plan)}; {written_to(options.out)}"]
     lines += map(wrapped, waits_said(plan) if plan.certificate is not None else ())
     lines += [f"stability, {each}" for each in found.own]
     lines += [wrapped(each.said) for each in (found.bases, found.props) if each is not None]
@@ -338,6 +344,7 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
         written=written,
         notes=(
             *_posed_notes(found.asked.problem),
+            *rule_notes(found.asked.problem.moves, scene),
             *arms,
             *(() if stopped else (*plan.enough.lines, f"proof: {_proof(plan)}")),
             *idle_notes(scene, plan.steps),
@@ -362,9 +369,10 @@ def _in_range(answer: Answer, plan: Plan) -> Answer:
 
 def _enough_payload(scene: Scene, table: _Columns) -> tuple[str, ...]:
     """Return which payload of every robot is enough for a plan in which one is exceeded."""
-    least = max((ceil(excess.largest) for excess in overloads(scene, table)), default=None)
+    over = [excess.largest for excess in overloads(scene, table)]
+    least = _payload_text(max(over, default=0.0))
     how = f"--payload {least}, or payload of its robots in the scene file"
-    return () if least is None else (f"payload of {least} N is enough for this plan: {how}",)
+    return (f"payload of {least} N is enough for this plan: {how}",) if over else ()
 
 
 def _time_notes(plan: Plan) -> tuple[str, ...]:
@@ -375,27 +383,28 @@ def _time_notes(plan: Plan) -> tuple[str, ...]:
     return (f"time: {what} takes {plan.makespan:.6g} s; --aim makespan makes it short",)
 
 
-def _said(found: Found) -> str:
-    """Return what a plan is worth, in a line."""
+def _value(found: Found) -> str:
+    """Return what a plan was chosen by, and what is proven of that."""
     plan = found.plan
-    how = f"{plan.formulation.name} ({plan.formulation.kind.value})"
     if plan.order is not None:
         values = ", ".join(f"{name} {value_text(name, v)}" for name, v in plan.objective.items())
-        bound = plan.order.bound_said
-        outside = f"{OUTSIDE}: " if plan.outside else ""
-        return f"{how}: {outside}{values}, {plan.status}, {bound}; {len(plan.steps)} steps"
+        return f"{values}, {plan.status}, {plan.order.bound_said}"
     if found.trial is not None:
         unseen = found.trial.summary()["unseen"]
         return (
-            f"{how}: {plan.result} over {len(found.trial.known)} scenarios ({plan.title}); over "
+            f"{plan._value} over {len(found.trial.known)} scenarios ({plan.title}); over "
             f"unseen ones {unseen['robust']:.6g}, the nominal plan {unseen['nominal']:.6g}"
         )
-    counts = f"{plan.models:,} models"
+    return plan._value
+
+
+def _search(plan: Plan) -> str:
+    """Return which formulation found a plan, what it is, and how many models that took."""
+    counts = [f"{len(plan.steps)} steps"]
     if isinstance(plan.graph, States):
-        regrips = f"{plan.regrips} regrip{'s' * (plan.regrips != 1)}"
-        counts = f"{len(plan.steps)} steps, {regrips}, {counts}"
-        return f"{how}: {plan.result}; {counts}"
-    return f"{how}: {plan.result}, {counts}"
+        counts.append(f"{plan.regrips} regrip{'s' * (plan.regrips != 1)}")
+    counts += [] if plan.order is not None else [f"{plan.models:,} models"]
+    return f"{plan.formulation.name} ({plan.formulation.kind.value}): {', '.join(counts)}"
 
 
 def _posed_notes(problem: Problem) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.asked import asked_prover, level_notes, marked, refused, scene_facts
+from seqopt._cli.asked import asked_prover, level_notes, marked, refused, rule_notes, scene_facts
 from seqopt._cli.options import (
     BEST,
     BUILT,
@@ -164,7 +164,12 @@ def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Ans
         },
         text=f"{shown}{said}; {written_to(options.out)}",
         written=written,
-        notes=(*level_notes(free.engine), *refused(next(iter(provers.values()))), *missing),
+        notes=(
+            *level_notes(free.engine),
+            *rule_notes(free.rules, scene),
+            *refused(next(iter(provers.values()))),
+            *missing,
+        ),
     )
     answer = marked(answer, left)
     if not front.beyond:

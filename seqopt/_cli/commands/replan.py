@@ -45,7 +45,7 @@ from seqopt.scene.scenarios import as_built
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
 from seqopt.sequence._parts import SAME, read_measured
-from seqopt.sequence.rules import FREE, with_robots
+from seqopt.sequence.rules import FREE, _usual_grips, with_robots
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.study.published import CRITERIA
 
@@ -174,6 +174,8 @@ def _told(folder: Path) -> dict[str, Any]:
     if not isinstance(told, dict) or told.get("schedule") != FREE:
         return {}
     rules, limits = (_texts(told.get(name)) for name in ("rules", "limits"))
+    if rules.get("least_grips") == _usual_of(told.get("rules")):
+        del rules["least_grips"]  # of fewer robots it may be another
     names = ("least_grips", "newest", "payload", "regrips", "ending", "candidates")
     criterion, aims = told.get("criterion"), told.get("aims")
     return {
@@ -187,6 +189,12 @@ def _told(folder: Path) -> dict[str, Any]:
             if name != PROP_EXCESS  # which the scene says
         ],
     }
+
+
+def _usual_of(rules: object) -> str:
+    """Return how many nodes as many robots as took part hold at least by default."""
+    team = rules.get("robots") if isinstance(rules, dict) else None
+    return str(_usual_grips(len(team))) if isinstance(team, list) else ""
 
 
 def _texts(told: object) -> dict[str, str]:

@@ -12,6 +12,7 @@ from seqopt._cli.asked import (
     arm_notes,
     asked_scene,
     asked_steps,
+    carrying_notes,
     exceeded,
     idle_notes,
     in_seconds,
@@ -136,6 +137,7 @@ def run(options: argparse.Namespace) -> Answer:
         text="\n".join(map(wrapped, lines)),
         written=written,
         notes=(
+            *carrying_notes(scene, build.steps),
             *idle_notes(scene, build.steps),
             *(f"arms: {each}" for each in cannot),
             *(figure_notes() if written else ()),

@@ -107,7 +107,7 @@ class LayeredCosts(FrozenValue):
                 raise InfeasibleError(
                     f"move {k}: none of its {len(single)} candidates is allowed after any choice "
                     "before it; relax a limit or widen a reach (--aim F_largest without "
-                    "limits finds the least payload)"
+                    "limits finds the least that robots must hold)"
                 )
         good = [np.isfinite(self.single[-1])]
         for single, shared in zip(self.single[-2::-1], self.shared[:0:-1], strict=True):

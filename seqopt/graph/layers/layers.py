@@ -23,19 +23,23 @@ from seqopt.problem.criteria import Among, Ranked, RankSum
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import (
     Criterion,
+    Excess,
     Limit,
     ResponsesAsked,
     SceneFacts,
+    _carrying_excesses,
     _excesses,
     _step_limits,
     robots_of,
 )
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, StepChoices
 from seqopt.responses._tolerance import is_tolerance, with_tolerances
-from seqopt.responses.quantities import PROP_EXCESS, robot_response
+from seqopt.responses.quantities import PROP_EXCESS, _payload_text, robot_response
 from seqopt.responses.resources import HERE, Resources
 from seqopt.responses.table import analyze
+from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenGrip, Schedule
+from seqopt.sequence.site import _begin_step
 from seqopt.sequence.steps import Grips, Step
 
 
@@ -277,10 +281,11 @@ class Layers(Shown):
         return costs
 
     def require_possible(self) -> None:
-        """Raise an error if a step without an open grip exceeds a limit: no choice can keep it.
+        """Raise an error if no choice can keep a limit: of a grip that is given, or of a carrier.
 
         Raises `InfeasibleError`, naming the limit, the value and the steps.
         """
+        _require_carried(self.schedule, [self.engine.network.scene])
         given = (step for step in self.schedule.steps if not step.moves)
         fixed = [Step(s.number, s.kind, s.bricks, cast(Grips, s.grips)) for s in given]
         if not (self.limits and fixed):
@@ -304,6 +309,19 @@ class Layers(Shown):
     def steps(self, choice: Sequence[int]) -> tuple[Step, ...]:
         """Return the checked steps of a choice; a `StepError` says which one is impossible."""
         return self.schedule.fill(self.nodes(choice))
+
+
+def _require_carried(schedule: Schedule, scenes: Sequence[Scene]) -> None:
+    """Raise an `InfeasibleError` if a robot has to carry a brick in a scene that is too heavy."""
+    steps = (_begin_step(schedule.scene, schedule.begin), *schedule.steps)
+    found = [each for scene in scenes for each in _carrying_excesses(scene, steps)]
+    if found:
+        worst: dict[str, Excess] = {}
+        for each in sorted(found, key=lambda each: each.largest):
+            worst[each.robot] = each
+        enough = (f"--payload {n}={_payload_text(each.largest)}" for n, each in worst.items())
+        said = "; ".join(map(str, worst.values()))
+        raise InfeasibleError(f"{schedule.method} schedule: {said}; it takes {' '.join(enough)}")
 
 
 def candidate_layers(

@@ -146,10 +146,14 @@ class States(Shown):
         from seqopt.sequence._schedule_space import ScheduleSpace  # noqa: PLC0415
 
         if isinstance(self.rules, Schedule):
-            return ScheduleSpace(self.network, self.rules, self.caps, self.parks)
-        return free_space(
-            self.network, self.rules, self.caps, parks=self.parks, timed=self.is_timed
-        )
+            return ScheduleSpace(self.network, self.rules, self.caps, self.parks, self.worlds)
+        how = {"parks": self.parks, "timed": self.is_timed}
+        return free_space(self.network, self.rules, self.caps, **how, worlds=self.worlds)
+
+    @property
+    def worlds(self) -> tuple[Scene, ...]:
+        """The scenes of its scenarios."""
+        return tuple(engine.network.scene for engine in self.scenarios)
 
     @property
     def is_timed(self) -> bool:

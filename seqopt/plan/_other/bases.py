@@ -255,6 +255,8 @@ class Tried:
 class _Search(Tried):
     """Looks at sets of bases, the most promising first, and keeps the best plan so far."""
 
+    _why = ""
+
     def found(self, sets: Sequence[tuple[dict[str, Base], Scene]]) -> FoundBases:
         """Return the best plan of sets of bases."""
         soft = any(scene.grip_kinds.arms.any() for _, scene in sets)
@@ -269,9 +271,15 @@ class _Search(Tried):
             self._rows.append({**said, "outcome": outcome, **self._named(bound)})
         if self._plan is None or self._of is None:
             raise self._none(
-                f"bases: none of {len(sets)} sets of bases allows a plan; give other places"
+                f"bases: none of {len(sets)} sets of bases allows a plan: {self._why}; give other "
+                "places"
             )
         return FoundBases(self._plan, self._of, pd.DataFrame(self._rows), self._proven)
+
+    def _without(self, why: str) -> tuple[str, tuple[float, ...]]:
+        """Return what is known of a set without a plan; of the most promising one it is kept."""
+        self._why = self._why or why
+        return f"no plan: {why}", (inf,)
 
     def _by_promise(
         self, sets: Sequence[tuple[dict[str, Base], Scene]]
@@ -299,7 +307,7 @@ class _Search(Tried):
         try:
             lacking = _lacking(apart)
             if lacking is not None:
-                return f"no plan: nobody reaches brick {lacking}", (inf,)
+                return self._without(f"nobody reaches brick {lacking}")
             alone = (-inf,) if soft else _bound(self._solved(_moved(self._problem, apart)))
             if self._plan is not None and not _is_below(alone, self._best):
                 return "skipped: by reach alone no better", alone
@@ -309,8 +317,7 @@ class _Search(Tried):
         except NothingFoundError as error:
             return self._open(error)
         except (InfeasibleError, SceneError) as error:
-            why = "" if isinstance(error, InfeasibleError) else f": {error}"
-            return f"no plan{why}", (inf,)
+            return self._without(str(error))
         if plan.arms is not None and plan.arms.postures.unreached:
             self._left.append(bound := _bound(plan))
             return "no plan that keeps postures was found", bound

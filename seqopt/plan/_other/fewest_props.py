@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import comb, inf
+from operator import itemgetter
 
 import pandas as pd
 
@@ -117,6 +118,7 @@ class _Search(Tried):
         super().__init__(problem, solved, tell)
         self._candidates, self._since = candidates, since
         self._cuts: dict[int, set[_Set]] = {}  # first props of sets without a better plan
+        self._farthest: tuple[int, _Set] = (0, ())  # at how many bricks plans end, of which set
 
     def found(self) -> FoundProps:
         """Return the best plan of the smallest sets that allow any."""
@@ -133,9 +135,19 @@ class _Search(Tried):
                     "found to allow a plan; allow fewer nodes with --props-among"
                 )
         raise self._none(
-            f"props: none of {sets} sets of up to {count} props allows a plan; allow other nodes, "
-            "or loosen a rule or limit"
+            f"props: none of {sets:,} sets of up to {count} props allows a plan; {self._cause()}"
         )
+
+    def _cause(self) -> str:
+        """Return why the set with which plans come farthest allows none, in words."""
+        nodes = [self._candidates[i].node for i in self._farthest[1]]
+        which = f"with those at nodes {', '.join(map(str, nodes))}" if nodes else "without any"
+        props = (self._candidates[i] for i in self._farthest[1])
+        try:
+            self._solved(_moved(self._problem, self._problem.scene.with_props(*props)))
+        except (InfeasibleError, NothingFoundError, StepError) as error:
+            return f"{which}, {error}"
+        return "allow other nodes, or loosen a rule or limit"
 
     def _sets(self, size: int, chosen: _Set) -> Iterator[_Set]:
         """Yield the sets that begin with some, ascending, and that no cut rules out until then."""
@@ -175,6 +187,7 @@ class _Search(Tried):
             stop = Proof(states_of(problem)).stops_at(self._wanted())
             if stop is not None:
                 self._cuts.setdefault(stop, set()).add(self._until(chosen, stop))
+                self._farthest = max(self._farthest, (stop, chosen), key=itemgetter(0))
                 why = "no plan" if self._plan is None else "none as good"
                 return f"{why}, by {stop} bricks", ()
             return self._kept(problem, self._solved(problem))

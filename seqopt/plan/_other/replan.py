@@ -10,13 +10,13 @@ from seqopt.graph.states.states import States
 from seqopt.plan.judge._posture_rules import check_postures
 from seqopt.plan.judge.schedules import plan_values
 from seqopt.plan.plan import Plan
-from seqopt.problem.requirements import overloads
+from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene, in_order
 from seqopt.sequence._rule_check import check_free
 from seqopt.sequence._timing import step_times
 from seqopt.sequence.rules import FreeRules, Payload
-from seqopt.sequence.site import Site
+from seqopt.sequence.site import Site, _begin_step
 from seqopt.sequence.steps import Step
 from seqopt.stability._aging.builds import CuringBuilds
 
@@ -79,12 +79,16 @@ def goes_on(states: States, steps: Sequence[Step]) -> dict[str, float]:
     """
     rules = states.free_rules
     assert isinstance(rules, FreeRules)
+    scene, kept = states.network.scene, rules.payload is Payload.KEPT
+    begun = (_begin_step(scene, rules.begin), *steps)
+    over = _carrying_excesses(scene, begun) if kept else ()
+    if over:
+        raise StepError(f"payload exceeded: {over[0]}")
     check_free(states.network, rules, steps)
-    check_postures(states.network.scene, steps)
-    if rules.payload is Payload.KEPT:
-        over = overloads(states.network.scene, analyze(states.engine, steps))
-        if over:
-            raise StepError(f"payload exceeded: {over[0]}")
+    check_postures(scene, steps)
+    over = overloads(scene, analyze(states.engine, steps)) if kept else ()
+    if over:
+        raise StepError(f"payload exceeded: {over[0]}")
     values = plan_values(states, steps, starts=_starts(states, steps))
     pairs = zip(states.goals, states.names, values, strict=False)
     return {name: goal.shown(value) for goal, name, value in pairs}

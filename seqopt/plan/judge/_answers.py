@@ -93,7 +93,7 @@ def alike(
     scene, last = book.network.scene, len(book.network.inner)
     groups: dict[object, list[int]] = {}
     for r in book.team:
-        may = not book.rules.placers or scene.robots[r].name in book.rules.placers
+        may = tuple(book.places(r, b) for b in range(1, last + 1))
         nodes = [book.newest_nodes[r, b] for b in range(1, last + 1)]
         own = scene.robots[r]
         gives = (own.stiffness, own.rotational_stiffness, own.payload)  # tolerances are of these

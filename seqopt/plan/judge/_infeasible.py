@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields, replace
 from itertools import chain, combinations, islice
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -30,12 +31,17 @@ from seqopt.plan.search._margin_search import WORST, StandingLook, bisected, wit
 from seqopt.problem.problem import LARGEST, STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
-from seqopt.responses.quantities import PROP_EXCESS, length_text
+from seqopt.responses.quantities import PROP_EXCESS, _payload_text, _rounded_up, length_text
 from seqopt.scene.arm import Arm
 from seqopt.scene.scene import Scene
+from seqopt.sequence._carrying import loads
+from seqopt.sequence._rule_check import RuleBook, unbearable
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.two_robots import _enough_reach
+
+if TYPE_CHECKING:
+    from seqopt.graph.orders import AllOrders
 
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none
 
@@ -177,6 +183,15 @@ def confirmed(
     return claimed(name, why, exact=exact)
 
 
+def without_order(problem: AllOrders, name: str, seconds: float = np.inf) -> InfeasibleError:
+    """Return the error that no order has a plan, with why the scene's own has none.
+
+    ``name``, ``seconds``: as of `confirmed`; that no order has a plan is proven.
+    """
+    why = confirmed(problem.planned(problem.scene.build_order), name, seconds)
+    return InfeasibleError(f"no order of the bricks has a plan; in the scene's own, {why}")
+
+
 def _over_budget(problem: States, found: Explorer, name: str, *, exact: bool) -> SeqoptError:
     """Return the error that names what each budget needs at least, where plans exist without."""
     graph, states = found.graph()
@@ -230,19 +245,47 @@ def _why_impossible(problem: States, seconds: float = np.inf) -> str:
 
 
 def _where(problem: States, look: Look) -> str:
-    placed = problem.network.scene.placed
+    """Return where all builds stop, and which brick there or later is too heavy to be carried."""
+    placed, rules, last = problem.network.scene.placed, problem.rules, problem.space.levels
     if (state := barred(replace(problem, goals=STEPS))) is not None:
         return _barred_said(problem, *state)
     stops = look(replace(problem, goals=STEPS)).reached
-    if isinstance(problem.rules, Schedule):
-        return f"step {stops + 1} of {problem.space.levels} has no state that is allowed"
-    if problem.rules.takes_down and stops < problem.space.levels:
-        stands = problem.space.bricks_at(stops)
-        return f"brick {placed[stands - 1].name} ({stands} of {len(placed)}) is never removed"
-    last = problem.space.levels
-    if stops < last:
-        return f"brick {placed[stops].name} ({stops + 1} of {len(placed)}) is never placed"
-    return f"after brick {placed[last - 1].name} the build cannot end"
+    if isinstance(rules, Schedule):
+        found = unbearable((problem.network.scene, *problem.worlds), rules.steps, rules.begin)
+        heavy = "".join(f": in step {n} {why}" for n, why in [*found.items()][:1])
+        return f"step {stops + 1} of {last} has no state that is allowed{heavy}"
+    if stops == last:
+        return f"after brick {placed[problem.space.bricks_at(last) - 1].name} the build cannot end"
+    end = problem.space.bricks_at(last)
+    at = problem.space.bricks_at(stops) + (not rules.takes_down)
+    left = range(at, end, -1) if rules.takes_down else range(at, end + 1)
+    done = "removed" if rules.takes_down else "placed"
+    where = f"brick {placed[at - 1].name} ({at} of {len(placed)}) is never {done}"
+    return f"{where}{_too_heavy(RuleBook(problem.network, rules, problem.worlds), left)}"
+
+
+def _too_heavy(book: RuleBook, left: Sequence[int]) -> str:
+    """Return which brick cannot be carried, as the end of a line: the next one, or a later one.
+
+    ``left``: how many bricks there are with each that is to be carried; of later ones that which
+    no robot carries that reaches it.
+    """
+    for bricks in left:
+        near = [r for r in book.team if book.named(r) and book.newest_nodes[r, bricks]]
+        heavy = book.too_heavy(bricks, near)
+        if heavy and (bricks == left[0] or not any(book.places(r, bricks) for r in near)):
+            return f": {heavy}"
+    return ""
+
+
+def _heaviest(problem: States) -> float:
+    """Return the most that a robot of a free schedule would have to carry, N: its tool as well."""
+    rules, scenes = problem.rules, (problem.network.scene, *problem.worlds)
+    assert isinstance(rules, FreeRules)
+    bricks = slice(*sorted(rules.span(scenes[0])))
+    team = rules.team(scenes[0])
+    pairs = ((scene, scene.robots[r]) for scene in scenes for r in team)
+    return max(float(loads(scene, robot)[bricks].max()) for scene, robot in pairs)
 
 
 def _barred_said(problem: States, level: int, state: Ints) -> str:
@@ -327,9 +370,12 @@ def _supporting(problem: States, look: Look) -> Iterator[str]:
     """Yield what alone is enough for states to stand: no need to, or robots that carry more."""
     if problem.demands and look.exists(replace(problem, standing=None, settled=())):
         yield STANDING
-    kept = isinstance(problem.rules, FreeRules) and problem.rules.payload is Payload.KEPT
-    able = problem.demands and kept and recipe_of(problem.engine) and not problem.scenarios
-    if able and look.exists(_carrying(problem, LARGE)):
+    rules, scenes = problem.rules, (problem.network.scene, *problem.worlds)
+    if isinstance(rules, Schedule):  # of which grips may hold up more than payloads
+        asked = bool(unbearable(scenes, rules.steps, rules.begin))
+    else:
+        asked = bool(problem.demands) and rules.payload is Payload.KEPT
+    if asked and recipe_of(problem.engine) and look.exists(_carrying(problem, LARGE)):
         yield PAYLOADS
 
 
@@ -362,7 +408,8 @@ def _in_scene(problem: States, scene: Scene) -> States:
 
 def _loosened(problem: States) -> Iterator[tuple[str, FreeRules]]:
     """Yield the rules that can be loosened: what stands is asked of robots with payloads."""
-    for text, rules in problem.rules.loosened() if isinstance(problem.rules, FreeRules) else ():
+    own, scene = problem.rules, problem.network.scene
+    for text, rules in own.loosened(scene) if isinstance(own, FreeRules) else ():
         if not problem.demands or rules.payload is Payload.KEPT:
             yield text, rules
 
@@ -389,13 +436,13 @@ def _enough(problem: States, way: str, look: Look) -> str:
             enough = bisected("bond", exists)[1]
         except InfeasibleError:
             return way
-        digit = 10.0 ** (math.floor(math.log10(enough)) - 2) if enough else 1.0
-        return f"a bond of {math.ceil(enough / digit) * digit:.10g} Pa"
+        return f"a bond of {_rounded_up(enough):.10g} Pa"
     if way == PAYLOADS:
         return _enough_payload(problem, lambda payload: look.exists(_carrying(problem, payload)))
     if way == IGNORED and isinstance(problem.rules, FreeRules):
         rules = replace(problem.rules, payload=Payload.IGNORED)
-        newton = math.ceil(worst_least(replace(problem, rules=rules), LARGEST, look))
+        held = worst_least(replace(problem, rules=rules), LARGEST, look)
+        newton = _payload_text(max(held, _heaviest(problem)))
         return f"a payload of {newton} N (--payload {newton})"
     return _enough_limit(problem, way, look)
 
@@ -410,21 +457,23 @@ def _enough_limit(problem: States, way: str, look: Look) -> str:
     least = worst_least(replace(problem, limits=rest), name, look)
     if is_tolerance(way):
         return f"a tolerance of {length_text(1 / least)} instead of {length_text(found[0].bound)}"
-    most, bound = found[0].shown(least), found[0].shown(found[0].bound)
+    most, bound = _rounded_up(found[0].shown(least)), found[0].shown(found[0].bound)
     return f"{way}={most:.6g} instead of {bound:g}"
 
 
 def _carrying(problem: States, payload: float) -> States:
     """Return a problem in which every robot may carry so much, N."""
-    scene = problem.network.scene
-    return _in_scene(
-        problem, scene.with_robots(*(replace(r, payload=payload) for r in scene.robots))
-    )
+
+    def strong(scene: Scene) -> Scene:
+        return scene.with_robots(*(replace(r, payload=payload) for r in scene.robots))
+
+    worlds = tuple(engine_for(e, strong(e.network.scene)) for e in problem.scenarios)
+    return replace(_in_scene(problem, strong(problem.network.scene)), scenarios=worlds)
 
 
 def _enough_payload(problem: States, exists: Callable[[float], bool]) -> str:
     """Return the least payload of all robots with which something exists, to three digits."""
-    low = max(robot.payload for robot in problem.network.scene.robots)
+    low = min(robot.payload for robot in problem.network.scene.robots)
     high = 2 * low
     while not exists(high):
         low, high = high, 2 * high
@@ -433,7 +482,8 @@ def _enough_payload(problem: States, exists: Callable[[float], bool]) -> str:
     while most - least > 1:
         middle = (least + most) // 2
         least, most = (least, middle) if exists(middle * step) else (middle, most)
-    return f"a payload of {most * step:.10g} N (--payload {most * step:.10g})"
+    newton = _payload_text(most * step)
+    return f"a payload of {newton} N (--payload {newton})"
 
 
 def _typed(way: str) -> str:

@@ -27,7 +27,7 @@ from seqopt.plan.judge._proof import BELOW, Asked, Passable, Tables
 from seqopt.plan.judge._rule_moves import Follows, RuleTables
 from seqopt.problem.problem import Measure
 from seqopt.problem.standing import slack
-from seqopt.scene.scene import Order
+from seqopt.scene.scene import Order, in_order
 from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.rules import Ending
@@ -136,7 +136,8 @@ def _of_the_whole(problem: AllOrders) -> float:
     free = problem.judging(problem.scene.build_order)
     taken = {*problem.scene.blocked_nodes, *(prop.node for prop in problem.scene.props)}
     nodes = [n for n in node_numbers(free.network) if n not in taken]
-    fewest = max(1, free.free_rules.least_grips - len(problem.scene.props))
+    rules, scene = free.free_rules, problem.scene
+    fewest = max(1, rules.fewest_grips(scene) - len(scene.props))
     held = range(fewest, free.space.robots + 1)
     least = -np.inf
     if sum(comb(len(nodes), count) for count in held) <= MOST_SETS:
@@ -201,7 +202,8 @@ def _placed(problem: AllOrders, key: Key, found: _Reached) -> Iterator[tuple[Key
     for brick in problem.next_bricks(key[0]) if len(found.states) else ():
         order = _order(problem, key, brick)
         network = build_network(problem.scene, order)
-        tables = RuleTables(RuleBook(network, problem.states.free_rules), [], parks=parks)
+        worlds = tuple(in_order(scene, order) for scene in problem.states.worlds)
+        tables = RuleTables(RuleBook(network, problem.states.free_rules, worlds), [], parks=parks)
         rows = _places(problem, order, own, back=True).astype(tables.start().dtype)
         for move in tables.follow(len(key[0]), rows):
             if move.level > len(key[0]) and len(move.states):

@@ -235,8 +235,10 @@ class Passable:
 def _tables(problem: States, most: Mapping[int, float]) -> Tables:
     """Return what rules or a schedule allow."""
     if isinstance(problem.rules, Schedule):
-        return ScheduleTables(problem.rules, problem.network, parks=problem.parks)
-    book = RuleBook(problem.network, problem.rules)
+        return ScheduleTables(
+            problem.rules, problem.network, parks=problem.parks, worlds=problem.worlds
+        )
+    book = RuleBook(problem.network, problem.rules, problem.worlds)
     return RuleTables(book, alike(book, most, timed=problem.is_timed), parks=problem.parks)
 
 
@@ -433,7 +435,8 @@ class _Levels:
     def __init__(self, passable: Passable, told: Mapping[int, Ints], asked: Asked) -> None:
         self._passable, self._asked = passable, asked
         self.levels, self.states = list[int](), list[Ints]()
-        self._moves: list[tuple[Ints, Ints, Floats]] = []
+        none = np.zeros(0, dtype=np.int64)  # it may end where it begins
+        self._moves = [(none, none, np.zeros((0, len(passable.problem.goals))))]
         self._ends: list[Bools] = []
         self._count, tables, start = 0, passable.tables, passable.tables.start()
         coming = self._begin(tables.first, start)

@@ -16,7 +16,8 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.network.network import Network
 from seqopt.plan.judge._posture_rules import PostureRules
-from seqopt.sequence._rule_check import RuleBook
+from seqopt.scene.scene import Scene
+from seqopt.sequence._rule_check import RuleBook, unbearable
 from seqopt.sequence.rules import Ending, Newest
 from seqopt.sequence.schedule import Hold, Schedule, holds, islands
 from seqopt.sequence.steps import StepKind
@@ -70,9 +71,8 @@ class RuleTables:
         self.nodes = np.array([-1, *(node for brick in placed for node in brick.nodes)])
         place = {node: i for i, node in enumerate(self.nodes.tolist())}
         self._groups = [[book.team.index(r) for r in group] for group in groups]
-        names = [book.network.scene.robots[r].name for r in book.team]
-        self._able = [not self._rules.placers or name in self._rules.placers for name in names]
         self._book, self._place = book, place
+        self._least = self._rules.fewest_grips(scene)
         holders = [prop.node for prop in book.network.scene.props]
         self._propped = np.isin(self.nodes, holders)  # of places; none of a node that is none
         self._postures = PostureRules(book.network.scene, book.team)
@@ -111,7 +111,7 @@ class RuleTables:
     @property
     def robots(self) -> int:
         """How many robots take part."""
-        return len(self._able)
+        return len(self.team)
 
     def start(self) -> Ints:
         """Return the state (1, c) in which the build begins."""
@@ -156,7 +156,7 @@ class RuleTables:
             yield from self._removed(level, states, keeps)
             return
         for robot in self._takers():
-            if self._able[robot]:
+            if self._book.places(self.team[robot], bricks + 1):
                 newest = self._of(bricks + 1).newest[robot]
                 source, after, way = self._taken(states, keeps, robot, newest)
                 after[:, self.robots :] = 0
@@ -171,7 +171,7 @@ class RuleTables:
         holders = np.isin(states[rows, : self.robots], brick).sum(axis=1)
         rows = rows[holders == 1]
         for robot in range(self.robots):
-            if not self._able[robot]:
+            if not self._book.places(self.team[robot], bricks):
                 continue
             source = rows[np.isin(states[rows, robot], self._of(bricks).newest[robot])]
             after = states[source]
@@ -267,7 +267,7 @@ class RuleTables:
         ok = np.ones(len(states), dtype=bool)
         propped = props[: 2 * bricks + 1]
         if bricks > 1:
-            ok &= np.count_nonzero(grips, axis=1) + propped.sum() >= self._rules.least_grips
+            ok &= np.count_nonzero(grips, axis=1) + propped.sum() >= self._least
         if self._rules.newest is not Newest.FREE and not propped[-2:].any():
             ok &= self._of(bricks).holds[np.arange(self.robots), grips].any(axis=1)
         for part in self._of(bricks).parts:
@@ -306,11 +306,19 @@ class RuleTables:
 class ScheduleTables:
     """The holds of a schedule for many states at once.
 
-    ``parks``: whether it counts where a free robot was last.
+    ``parks``: whether it counts where a free robot was last; ``worlds``: scenes of scenarios.
     """
 
-    def __init__(self, schedule: Schedule, network: Network, *, parks: bool = False) -> None:
+    def __init__(
+        self,
+        schedule: Schedule,
+        network: Network,
+        *,
+        parks: bool = False,
+        worlds: tuple[Scene, ...] = (),
+    ) -> None:
         scene, self.first = network.scene, 0
+        self._heavy = unbearable((scene, *worlds), schedule.steps, schedule.begin)
         self._schedule, self._parks = schedule, parks
         self.last, self.robots = len(schedule.steps), len(scene.robots)
         self._before = schedule.steps[0].number - 1
@@ -343,11 +351,11 @@ class ScheduleTables:
 
     def follow(self, level: int, states: Ints) -> Iterator[Follows]:
         """Yield what follows from states (n, robots) by the next step, if there is one."""
-        if level == self.last:
+        number = self._before + level + 1
+        if level == self.last or number in self._heavy:
             return
         source, after, way = np.arange(len(states)), states, np.zeros(len(states))
         for robot in range(self.robots):
-            number = self._before + level + 1
             source, after, way = self._moved(robot, number, (source, after, way))
         ok = self._postures.allow(self.bricks_at(level + 1), after)
         source, after, way = source[ok], after[ok], way[ok]

@@ -91,6 +91,11 @@ def _sizes(network: Network, steps: Sequence[Mapping[str, float]]) -> dict[str, 
 TOLERANCE = 1e-6  # of the costs that a choice meets: how far a claim may be from what the data say
 
 
+def _known_gap(gap: float) -> float:
+    """Return a gap as people read it: below the tolerance of proofs there is none."""
+    return 0.0 if gap <= TOLERANCE else gap
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Certificate(FrozenValue):
     """The values of a plan and bounds on all others, from the problem's data alone.
@@ -130,7 +135,7 @@ class Certificate(FrozenValue):
 
     def __repr__(self) -> str:
         values = f"objective {self.objective:.6g}, no choice below {self.bound:.6g}"
-        return f"<Certificate: {values}, gap {100 * self.gap:.3g} %>"
+        return f"<Certificate: {values}, gap {100 * _known_gap(self.gap):.3g} %>"
 
     @property
     def objective(self) -> float:

@@ -34,7 +34,7 @@ from seqopt.responses._props import EXCESS_COLUMN
 from seqopt.responses._tolerance import is_tolerance, misfits_along, with_tolerances
 from seqopt.responses.quantities import CHOSEN_BY, PROP_EXCESS
 from seqopt.responses.table import analyze, force_column
-from seqopt.sequence._rule_check import check_free
+from seqopt.sequence._rule_check import check_carried, check_free
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind
 
@@ -123,8 +123,9 @@ def _as_claimed(problem: States, selection: StatePath, steps: Sequence[Step]) ->
     """Return the values of steps that keep the rules, if they are those that are claimed."""
     if isinstance(problem.rules, Schedule):
         _check_scheduled(problem.rules, steps)
+        check_carried(problem.network.scene, problem.rules, steps, problem.worlds)
     else:
-        check_free(problem.network, problem.rules, steps)
+        check_free(problem.network, problem.rules, steps, problem.worlds)
     check_postures(problem.network.scene, steps)
     values = plan_values(problem, steps, selection.objective, selection.starts)
     for goal, value, claimed in zip(problem.names, values, selection.objective, strict=True):

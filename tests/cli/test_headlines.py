@@ -1,0 +1,134 @@
+"""What people read first: forces and displacements, the usual rules of few robots, and causes."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+
+import seqopt
+from seqopt.errors import InfeasibleError
+from seqopt.plan._other.fewest_props import fewest_props
+from seqopt.plan.judge.certificate import TOLERANCE, Certificate, _known_gap
+from seqopt.report.text import _headline
+from seqopt.responses.quantities import _payload_text, _rounded_up
+from seqopt.scene._props import Prop
+from seqopt.sequence.rules import FreeRules, with_robots
+from tests.commands import command as run
+
+WALL = "wall:columns=2,courses=2"
+FEW = "rules: least_grips=1, as 2 robots take part"
+
+
+def test_optimize_begins_with_what_robots_hold(capsys, tmp_path):
+    out = tmp_path / "out"
+    status, said, _ = run(capsys, "optimize", WALL, "--schedule", "free", "--out", out)
+    first, second, *_ = said.splitlines()
+    number = r"([0-9.,]+)"
+    found = re.match(
+        rf"largest force {number} N \({number} % of payload\), displacement {number} µm", first
+    )
+    force, share, moved = map(float, found.groups())
+    table = pd.read_csv(out / "plan.csv")
+    most = table[[f"F_rob{k}_N" for k in (1, 2, 3)]].abs().max().max()
+    payload = seqopt.load_scene(WALL).robots[0].payload
+    assert (status, force) == (0, pytest.approx(most, rel=5e-3))
+    assert share == pytest.approx(100 * most / payload, rel=5e-3)
+    assert moved == pytest.approx(table["D_max_1e-3mm"].max(), rel=5e-3)
+    assert all(len(digits.replace(".", "").lstrip("0")) <= 3 for digits in found.groups())
+    assert re.search(r"; minmax [0-9.]+, optimal$", first)
+    assert second.startswith("schedule_search (exact): ")
+
+
+def test_the_share_is_that_of_the_robot_that_holds_most():
+    scene = with_robots(seqopt.load_scene(WALL), 2)
+    weak, strong = (replace(scene.robots[k], payload=p) for k, p in ((0, 50.0), (1, 400.0)))
+    table = {
+        "step": [1, 2],
+        "F_rob1_N": [10.0, 20.0],
+        "F_rob2_N": [None, 100.0],
+        "D_max_1e-3mm": [1.0, 2345.6],
+    }
+    said = _headline(scene.with_robots(weak, strong), table)
+    assert said == "largest force 100 N (25 % of payload), displacement 2.35 mm"
+
+
+@pytest.mark.parametrize(("robots", "least"), [(1, 0), (2, 1), (3, 2), (5, 2)])
+def test_one_robot_stays_free_to_place(robots, least):
+    scene = with_robots(seqopt.load_scene(WALL), robots)
+    assert FreeRules().fewest_grips(scene) == least
+    assert FreeRules().described(scene)["least_grips"] == least
+    assert FreeRules(least_grips=robots).fewest_grips(scene) == robots
+
+
+@pytest.mark.parametrize(
+    ("words", "says"), [(["2"], True), (["3"], False), (["2", "--rule", "least_grips=1"], False)]
+)
+def test_two_robots_build_by_themselves(capsys, words, says):
+    for asked in (["optimize"], ["pareto", "--aim", "F_largest,D_max"]):
+        line = [asked[0], WALL, *asked[1:], "--schedule", "free", "--robots", *words]
+        status, _, err = run(capsys, *line, "--no-stability")
+        assert (status, FEW in err.splitlines()) == (0, says), err
+
+
+def test_who_is_lost_changes_the_usual_rule(capsys, tmp_path):
+    out = tmp_path / "out"
+    words = ("optimize", WALL, "--schedule", "free", "--no-stability", "--out", out)
+    assert run(capsys, *words)[0] == 0
+    again = ("replan", out, "--at", "1", "--lost", "rob3", "--no-stability")
+    status, _, err = run(capsys, *again)
+    assert (status, FEW in err) == (0, True), err
+    status, _, err = run(capsys, *again, "--rule", "least_grips=2")
+    assert status == 3
+    assert "it becomes possible with least_grips=1" in err
+
+
+def test_what_no_set_of_props_helps_has_the_cause_of_one_run():
+    scene = with_robots(seqopt.load_scene(WALL), 2)
+    weak = scene.with_robots(*(replace(robot, payload=20.0) for robot in scene.robots))
+    engine, worst = seqopt.make_engine("auto", weak), seqopt.CRITERIA["worst-ratio"]
+    problem = seqopt.pose(engine, FreeRules(), worst, "minmax")
+    with pytest.raises(InfeasibleError) as alone:
+        seqopt.solve(problem)
+    with pytest.raises(InfeasibleError) as every:
+        fewest_props(problem, [Prop(node=node) for node in weak.placed[1].nodes], seqopt.solve)
+    assert "brick 1 weighs 23.5 N, more than the payload of rob1 (20 N)" in str(alone.value)
+    assert str(every.value).startswith("props: none of 4 sets of up to 2 props allows a plan; ")
+    assert str(alone.value) in str(every.value)
+
+
+def test_gaps_below_the_tolerance_of_proofs_are_none(capsys):
+    assert [_known_gap(gap) for gap in (0.0, 2.2e-16, TOLERANCE)] == [0.0] * 3
+    assert _known_gap(2 * TOLERANCE) == 2 * TOLERANCE
+    assert repr(Certificate((1.0,), (1.0,), 2.2e-16, 0.0)).endswith("gap 0 %>")
+    assert repr(Certificate((1.0,), (0.9,), 0.1, 0.1)).endswith("gap 10 %>")
+    status, said, _ = run(capsys, "optimize", "wall:columns=3,courses=2", "--no-stability")
+    assert (status, said.splitlines()[0].split("; ")[1]) == (0, "objective 32.3083, gap 0 %")
+
+
+def test_a_limit_that_helps_has_three_digits_and_does_help():
+    engine = seqopt.make_engine("auto", seqopt.load_scene(WALL))
+
+    def asked(bound):
+        limits = [seqopt.Limit("F_largest", bound)]
+        rules, criterion = FreeRules(), seqopt.CRITERIA["worst-ratio"]
+        return seqopt.solve(seqopt.pose(engine, rules, criterion, "minmax", limits))
+
+    with pytest.raises(InfeasibleError) as error:
+        asked(10.0)
+    enough = re.search(r"F_largest=([0-9.]+) instead of 10", str(error.value))[1]
+    assert len(enough.replace(".", "")) <= 3
+    assert asked(float(enough)).steps
+    with pytest.raises(InfeasibleError):
+        asked(0.99 * float(enough))
+
+
+@pytest.mark.parametrize(
+    ("value", "up"),
+    [(0.0, 0.0), (1.0, 1.0), (1.234, 1.24), (123.0000001, 124.0), (98_765.0, 98_800.0)],
+)
+def test_what_is_enough_is_rounded_up(value, up):
+    assert _rounded_up(value) == pytest.approx(up, rel=1e-12)
+    assert float(_payload_text(value)) >= value
