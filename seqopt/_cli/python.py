@@ -116,7 +116,8 @@ def assess(
     Returns
     -------
     pandas.DataFrame
-        A row per step; with ``map`` a row per build, mortar and value.
+        A row per mortar and step: dry, then with epoxy, if no ``mortar`` is named; with ``map`` a
+        row per build, mortar and value. ``attrs["notes"]`` says what verdicts leave out.
 
     Raises
     ------
@@ -129,9 +130,10 @@ def assess(
     {'stands': 7}
     """
     with _Asked("assess", {"scene": scene, **words}, progress) as options:
-        facts = _assess.run(options).facts
-        table = facts["steps" if options.map is None else "cases"]
+        answer = _assess.run(options)
+        table = answer.facts["steps" if options.map is None else "cases"]
         assert isinstance(table, pd.DataFrame)
+        table.attrs["notes"] = [*answer.notes]
         return table
 
 

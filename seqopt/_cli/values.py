@@ -11,7 +11,7 @@ from math import radians
 from typing import Any
 
 from seqopt.contact.curing import Curing, _find_curing
-from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
+from seqopt.contact.mortar import MORTARS, Mortar, find_mortar, mortar_name
 from seqopt.errors import ProblemError, SceneError, SeqoptError, StepError, did_you_mean
 from seqopt.plan.calling.formulation import Formulation, as_formulation
 from seqopt.problem._limit_words import LARGEST, NAMES, number_word, split_word
@@ -187,14 +187,20 @@ def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[
     return out
 
 
-def asked_mortar(options: argparse.Namespace) -> Mortar:
-    """Return the named mortar with the numbers that are given instead of its own."""
+def asked_mortars(options: argparse.Namespace) -> dict[str, Mortar]:
+    """Return the mortar that is named, or dry joints and the epoxy, by what they are called.
+
+    The last is what the build counts on. Numbers that are given take the place of its own, and
+    friction in dry joints as well.
+    """
     given = {
         name: number_word(text, f"--{name.replace('_', '-')}", zero=True)
         for name in ("friction", "tensile_strength", "cohesion")
         if (text := getattr(options, name)) is not None
     }
-    return replace(mortar_word(options.mortar, "--mortar"), **given)
+    own = replace(mortar_word(options.mortar or "epoxy", "--mortar"), **given)
+    dry = () if options.mortar else (Mortar(friction=own.friction),)
+    return {mortar_name(mortar): mortar for mortar in (*dry, own)}
 
 
 def mortar_word(text: str | Mortar, where: str) -> Mortar:

@@ -100,8 +100,8 @@ class ShownBuild(Shown):
     def stability(self, mortar: Mortar | str) -> pd.DataFrame:
         """Return whether every step stands with a mortar, and by which margins.
 
-        Margins take ten times as long as `verdicts` alone. ``mortar``: of all joints; or its name,
-        ``dry`` or ``epoxy``. Result: as of
+        Margins take ten times as long as `verdicts` alone. Movements of the ground enter neither.
+        ``mortar``: of all joints; or its name, ``dry`` or ``epoxy``. Result: as of
         `seqopt.stability.steps.stability_table`.
         """
         results = assess_steps(self.engine.network, self.steps, mortar, MARGINS)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from seqopt.contact.mortar import with_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import SeqoptError
 from seqopt.network.build import build_network
@@ -90,17 +91,28 @@ def failure_page(engine: Engine, builds: Builds, found: FailureMap) -> str:
 
 
 def load_page(
-    engine: Engine, name: str, steps: Sequence[Step], found: Sequence[LoadFactor], said: str
+    engine: Engine,
+    name: str,
+    steps: Sequence[Step],
+    found: Mapping[str, Sequence[LoadFactor]],
+    said: Mapping[str, str],
 ) -> str:
-    """Return the page of a build with how its steps give way under the largest load they bear."""
-    motions = np.zeros((len(steps), len(engine.network.inner), 6))
-    for i, (step, each) in enumerate(zip(steps, found, strict=True)):
-        motions[i, : step.bricks] = each.motion
-    build = Build(name, steps, analyze(engine, steps), falls=motions)
-    table = load_factor_table(steps, found)
-    sentence = f"{engine.network.scene.name}, {name}: {said}. A step can be shown as it gives way."
+    """Return the page of a build with how its steps give way under the largest load they bear.
+
+    ``found``, ``said``: by mortar, each beside the others.
+    """
+    builds, tables, responses = [], [], analyze(engine, steps)
     caption = "How much load every step bears: the largest multiple, weights as they are"
-    return report_page(engine, [build], sentence, [(caption, table)])
+    for mortar, each in found.items():
+        how = with_mortar(mortar)
+        motions = np.zeros((len(steps), len(engine.network.inner), 6))
+        for i, (step, one) in enumerate(zip(steps, each, strict=True)):
+            motions[i, : step.bricks] = one.motion
+        builds.append(Build(f"{name}, {how}", steps, responses, falls=motions))
+        tables.append((f"{caption}, {how}", load_factor_table(steps, each)))
+    words = "; ".join(f"{with_mortar(mortar)}: {text}" for mortar, text in said.items())
+    sentence = f"{engine.network.scene.name}, {name}: {words}. A step can be shown as it gives way."
+    return report_page(engine, builds, sentence, tables)
 
 
 def _caption(axis: str) -> str:

@@ -14,9 +14,10 @@ import pandas as pd
 
 from seqopt._files import csv_text
 from seqopt.contact._partial_assemblies import PartialAssemblies
-from seqopt.contact.mortar import DRY, EPOXY, Mortar, is_as_strong
+from seqopt.contact.mortar import DRY, EPOXY, Mortar, is_as_strong, with_mortar
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
+from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.steps import Grips, Step
 from seqopt.stability._ahead import SharedVerdicts, quick_verdicts
@@ -67,7 +68,7 @@ class BuildVerdicts:
     @property
     def how(self) -> str:
         """With what it stands or falls, in words."""
-        return self.mortar if self.mortar == "dry" else f"with {self.mortar}"
+        return with_mortar(self.mortar)
 
     def facts(self) -> dict[str, object]:
         """Return it as numbers and words, for scripts."""
@@ -109,6 +110,16 @@ class BuildProver:
         self._crew: Crew | None = None
         self._shared: dict[str, _Begun | None] = {}
         self.refusal = ""
+
+    @property
+    def scene(self) -> Scene:
+        """What is built."""
+        return self._network.scene
+
+    @property
+    def asks(self) -> bool:
+        """Whether it is asked of any mortar what stands."""
+        return bool(self._mortars)
 
     def of_tables(self, tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[BuildVerdicts, ...]]:
         """Return the verdicts of builds by their tables of responses, one for every mortar."""

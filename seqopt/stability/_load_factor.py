@@ -23,7 +23,7 @@ from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step, require_steps
 from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import Verdict, _first_to_fail, _verdict_of, bonded
-from seqopt.stability.limit_analysis import CAP, GAP, Compile, Sense, compile_equilibrium
+from seqopt.stability.limit_analysis import CAP, GAP, Claim, Compile, Sense, compile_equilibrium
 from seqopt.work.progress import Tell, with_progress
 
 _ENDLESS = (1 - GAP) * CAP  # multiples from which on none is the largest
@@ -36,8 +36,8 @@ class LoadFactor(FrozenValue):
     Attributes
     ----------
     factor : float
-        Proven on both sides; inf if no multiple makes it fall, NaN if nothing is proven, no load
-        acts yet, or it stands with no multiple.
+        Proven on both sides; inf if no multiple makes it fall, 0 if it falls before any load acts
+        and no multiple holds it, NaN if nothing is proven, or it stands and no load acts yet.
     bound : float
         What the motion alone proves: no larger multiple is borne.
     unloaded : Verdict
@@ -80,16 +80,25 @@ def load_factor(
     force = float(np.linalg.norm(assembly.applied[:, :3], axis=1).sum())
     scaled = replace(assembly, applied=assembly.applied / (size or 1.0))  # so that z is no share
     prove, lacking = Prover(scaled, compiled), bonded(assembly, mortar)
-    unloaded = _verdict_of(prove(replace(lacking, applied=(0.0, 0.0))))
-    motion = np.zeros((len(assembly.centroid), 6))
-    if not size:
-        return LoadFactor(np.nan, np.nan, unloaded, 0.0, motion, "", "")
-    found = prove(replace(lacking.fixed(), sense=Sense.LARGEST, applied=(0.0, 1.0)))
-    if found.value < _ENDLESS:
-        motion = found.answer.motion / (np.abs(found.answer.motion).max() or 1.0)
+    bare = prove(replace(lacking, applied=(0.0, 0.0)))
+    unloaded, values, motion = (
+        _verdict_of(bare),
+        (np.nan, np.nan),
+        np.zeros_like(bare.answer.motion),
+    )
+    if size:
+        found = prove(replace(lacking.fixed(), sense=Sense.LARGEST, applied=(0.0, 1.0)))
+        values = found.value, found.bound
+        if found.value < _ENDLESS:
+            motion = found.answer.motion
+    if unloaded is Verdict.FALLS and np.isnan(values[0]):
+        helps = bool(size) and float(scaled.applied_load @ bare.answer.motion.ravel()) < 0
+        if not helps or found.answer.claim is Claim.INFEASIBLE:
+            values, motion = (0.0, np.nan if helps else 0.0), bare.answer.motion
+    motion = motion / (np.abs(motion).max() or 1.0)
     first = _first_to_fail(assembly, motion)
     motion = motion / np.repeat([1.0, assembly.scales[1]], 3)
-    factor, most = (np.inf if z >= _ENDLESS else z / size for z in (found.value, found.bound))
+    factor, most = (np.inf if z >= _ENDLESS else z / (size or 1.0) for z in values)
     return LoadFactor(factor, most, unloaded, force, motion, *first)
 
 
@@ -180,7 +189,8 @@ def format_load_factors(steps: Sequence[Step], results: Sequence[LoadFactor]) ->
         where = f", of step {number}" if np.isfinite(factor) else ""
         said = f"the least load factor is {factor:.6g}{where}"
     bare = sum(result.unloaded is Verdict.FALLS for result in results)
-    more = f"; {bare} do not stand without their loads" if bare else ""
-    return (
-        f"{loaded} of {len(steps)} steps are loaded: {said}, {loaded - len(known)} unproven{more}"
-    )
+    fall = "falls" if bare == 1 else "fall"
+    never = sum(result.factor == 0 for result in results)
+    more = f"; {bare} {fall} before any load acts, {never} with any (factor 0)" if bare else ""
+    unproven = sum(result.load > 0 and np.isnan(result.factor) for result in results)
+    return f"{loaded} of {len(steps)} steps are loaded: {said}, {unproven} unproven{more}"

@@ -203,8 +203,9 @@ def test_a_load_that_nothing_holds_and_one_that_must_act():
     assert found.unloaded is Verdict.FALLS
     away = replace(lean, loads=(replace(push, force=(100.0, 0.0, 0.0)),))
     (none,) = results = load_factors(away, last_step(away), DRY)
-    assert np.isnan(none.factor)
-    assert "1 unproven; 1 do not stand without" in format_load_factors(last_step(away), results)
+    assert (none.factor, none.bound, none.first_block) == (0.0, 0.0, "1")
+    said = "least load factor is 0, of step 1, 0 unproven; 1 falls before any load acts, 1 with any"
+    assert said in format_load_factors(last_step(away), results)
     assert found.factor > 0
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import seqopt
 from seqopt._cli.commands.assess import Rows
 from seqopt._cli.main import main
 from seqopt.errors import FileError
@@ -37,7 +38,9 @@ def test_a_run_goes_on_where_it_was_ended(capsys, tmp_path, monkeypatch):
         patch.setattr(Rows, "add", until)
         assert main([*WORDS, "--out", str(out)]) == 130
     part = tmp_path / "out.csv.part"
-    said = f"seqopt: interrupted; 5 of 17 steps are in {part}; the same command goes on from there"
+    said = (
+        f"seqopt: interrupted; 5 of 17 verdicts are in {part}; the same command goes on from there"
+    )
     assert capsys.readouterr().err == f"{said}\n"
     assert not out.exists()
     with part.open("a", encoding="utf-8") as stream:
@@ -45,7 +48,7 @@ def test_a_run_goes_on_where_it_was_ended(capsys, tmp_path, monkeypatch):
     asked = []
     monkeypatch.setattr(Rows, "add", lambda self, row: asked.append(row) or add(self, row))
     assert main([*WORDS, "--out", str(out)]) == 1
-    assert capsys.readouterr().err == f"kept: 5 of 17 steps, found before, from {part}\n"
+    assert capsys.readouterr().err == f"kept: 5 of 17 verdicts, found before, from {part}\n"
     assert len(asked) == 12
     own, other = (pd.read_csv(path) for path in (out, whole))
     pd.testing.assert_frame_equal(own.drop(columns="proof"), other.drop(columns="proof"))
@@ -138,12 +141,108 @@ def test_how_much_load_a_build_bears(capsys, tmp_path):
         out = tmp_path / f"out{wind}"
         words = ["assess", str(path), "--method", "cantilever", "--load-factor"]
         assert main([*words, "--out", str(out)]) == 0
-        assert "17 of 17 steps are loaded: the least load factor is" in capsys.readouterr().out
-        factors.append(pd.read_csv(out / "load_factors.csv")["load_factor"])
+        said = capsys.readouterr().out
+        for how in ("dry", "with epoxy"):
+            assert f"{how}: 17 of 17 steps are loaded: the least load factor is" in said
+        table = pd.read_csv(out / "load_factors.csv").set_index(["mortar", "step"])
+        factors.append(table["load_factor"]["epoxy"])
         assert '"fall":{' in contents(out / "report.html")
     np.testing.assert_allclose(factors[0], 2 * factors[1], rtol=1e-3)
     assert main([*words[:1], ARCH, *words[2:]]) == 2
     assert "no load acts on it; give it loads or wind" in capsys.readouterr().err
+
+
+def test_a_step_that_falls_before_any_load_bears_none(capsys, tmp_path):
+    """It was a failed solver, status 4; that some stand with a load that helps is no zero."""
+    scene = replace(load_scene(ARCH), wind=(0.1, 0.0, 0.0))
+    save_scene(scene, path := tmp_path / "windy.json")
+    words = ["assess", str(path), *WORDS[2:], "--load-factor", "--out", str(tmp_path / "out")]
+    assert main(words) == 1
+    out, err = capsys.readouterr()
+    assert "solver failed" not in err
+    table = pd.read_csv(tmp_path / "out" / "load_factors.csv")
+    falls = table["unloaded"] == "does not stand"
+    assert falls.any()
+    assert table["load_factor"].notna().all()
+    assert (table["load_factor"][~falls] > 0).all()
+    none = falls & (table["load_factor"] == 0)
+    assert table["first_brick"][none].notna().all()
+    assert f"{falls.sum()} fall before any load acts, {none.sum()} with any (factor 0)" in out
+
+
+def test_without_a_mortar_both_answers_are_given(capsys, tmp_path):
+    """It said that every step stands, by an epoxy of 3 MPa that nobody had named."""
+    out = tmp_path / "both.csv"
+    assert main(["assess", ARCH, "--method", "sequential", "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    table = pd.read_csv(out)
+    own = {name: each["verdict"].value_counts() for name, each in table.groupby("mortar")}
+    falls = own["dry"]["does not stand"]
+    assert own["epoxy"].to_dict() == {"stands": 17}
+    assert f"dry: 17 steps: {17 - falls} stand, {falls} do not stand" in said
+    assert "with epoxy: 17 steps: 17 stand, 0 do not stand" in said
+    assert main([*WORDS[:-1], "epoxy", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert [*found["verdicts"]] == [*found["mortar"]] == ["epoxy"]
+    assert main([*WORDS, "--out", str(out)]) == 1  # what is asked alone decides
+    assert set(pd.read_csv(out)["mortar"]) == {"dry"}
+    both = seqopt.assess(ARCH, method="sequential")
+    assert both["verdict"].tolist() == table["verdict"].tolist()
+
+
+def test_what_falls_with_the_mortar_of_the_build_is_status_1(capsys, tmp_path):
+    """And friction that is given is that of both."""
+    scene = replace(load_scene(ARCH), weight_factor=1e4)
+    save_scene(scene, path := tmp_path / "heavy.json")
+    words = ["assess", str(path), "--method", "sequential", "--friction", "0.3", "--json"]
+    assert main(words) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert [*found["verdicts"]] == ["dry, friction 0.3", "epoxy, friction 0.3"]
+    assert {each["friction"] for each in found["mortar"].values()} == {0.3}
+    assert all(each["does not stand"] for each in found["verdicts"].values())
+
+
+def test_both_verdicts_go_on_where_they_were_ended(capsys, tmp_path, monkeypatch):
+    out, add = tmp_path / "out.csv", Rows.add
+
+    def until(self, row):
+        if len(self.rows) == 20:
+            raise KeyboardInterrupt
+        add(self, row)
+
+    words = ["assess", ARCH, "--method", "sequential", "--out", str(out)]
+    with monkeypatch.context() as patch:
+        patch.setattr(Rows, "add", until)
+        assert main(words) == 130
+    assert "20 of 34 verdicts are in" in capsys.readouterr().err
+    assert main(words) == 0
+    assert "kept: 20 of 34 verdicts" in capsys.readouterr().err
+    table = pd.read_csv(out)
+    assert table["mortar"].tolist() == ["dry"] * 17 + ["epoxy"] * 17
+    assert table["step"].tolist() == [*range(1, 18)] * 2
+
+
+@pytest.mark.parametrize(("fall", "said"), [(-0.005, "leaves their balance"), (-0.5, "not small")])
+def test_a_movement_of_the_ground_is_said_to_enter_no_verdict(capsys, tmp_path, fall, said):
+    """It was left out without a word; of ground at rest nothing is said."""
+    scene = load_scene(ARCH)
+    first, second = scene.grounds
+    down = replace(second, movement=(0.0, 0.0, fall))
+    save_scene(replace(scene, grounds=(first, down)), path := tmp_path / "settled.json")
+    words = [str(path), "--method", "sequential", "--out", str(tmp_path / "x.csv")]
+    assert main(["assess", *words]) == 0
+    start = (
+        f"stability: the movement of 1 ground end, up to {-1e3 * fall:.4g} mm, enters no verdict"
+    )
+    err = capsys.readouterr().err
+    assert start in err
+    assert said in err
+    notes = seqopt.assess(path, method="sequential", mortar="dry").attrs["notes"]
+    assert [note for note in notes if note.startswith(start)]
+    assert main(["optimize", str(path), "--schedule", "free", "--rule", "payload=ignored"]) == 0
+    assert start in capsys.readouterr().err
+    assert main(["assess", ARCH, *words[1:]]) == 0
+    assert "movement" not in capsys.readouterr().err
 
 
 @pytest.mark.slow

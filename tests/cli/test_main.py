@@ -409,6 +409,7 @@ def test_compare_writes_tables_and_figures(capsys, tmp_path):
 
 
 CERTIFIED = [
+    "mortar",
     "step",
     "type",
     "bricks",
@@ -431,7 +432,7 @@ def test_assess(capsys, tmp_path):
     words += ("--margins", "all")
     status, text, err = run(capsys, *words)
     assert (status, err) == (1, "")  # done, and some do not stand
-    assert text.startswith("49 steps: 27 stand, 22 do not stand, 0 are undecided; ")
+    assert text.startswith("dry: 49 steps: 27 stand, 22 do not stand, 0 are undecided; ")
     table = pd.read_csv(out)
     assert table.columns[: len(CERTIFIED)].tolist() == CERTIFIED
     assert (table["unproven"] == 0).all()
@@ -469,7 +470,7 @@ def test_assess_says_what_it_cannot_decide(capsys, tmp_path, monkeypatch):
     words = ("--plan", str(plan), "--out", str(out), "--margins", "all")
     status, text, err = run(capsys, "assess", *words)
     assert (status, err.count("\n")) == (4, 1)
-    assert "steps 1 are undecided" in err
+    assert "step 1: undecided" in err
     assert "1 are undecided" in text
     row = pd.read_csv(out).iloc[0]
     assert row["verdict"] == "undecided"

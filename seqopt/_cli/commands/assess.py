@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from hashlib import sha256
@@ -15,7 +15,13 @@ import numpy as np
 import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.asked import asked_scene, asked_steps, carrying_notes, scene_facts
+from seqopt._cli.asked import (
+    asked_scene,
+    asked_steps,
+    carrying_notes,
+    scene_facts,
+    settlement_notes,
+)
 from seqopt._cli.mapping import MAP, answer_map
 from seqopt._cli.options import (
     BUILT,
@@ -32,16 +38,17 @@ from seqopt._cli.options import (
 )
 from seqopt._cli.outputs import keep_apart, put_table, require_out, write_outputs
 from seqopt._cli.screens import question
-from seqopt._cli.values import MOST_WORKERS, asked_mortar, count_word
+from seqopt._cli.values import MOST_WORKERS, asked_mortars, count_word
 from seqopt._cli.words.given import plan_name
 from seqopt._files import csv_text, read_text
 from seqopt._showing import PAGE
-from seqopt.contact.mortar import Mortar
+from seqopt.contact.mortar import Mortar, with_mortar
 from seqopt.engines.registry import USUAL, make_engine, versions
 from seqopt.errors import FileError, ProblemError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report._failures import load_page
+from seqopt.responses.quantities import _steps_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.steps import Step
 from seqopt.stability._load_factor import format_load_factors, load_factor_table, load_factors
@@ -60,27 +67,33 @@ def answer_load_factor(options: argparse.Namespace) -> Answer:
     """Answer how much load every step of a sequence bears."""
     scene = asked_scene(options)
     require_out(options)
-    network = build_network(scene)
-    steps = asked_steps(options, network)
-    found = load_factors(network, steps, asked_mortar(options), options.tell)
-    table, said = load_factor_table(steps, found), format_load_factors(steps, found)
+    network, mortars = build_network(scene), asked_mortars(options)
+    steps, each, tables = asked_steps(options, network), {}, []
+    for name, mortar in mortars.items():
+        found = each[name] = load_factors(network, steps, mortar, options.tell)
+        tables.append(load_factor_table(steps, found).assign(mortar=name))
+    table = pd.concat(tables, ignore_index=True)[["mortar", *tables[0].columns[:-1]]]
+    said = {name: format_load_factors(steps, found) for name, found in each.items()}
 
     def files() -> dict[str, bytes | str]:
         engine = make_engine(USUAL, network, None)
-        page = load_page(engine, plan_name(options), steps, found, said)
+        page = load_page(engine, plan_name(options), steps, each, said)
         return {"load_factors.csv": csv_text(table), PAGE: page}
 
     written = write_outputs(options, files)
-    where = f"; written to {options.out}; {options.out / PAGE} shows how steps give way"
-    failing = (table["load_factor"] < 1) | (table["unloaded"] != "stands")
+    where = f"written to {options.out}; {options.out / PAGE} shows how steps give way"
+    lines = [f"{with_mortar(name)}: {text}" for name, text in said.items()]
+    last = tables[-1]  # the mortar that the build counts on
+    failing = (last["load_factor"] < 1) | (last["unloaded"] != Verdict.STANDS.value)
     unsure = table["step"][table["load_factor"].isna() & (table["load_N"] > 0)]
-    unproven = f"seqopt: solver failed: steps {', '.join(map(str, unsure))} are not proven"
+    unproven = f"seqopt: solver failed: {_steps_in_words([*dict.fromkeys(unsure)])}: not proven"
     status = Status.DOES_NOT_HOLD if np.any(failing) else Status.DONE
     return Answer(
         facts={"scene": scene_facts(scene), "versions": versions(), "steps": table},
-        text=said + where if written else "",
+        text="\n".join([*lines, where]) if written else "",
         data="" if written else csv_text(table),
         written=written,
+        notes=settlement_notes(scene),
         failures=(unproven,) if len(unsure) else (),
         status=Status.FAILED if len(unsure) else status,
     )
@@ -193,9 +206,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     holds = question(command, HOLDS, OF_HOLDS)
     holds.add_argument(
         "--mortar",
-        default="epoxy",
         help="what is in the joints: the epoxy of Bruun et al. (25°, 3 MPa, 2 MPa), dry (nothing), "
-        "or bond=STRENGTH (Pa) (default: %(default)s)",
+        "or bond=STRENGTH (Pa) (default: dry, then epoxy, which alone decides the exit status)",
     )
     declare(holds, STRENGTH)
     declare(question(command, "What is asked beside verdicts?", OF_ASKED), HOW | LOADS | MAP)
@@ -211,49 +223,67 @@ def run(options: argparse.Namespace) -> Answer:
     if options.load_factor:
         return answer_load_factor(options)
     keep_apart(options, options.out)
-    scene, mortar = asked_scene(options), asked_mortar(options)
+    scene, mortars = asked_scene(options), asked_mortars(options)
     network = build_network(scene)
     steps = asked_steps(options, network)
-    rows = _found(options, network, steps, mortar)
+    rows = _found(options, network, steps, mortars)
     table = pd.DataFrame(rows.rows)
-    went_on = f"kept: {rows.taken_up} of {len(table)} steps, found before, from {rows.path}"
-    answer = put_table(options.out, table, f"{format_rows(table)};")
+    went_on = f"kept: {rows.taken_up} of {len(table)} verdicts, found before, from {rows.path}"
+    each = {name: table[table["mortar"] == name] for name in mortars}
+    lines = [f"{with_mortar(name)}: {format_rows(own)}" for name, own in each.items()]
+    answer = put_table(options.out, table, "\n".join(lines) + ";")
     rows.done()
-    found = {verdict: table["verdict"] == verdict.value for verdict in Verdict}
-    unsure = table["step"][found[Verdict.UNDECIDED]]
-    said = f"steps {', '.join(map(str, unsure))} are undecided; this says nothing about them"
-    status = Status.DOES_NOT_HOLD if found[Verdict.FALLS].any() else Status.DONE
+    undecided = table["verdict"] == Verdict.UNDECIDED.value
+    unsure = _steps_in_words([*dict.fromkeys(table["step"][undecided])])
+    said = f"{unsure}: undecided; this says nothing about them"
+    falls = (each[[*mortars][-1]]["verdict"] == Verdict.FALLS.value).any()
+    status = Status.DOES_NOT_HOLD if falls else Status.DONE
     return Answer(
         facts={
             "scene": scene_facts(scene),
-            "mortar": asdict(mortar),
+            "mortar": {name: asdict(mortar) for name, mortar in mortars.items()},
             "versions": versions(),
-            "verdicts": {verdict.value: int(each.sum()) for verdict, each in found.items()},
+            "verdicts": {name: _counted(own) for name, own in each.items()},
             "steps": table,
         },
         **answer,
-        notes=(*((went_on,) if rows.taken_up else ()), *carrying_notes(scene, steps)),
-        failures=(f"seqopt: solver failed: {said}",) if len(unsure) else (),
-        status=Status.FAILED if len(unsure) else status,
+        notes=(
+            *((went_on,) if rows.taken_up else ()),
+            *settlement_notes(scene),
+            *carrying_notes(scene, steps),
+        ),
+        failures=(f"seqopt: solver failed: {said}",) if undecided.any() else (),
+        status=Status.FAILED if undecided.any() else status,
     )
 
 
+def _counted(table: pd.DataFrame) -> dict[str, int]:
+    """Return how many steps have each verdict."""
+    return {verdict.value: int((table["verdict"] == verdict.value).sum()) for verdict in Verdict}
+
+
 def _found(
-    options: argparse.Namespace, network: Network, steps: Sequence[Step], mortar: Mortar
+    options: argparse.Namespace,
+    network: Network,
+    steps: Sequence[Step],
+    mortars: Mapping[str, Mortar],
 ) -> Rows:
-    """Return the rows of all steps; those that were kept of an earlier run are taken up."""
+    """Return the rows of all steps, mortar by mortar; those kept of an earlier run are taken up."""
     margins, at = _asked_margins(options, steps)
     workers = count_word(options.workers, "--workers", MOST_WORKERS, usual=1)
-    asked = dump_scene(network.scene), steps, mortar, margins, at, versions()
+    asked = dump_scene(network.scene), steps, mortars, margins, at, versions()
     rows = Rows(options.out, asked)
-    left = steps[len(rows.rows) :]
-    told = with_progress("assessing steps", left, options.tell)
-    found = each_stability(network, left, mortar, margins, at, (None, workers))
     try:
-        for step, result in zip(told, found, strict=True):
-            rows.add(stability_row(step, result))
+        for before, (name, mortar) in enumerate(mortars.items()):
+            if not (left := steps[max(0, len(rows.rows) - before * len(steps)) :]):
+                continue
+            told = with_progress(f"assessing steps, {with_mortar(name)}", left, options.tell)
+            found = each_stability(network, left, mortar, margins, at, (None, workers))
+            for step, result in zip(told, found, strict=True):
+                rows.add({"mortar": name, **stability_row(step, result)})
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(rows.where(len(steps), "steps")) from None
+        total = len(mortars) * len(steps)
+        raise KeyboardInterrupt(rows.where(total, "verdicts")) from None
     return rows
 
 
