@@ -12,7 +12,7 @@ import pandas as pd
 from seqopt._files import csv_text
 from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
-from seqopt.errors import ProblemError, SeqoptError, StepError
+from seqopt.errors import MechanismError, ProblemError, SeqoptError, StepError
 from seqopt.graph.layers.costs import TINY
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import rank_choice, under_both
@@ -371,15 +371,15 @@ def method_tables(
     """
     scene = engine.network.scene
     tables: dict[str, pd.DataFrame] = {}
-    refused: dict[str, StepError] = {}
+    refused: dict[str, StepError | MechanismError] = {}
     notes: list[str] = []
     for name, method in METHODS.items():
         try:
             steps = method(engine.network, robots[:2])
-        except StepError as error:
+            tables[name] = analyze(engine, steps)
+        except (StepError, MechanismError) as error:
             refused[name] = error
             continue
-        tables[name] = analyze(engine, steps)
         why = degeneration(engine.network, name)
         notes += [f"{name}: {why}"] if why else []
         notes += _idle_note(scene, name, steps)
@@ -419,7 +419,7 @@ def _free_plan(
 
 def fixed_methods(engine: Engine) -> dict[str, pd.DataFrame]:
     """Return the responses of every method without open grips, as `method_tables`; or of none."""
-    with suppress(StepError):
+    with suppress(StepError, MechanismError):
         return method_tables(engine)[0]
     return {}
 

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -20,7 +21,7 @@ from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
 from seqopt.engines._kinds import ChoosingEngine, OpeningEngine, linear_limit
 from seqopt.engines.interface import Engine, Fields, Want, _empty_site
-from seqopt.errors import MechanismError, SceneError, SolverError
+from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.network import Network
 from seqopt.responses._props import prop_cells
 from seqopt.responses.quantities import (
@@ -371,13 +372,46 @@ def archive(network: Network, answers: Iterable[tuple[Step, Fields]]) -> bytes:
     return buffer.getvalue()
 
 
-def _row(network: Network, step: Step, fields: Fields) -> dict[str, object]:
-    scene = network.scene
-    forces = iter(require_finite("grip force", grip_forces(network, fields), step.bricks)[0])
+def with_faults(
+    scene: Scene, table: pd.DataFrame, steps: Sequence[Step], faults: Mapping[int, SeqoptError]
+) -> pd.DataFrame:
+    """Return a table with the steps that an engine did not solve, and a column that says why.
+
+    ``table``: of the others; ``faults``: by number of the step. In the column ``finding`` a step is
+    a ``mechanism``, of the brick that moves most, or ``not solved``, which says nothing of it; the
+    cells of its responses are empty.
+    """
+    rows = {row["step"]: row for row in table.assign(finding="").to_dict("records")}
+    for step in (step for step in steps if step.number in faults):
+        finding = {"finding": _finding(faults[step.number])}
+        rows[step.number] = {**_held_cells(scene, step), **finding}
+    names = dict.fromkeys(
+        ("step", "type", "bricks", "finding", *chain.from_iterable(rows.values()))
+    )
+    ordered = [rows[number] for number in sorted(rows)]
+    return _table_of({name: [row.get(name, np.nan) for row in ordered] for name in names})
+
+
+def _finding(fault: SeqoptError) -> str:
+    """Return what a fault says of a step, in a cell."""
+    if not isinstance(fault, MechanismError):
+        return "not solved"
+    sizes = {brick: max(map(abs, motion)) for brick, motion in fault.mode}
+    return f"mechanism (brick {max(sizes, key=sizes.__getitem__)})" if sizes else "mechanism"
+
+
+def _held_cells(scene: Scene, step: Step) -> dict[str, object]:
+    """Return the cells of a step that are known before anything is computed."""
     row: dict[str, object] = {"step": step.number, "type": step.kind.value, "bricks": step.bricks}
     for robot, node in zip(scene.robots, step.grips, strict=True):
         row[f"{robot.name}_brick"] = None if node is None else scene.brick_of_node[node].name
         row[f"{robot.name}_node"] = node
+    return row
+
+
+def _row(network: Network, step: Step, fields: Fields) -> dict[str, object]:
+    scene, row = network.scene, _held_cells(network.scene, step)
+    forces = iter(require_finite("grip force", grip_forces(network, fields), step.bricks)[0])
     for robot, node in zip(scene.robots, step.grips, strict=True):
         row[force_column(robot)] = np.nan if node is None else next(forces)
     for response in RESPONSES.values():

@@ -536,7 +536,6 @@ def test_bad_arguments_get_one_line(capsys, arguments, named):
     ("change", "named"),
     [
         (lambda d: d["bricks"][4].update(density="heavy"), "bricks[4].density"),
-        (lambda d: d["joints"].pop(3), "nothing resists"),
         (lambda d: d["robots"].pop(), "--plan FILE"),
     ],
 )
@@ -553,6 +552,15 @@ def test_bad_scenes_get_one_line(capsys, tmp_path, change, named):
     assert named in err + err2
     assert all(beside_models(text).count("\n") <= 1 for text in (err, err2))
     assert not target.exists() or status2 == 0
+
+
+def test_a_joint_that_is_missing_gets_one_line_beside_the_table(capsys, tmp_path):
+    path, out = scene_file(capsys, tmp_path, lambda d: d["joints"].pop(3)), tmp_path / "out.csv"
+    words = ("analyze", str(path), "--method", "sequential", "--out", str(out))
+    status, _, err = run(capsys, *words)
+    (line,) = (line for line in err.splitlines() if line.startswith("seqopt: "))
+    assert (status, "nothing resists a motion of brick" in line) == (3, True)
+    assert pd.read_csv(out)["finding"].notna().any()
 
 
 def test_it_runs_as_a_program():

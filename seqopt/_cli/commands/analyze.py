@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 
 import pandas as pd
 
@@ -39,10 +40,12 @@ from seqopt._cli.values import parse_time_limit
 from seqopt._files import write_bytes
 from seqopt._interrupts import ending
 from seqopt.arms.reach import find_postures
-from seqopt.engines._kinds import ChoosingEngine, Level
+from seqopt.contact.mortar import EPOXY, find_mortar
+from seqopt.engines._kinds import ChoosingEngine, Level, OpeningEngine
+from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.interface import Engine, Fields, Want
-from seqopt.engines.registry import provenance
-from seqopt.errors import SceneError
+from seqopt.engines.registry import provenance, recipe_of
+from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.build import build_network
 from seqopt.problem._limit_words import length_word
 from seqopt.problem.requirements import _prop_faults, overloads
@@ -50,8 +53,10 @@ from seqopt.responses._enough import what_was_enough
 from seqopt.responses._staged import Placing, staged_fields
 from seqopt.responses._tolerance import COLUMN, stiffness_for, with_tolerances
 from seqopt.responses.quantities import _plain, _steps_in_words, length_text
-from seqopt.responses.table import LinearRange, archive, response_table, step_fields
+from seqopt.responses.table import LinearRange, archive, response_table, step_fields, with_faults
 from seqopt.sequence.steps import Step
+from seqopt.stability.assessment import Verdict
+from seqopt.stability.steps import assess_steps
 from seqopt.work.progress import with_progress
 
 DESCRIPTION = (
@@ -107,28 +112,33 @@ def run(options: argparse.Namespace) -> Answer:
     find_postures(scene, options.cache, options.tell)
     network = build_network(scene)
     engine, steps = asked_engine(options, network), asked_steps(options, network)
-    limit = parse_time_limit(options.time_limit)
+    limit, faults = parse_time_limit(options.time_limit), dict[int, SeqoptError]()
     within = LinearRange(engine)
     in_time = _InTime(_step_answers(options, within, steps), limit)
-    answers = in_time if options.fields is None else list(in_time)
+    solved = _solved(engine, in_time, faults)
+    answers = solved if options.fields is None else list(solved)
     table = response_table(network, answers)
-    late, ended = _late(options, len(table), len(steps), engine, in_time)
+    reached = len(table) + len(faults)
+    late, ended = _late(options, reached, len(steps), engine, in_time)
+    failures, status = (*_faults_said(faults, reached), *late), _status_of(faults, ended)
     if table.empty:
-        return Answer(facts={"steps": ()}, failures=late, status=ended)
-    computed = steps[: len(table)]
+        none = with_faults(scene, table, steps, faults)
+        said = put_table(options.out, none, _counted(none, faults)) if faults else {}
+        return Answer(facts={"steps": none}, failures=failures, status=status, **said)
+    computed = [step for step in steps[:reached] if step.number not in faults]
     off: tuple[str, ...] = ()
     if options.tolerance is not None:
         table = with_tolerances(engine, computed, table)
         off = _tolerance_notes(engine, computed, table, options.tolerance)
     staged = None if options.staged is None else staged_fields(network, computed, options.staged)
     outside = within.departures(table, staged)
+    whole = with_faults(scene, table, steps, faults) if faults else table
+    said = put_table(options.out, whole, _counted(whole, faults))
     if options.fields is not None:
         write_bytes(options.fields, archive(network, answers))
-    said = put_table(options.out, table, f"{len(table)} steps")
-    if options.fields is not None:
         said["written"] = (*said.get("written", ()), options.fields)
     enough = what_was_enough(within, {"": table}, staged=staged is not None)
-    facts = {"scene": scene_facts(scene), "units": UNITS, "steps": table, **provenance(engine)}
+    facts = {"scene": scene_facts(scene), "units": UNITS, "steps": whole, **provenance(engine)}
     answer = Answer(
         facts={**facts, "enough": enough.facts()},
         notes=(
@@ -140,12 +150,72 @@ def run(options: argparse.Namespace) -> Answer:
             *(f"props: {fault}" for fault in _prop_faults(scene, table)),
             *idle_notes(scene, steps),
         ),
-        failures=late,
-        status=ended,
+        failures=failures,
+        status=status,
         **said,
     )
     unreached = arm_notes(scene, {"": computed})
     return strictly(answer, options, exceeded(scene, table), outside, unreached=unreached)
+
+
+def _solved(
+    engine: Engine, answers: Iterable[_Answered], faults: dict[int, SeqoptError]
+) -> Iterator[tuple[Step, Fields]]:
+    """Yield the steps that an engine solved; the others go to ``faults``, by their numbers."""
+    for step, found in answers:
+        if isinstance(found, Fields):
+            yield step, found
+        else:
+            faults[step.number] = _fault(engine, step, found)
+
+
+def _fault(engine: Engine, step: Step, error: SeqoptError) -> SeqoptError:
+    """Return why a step was not solved: a solver's failure is none where the step falls."""
+    if isinstance(error, MechanismError):
+        return error
+    recipe = recipe_of(engine)
+    if isinstance(engine, ChoosingEngine | OpeningEngine):
+        mortar = EPOXY if recipe is None else find_mortar(recipe.options.get("mortar") or EPOXY)
+        with suppress(SceneError):  # faces that are not known prove nothing
+            (found,) = assess_steps(engine.network, [step], mortar)
+            if found.verdict is Verdict.FALLS:
+                why = "a motion proves that it falls, robots within payload"
+                mode = zip(engine.network.scene.build_order, map(tuple, found.motion), strict=False)
+                said = f"step {step.number}: {why}; add a grip, a bond or friction"
+                return MechanismError(said, (*mode,))
+        return error
+    numbers = engine.network.scene.grip_numbers(step.grips, step.bricks)
+    told = diagnose(engine.network, step.bricks, numbers)
+    if told.finding is Finding.MECHANISM:
+        return MechanismError(f"step {step.number}: {told.reason}; add a grip or a joint")
+    return error
+
+
+def _counted(table: pd.DataFrame, faults: Mapping[int, SeqoptError]) -> str:
+    """Return how many steps a table has, and how many of them are mechanisms."""
+    mechanisms = sum(isinstance(fault, MechanismError) for fault in faults.values())
+    of_them = f", {mechanisms} of them mechanisms," if mechanisms else ""
+    return f"{len(table)} steps{of_them}"
+
+
+def _faults_said(faults: Mapping[int, SeqoptError], steps: int) -> tuple[str, ...]:
+    """Return which steps are mechanisms, and which a solver failed at, a line each."""
+    out = []
+    for what, kind in (("mechanism", MechanismError), ("solver failed", SolverError)):
+        own = {number: error for number, error in faults.items() if isinstance(error, kind)}
+        if own:
+            where = f"{len(own)} of {steps} steps" if len(own) < steps else "every step"
+            first = str(own[min(own)])
+            out.append(f"seqopt: {what}: {where} ({_steps_in_words([*own])}); {first}")
+    return tuple(out)
+
+
+def _status_of(faults: Mapping[int, SeqoptError], ended: Status) -> Status:
+    """Return the exit status of steps that were not solved, if there are any."""
+    if ended is not Status.DONE or not faults:
+        return ended
+    failed = any(isinstance(error, SolverError) for error in faults.values())
+    return Status.FAILED if failed else Status.NO_ANSWER
 
 
 def _tolerance_notes(
@@ -183,13 +253,26 @@ def _late(
     return (said,), Status.FAILED
 
 
+_Answered = tuple[Step, Fields | SeqoptError]
+
+
 def _step_answers(
     options: argparse.Namespace, within: LinearRange, steps: Sequence[Step]
-) -> Iterator[tuple[Step, Fields]]:
-    """Return steps with their fields, each from scratch or with what earlier ones lock in."""
+) -> Iterator[_Answered]:
+    """Return steps with their fields, each from scratch or with what earlier ones lock in.
+
+    One that is not solved from scratch has its error.
+    """
     each, engine = with_progress("steps", steps, options.tell), within.engine
+
+    def answer(step: Step) -> Fields | SeqoptError:
+        try:
+            return within.seen(step, step_fields(engine, step, Want.ALL))
+        except (MechanismError, SolverError) as error:
+            return error
+
     if options.staged is None:
-        return ((step, within.seen(step, step_fields(engine, step, Want.ALL))) for step in each)
+        return ((step, answer(step)) for step in each)
     if options.engine != "compliance":
         raise SceneError(
             f"--engine {options.engine}: --staged goes with exactly rigid bricks alone; "
@@ -204,15 +287,15 @@ class _InTime:
     ``interrupted``: whether somebody ended them; those that were there by then are not lost.
     """
 
-    def __init__(self, answers: Iterator[tuple[Step, Fields]], seconds: float) -> None:
+    def __init__(self, answers: Iterator[_Answered], seconds: float) -> None:
         self._answers, self._seconds, self.interrupted = answers, seconds, False
 
-    def __iter__(self) -> Iterator[tuple[Step, Fields]]:
+    def __iter__(self) -> Iterator[_Answered]:
         end = time.perf_counter() + self._seconds
         while (answer := self._next(end - time.perf_counter())) is not None:
             yield answer
 
-    def _next(self, seconds: float) -> tuple[Step, Fields] | None:
+    def _next(self, seconds: float) -> _Answered | None:
         try:
             with ending(seconds):
                 return next(self._answers, None)

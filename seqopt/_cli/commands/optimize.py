@@ -73,6 +73,7 @@ from seqopt._cli.words.optimizing import (
 from seqopt._files import csv_text
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph.states.states import States
+from seqopt.plan._softer import payload_advice
 from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.plan import Plan
@@ -81,9 +82,7 @@ from seqopt.problem._arms import faults_in_words
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, OWN, overloads
 from seqopt.responses._tolerance import value_text
-from seqopt.responses.quantities import _payload_text
-from seqopt.responses.table import OUTSIDE, _Columns
-from seqopt.scene.scene import Scene
+from seqopt.responses.table import OUTSIDE
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
 from seqopt.stability._builds import BuildProver, BuildVerdicts
@@ -316,7 +315,7 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
     table, scene = plan._columns, plan.engine.network.scene
     stopped = plan.ended is End.INTERRUPTED
     over = () if stopped else exceeded(scene, table)
-    enough = _enough_payload(scene, table) if over else ()
+    enough = _enough_payload(plan) if over else ()
     first = f"{OUTSIDE}: " if plan.outside else ""
     lines = [f"{first}{_headline(scene, table)}; {_value(found)}"]
     lines += [f"{_search(plan)}; {written_to(options.out)}"]
@@ -367,12 +366,10 @@ def _in_range(answer: Answer, plan: Plan) -> Answer:
     return replace(answer, failures=(*answer.failures, said), status=Status.DOES_NOT_HOLD)
 
 
-def _enough_payload(scene: Scene, table: _Columns) -> tuple[str, ...]:
-    """Return which payload of every robot is enough for a plan in which one is exceeded."""
-    over = [excess.largest for excess in overloads(scene, table)]
-    least = _payload_text(max(over, default=0.0))
-    how = f"--payload {least}, or payload of its robots in the scene file"
-    return (f"payload of {least} N is enough for this plan: {how}",) if over else ()
+def _enough_payload(plan: Plan) -> tuple[str, ...]:
+    """Return what is enough for a plan in which a payload is exceeded: one, or softer grips."""
+    over = overloads(plan.engine.network.scene, plan._columns)
+    return (payload_advice(plan.engine, plan.steps, over),) if over else ()
 
 
 def _time_notes(plan: Plan) -> tuple[str, ...]:

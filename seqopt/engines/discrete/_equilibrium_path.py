@@ -16,6 +16,7 @@ from seqopt.engines.discrete._system import System
 _ITERATIONS = 60
 _BALANCED = 1e-10  # largest force left on a body, over the heaviest body's weight
 _ROUNDING = 1e-13  # relative
+_HIDDEN = 1e-4  # of the heaviest body's weight, that rounding may leave: else nothing rests
 LARGEST_STEP, SMALLEST_STEP = 0.1, 1e-3  # of the load, once a bond breaks
 _FIRST_RESISTANCE = 1.0  # resistance to motion at first, over the stiffness
 _MOVES = 120  # against a resistance
@@ -68,6 +69,13 @@ class Held(FrozenValue):
     def gone(self, state: Settled) -> bool:
         """Return whether a state has moved too far for the bricks to be where they were."""
         return bool(np.abs(state.motion).max(initial=0.0) > FAR * self.system.length)
+
+    def left_faces(self, state: Settled) -> bool:
+        """Return whether joints that can open let a brick move by more than its length.
+
+        It has then left the faces it stood on, whatever rounding makes of its balance.
+        """
+        return bool(state.broken.any() and np.abs(state.motion).max(initial=0) > self.system.length)
 
     @cached_property
     def across(self) -> sparse.csr_array:
@@ -170,7 +178,7 @@ def _balance(held: Held, state: Settled, share: float) -> Settled:
     resistance = _FIRST_RESISTANCE
     for _ in range(_MOVES):
         if found is not None and (found.rests or held.gone(found)):
-            return found
+            return replace(found, left=np.inf) if held.left_faces(found) else found
         found = _newton(held, state, share, resistance)
         if found is None:
             resistance *= 8
@@ -190,7 +198,8 @@ def _newton(held: Held, state: Settled, share: float, resistance: float) -> Sett
         left = held.free.T @ held.reaction(motion, force, share)
         missing = left - resistance * held.diagonal * (motion - state.motion)
         size = np.linalg.norm(missing)
-        unit = max(system.scale, held.rounding(motion, force) / _BALANCED)
+        rounding = min(held.rounding(motion, force), _HIDDEN * system.scale)
+        unit = max(system.scale, rounding / _BALANCED)
         if np.abs(missing).max() <= _BALANCED * unit:
             slip = system.points.slipped(opening, force)
             return Settled(motion, force, slip, state.broken, float(np.abs(left).max() / unit))

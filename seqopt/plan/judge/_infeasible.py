@@ -24,6 +24,7 @@ from seqopt.graph.paths import distances, least_peak, tied
 from seqopt.graph.scenarios import engine_for
 from seqopt.graph.states._visits import barred, explore
 from seqopt.graph.states.states import States
+from seqopt.plan._softer import HARD, moves, softer, whole_load
 from seqopt.plan.judge._budget_proof import is_kept, least_within, too_small
 from seqopt.plan.judge._proof import Proof
 from seqopt.plan.judge.certificate import least_sum
@@ -31,7 +32,13 @@ from seqopt.plan.search._margin_search import WORST, StandingLook, bisected, wit
 from seqopt.problem.problem import LARGEST, STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing
 from seqopt.responses._tolerance import is_tolerance
-from seqopt.responses.quantities import PROP_EXCESS, _payload_text, _rounded_up, length_text
+from seqopt.responses.quantities import (
+    PROP_EXCESS,
+    _payload_text,
+    _rounded_up,
+    length_text,
+    robot_response,
+)
 from seqopt.scene.arm import Arm
 from seqopt.scene.scene import Scene
 from seqopt.sequence._carrying import loads
@@ -335,7 +342,10 @@ def _what_helps(problem: States, look: Look) -> str:
         ways = [*ways, *islice(pairs, 1), *(() if ways else _propped(problem, look))]
     if not ways:
         return ", whatever two rules or limits are loosened; extend a reach or add a robot"
-    return f"; it becomes possible with {' or '.join(_enough(problem, w, look) for w in ways)}"
+    enough = dict.fromkeys(text for way in ways if (text := _enough(problem, way, look)))
+    if enough:
+        return f"; it becomes possible with {' or '.join(enough)}"
+    return f"; robots would have to carry more than all weights and loads; {HARD}"
 
 
 def _opening(problem: States, look: Look) -> Iterator[str]:
@@ -356,6 +366,13 @@ def _opening(problem: States, look: Look) -> Iterator[str]:
     if recipe_of(problem.engine) and not (scene.has_arms or problem.scenarios):
         yield from _enough_reach(scene, lambda other: look.exists(_in_scene(problem, other)))
     yield from _limiting(problem, look)
+    if moves(scene) and not problem.scenarios and (soft := _softer(problem, look)):
+        yield soft
+
+
+def _softer(problem: States, look: Look) -> str:
+    """Return with how soft grips there is a plan, in words; empty if with none."""
+    return softer(problem.engine, lambda scene: look.exists(_in_scene(problem, scene)))
 
 
 def _limiting(problem: States, look: Look) -> Iterator[str]:
@@ -442,6 +459,8 @@ def _enough(problem: States, way: str, look: Look) -> str:
     if way == IGNORED and isinstance(problem.rules, FreeRules):
         rules = replace(problem.rules, payload=Payload.IGNORED)
         held = worst_least(replace(problem, rules=rules), LARGEST, look)
+        if held > whole_load(problem.network):
+            return _softer(problem, look)
         newton = _payload_text(max(held, _heaviest(problem)))
         return f"a payload of {newton} N (--payload {newton})"
     return _enough_limit(problem, way, look)
@@ -455,6 +474,9 @@ def _enough_limit(problem: States, way: str, look: Look) -> str:
         return _typed(way) if not found else PROPS if way == PROP_EXCESS else f"no limit on {way}"
     rest = tuple(limit for limit in problem.limits if limit not in found)
     least = worst_least(replace(problem, limits=rest), name, look)
+    forces = (LARGEST, *(robot_response(r.name) for r in problem.network.scene.robots))
+    if name in forces and least > whole_load(problem.network):
+        return _softer(problem, look)
     if is_tolerance(way):
         return f"a tolerance of {length_text(1 / least)} instead of {length_text(found[0].bound)}"
     most, bound = _rounded_up(found[0].shown(least)), found[0].shown(found[0].bound)
@@ -482,6 +504,8 @@ def _enough_payload(problem: States, exists: Callable[[float], bool]) -> str:
     while most - least > 1:
         middle = (least + most) // 2
         least, most = (least, middle) if exists(middle * step) else (middle, most)
+    if most * step > max(whole_load(problem.network), _heaviest(problem)):
+        return ""
     newton = _payload_text(most * step)
     return f"a payload of {newton} N (--payload {newton})"
 

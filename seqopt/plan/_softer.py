@@ -1,0 +1,72 @@
+"""What helps where robots would hold more than they can: a payload, or grips that give way.
+
+Rigid grips hold nodes where they are planned, whatever moves the structure: that may ask many times
+its weight of a robot. No payload is the remedy then; softer grips are, as far as they are found to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from seqopt.engines.interface import Engine
+from seqopt.engines.registry import recipe_of
+from seqopt.graph.scenarios import engine_for
+from seqopt.network.network import Network
+from seqopt.problem.requirements import Excess, overloads
+from seqopt.responses.quantities import _payload_text, _plain
+from seqopt.responses.table import analyze
+from seqopt.scene.scene import Scene
+from seqopt.sequence.steps import Step
+
+STIFFNESSES = (1e8, 1e7, 1e6, 1e5, 1e4, 1e3)  # of grips, N/m, the stiffest that helps first
+
+
+def whole_load(network: Network) -> float:
+    """Return the sizes of all weights, loads and wind in sum, N: no robot needs to carry more."""
+    applied = network.applied(len(network.inner))[:, :3]
+    return float(np.linalg.norm(np.concatenate([network.weight, applied]), axis=1).sum())
+
+
+def payload_advice(engine: Engine, steps: Sequence[Step], over: Sequence[Excess]) -> str:
+    """Return what helps in a plan in which payloads are exceeded, as of `overloads`, in words."""
+    network = engine.network
+    held = max((each.largest for each in over if each.brick is None), default=0.0)
+    if held <= whole_load(network):
+        least = _payload_text(max(each.largest for each in over))
+        how = f"--payload {least}, or payload of its robots in the scene file"
+        return f"payload of {least} N is enough for this plan: {how}"
+
+    def kept(scene: Scene) -> bool:
+        found = overloads(scene, analyze(engine_for(engine, scene), steps))
+        return all(each.brick is not None for each in found)  # what is carried stays as heavy
+
+    why = f"stiff grips{' that hold nodes in place while the ground moves' * moves(network.scene)}"
+    what = f"{held:,.0f} N, {_plain(held / whole_load(network), 3)} times all weights and loads,"
+    helps = softer(engine, kept)
+    return f"no payload helps: {what} come of {why}; {f'{helps} are enough' if helps else HARD}"
+
+
+HARD = "softer grips were not found to help; ground that moves less, or softer supports, may"
+
+
+def moves(scene: Scene) -> bool:
+    """Return whether some ground end moves."""
+    return any(any(ground.movement or ()) for ground in scene.grounds)
+
+
+def softer(engine: Engine, exists: Callable[[Scene], bool]) -> str:
+    """Return with how soft grips something exists, in words; empty if with none that is tried.
+
+    ``exists``: whether it does in a scene, which is the same save for its grips.
+    """
+    scene = engine.network.scene
+    own = [min(robot.stiffness) for robot in scene.robots if robot.stiffness]
+    if recipe_of(engine) is None or scene.has_arms:
+        return ""
+    for stiffness in (each for each in STIFFNESSES if each < min(own, default=np.inf)):
+        if exists(scene.with_grips(stiffness)):
+            said = f"{stiffness:.0e}".replace("e+0", "e")
+            return f"grips of {said} N/m (--grips {said})"
+    return ""
