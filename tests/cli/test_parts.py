@@ -43,7 +43,8 @@ def test_a_build_goes_on_from_a_step_and_reads_back(capsys, folder, tmp_path):
         plan = str(rest / "plan.csv")
         status, said, _ = run(capsys, command, scene, "--plan", plan)
         assert status == 0
-        assert said.splitlines()[1].startswith("5,")
+        mortar = "dry," * (command == "assess")
+        assert said.splitlines()[1].startswith(f"{mortar}5,")
     status, said, _ = run(capsys, "optimize", scene, *FREE, "--from", "2", "--to", "3")
     assert status == 0
 
