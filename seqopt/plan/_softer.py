@@ -62,7 +62,7 @@ def softer(engine: Engine, exists: Callable[[Scene], bool]) -> str:
     ``exists``: whether it does in a scene, which is the same save for its grips.
     """
     scene = engine.network.scene
-    own = [min(robot.stiffness) for robot in scene.robots if robot.stiffness]
+    own = [float(np.min(robot.stiffness)) for robot in scene.robots if robot.stiffness]
     if recipe_of(engine) is None or scene.has_arms:
         return ""
     for stiffness in (each for each in STIFFNESSES if each < min(own, default=np.inf)):

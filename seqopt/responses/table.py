@@ -381,10 +381,12 @@ def with_faults(
     a ``mechanism``, of the brick that moves most, or ``not solved``, which says nothing of it; the
     cells of its responses are empty.
     """
-    rows = {row["step"]: row for row in table.assign(finding="").to_dict("records")}
+    rows: dict[int, dict[str, object]] = {}
+    for row in table.assign(finding="").to_dict("records"):
+        rows[row["step"]] = {str(name): cell for name, cell in row.items()}
     for step in (step for step in steps if step.number in faults):
-        finding = {"finding": _finding(faults[step.number])}
-        rows[step.number] = {**_held_cells(scene, step), **finding}
+        rows[step.number] = _held_cells(scene, step)
+        rows[step.number]["finding"] = _finding(faults[step.number])
     names = dict.fromkeys(
         ("step", "type", "bricks", "finding", *chain.from_iterable(rows.values()))
     )

@@ -11,7 +11,8 @@ _SMALL = 0.1  # of the smallest side of a brick: what turns and shifts no more c
 
 def settlement_said(scene: Scene) -> str:
     """Return that movements of ground ends enter no verdict, in words; empty where none moves."""
-    moved = [np.reshape(g.movement, (2, 3)) for g in scene.grounds if any(g.movement or ())]
+    every = (ground.movement for ground in scene.grounds)
+    moved = [np.reshape(each, (2, 3)) for each in every if each is not None and any(each)]
     if not moved:
         return ""
     side = min(min(brick.dimensions) for brick in scene.bricks)

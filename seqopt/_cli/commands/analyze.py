@@ -40,7 +40,7 @@ from seqopt._cli.values import parse_time_limit
 from seqopt._files import write_bytes
 from seqopt._interrupts import ending
 from seqopt.arms.reach import find_postures
-from seqopt.contact.mortar import EPOXY, find_mortar
+from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines._kinds import ChoosingEngine, Level, OpeningEngine
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.interface import Engine, Fields, Want
@@ -175,7 +175,8 @@ def _fault(engine: Engine, step: Step, error: SeqoptError) -> SeqoptError:
         return error
     recipe = recipe_of(engine)
     if isinstance(engine, ChoosingEngine | OpeningEngine):
-        mortar = EPOXY if recipe is None else find_mortar(recipe.options.get("mortar") or EPOXY)
+        mortar = EPOXY if recipe is None else recipe.options.get("mortar", EPOXY)
+        assert isinstance(mortar, Mortar)  # as `make_engine` keeps it
         with suppress(SceneError):  # faces that are not known prove nothing
             (found,) = assess_steps(engine.network, [step], mortar)
             if found.verdict is Verdict.FALLS:

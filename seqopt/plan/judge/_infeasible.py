@@ -319,10 +319,11 @@ def _is_bare_end(problem: States, level: int, state: Ints) -> bool:
 def _excess_said(problem: States, level: int, state: Ints) -> str:
     """Return which limits a state exceeds, in words."""
     found, _ = problem.responses(level, state)
+    named = ((each, found[each.response]) for each in problem.limits if each.response in found)
     over = [
-        f"{each.response}={found[each.response][0]:.6g} instead of {each.bound:g}"
-        for each in problem.limits
-        if each.response in found and each.exceeded(found[each.response]).any()
+        f"{each.label}={each.shown(float(value[0])):.6g} instead of {each.shown(each.bound):g}"
+        for each, value in named
+        if each.exceeded(value).any()
     ]
     return f"has {' and '.join(over)}" if over else "asks more of robots than they carry"
 
