@@ -28,7 +28,7 @@ from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import AnyStep, Step, _idle_note
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability._builds import BuildProver, BuildVerdicts
-from seqopt.stability._settlement import settlement_said
+from seqopt.stability._settlement import _settlement_said
 from seqopt.stability.assessment import Verdict
 from seqopt.study.published import PUBLISHED
 
@@ -192,12 +192,12 @@ def asked_prover(options: argparse.Namespace, network: Network) -> BuildProver:
 def refused(prover: BuildProver) -> tuple[str, ...]:
     """Return why it is not said which steps stand, if it is not known, and what that leaves out."""
     said = (f"stability: not proven; {prover.refusal}",) if prover.refusal else ()
-    return (*said, *settlement_notes(prover.scene)) if prover.asks else said
+    return (*said, *_settlement_notes(prover.scene)) if prover.asks else said
 
 
-def settlement_notes(scene: Scene) -> tuple[str, ...]:
+def _settlement_notes(scene: Scene) -> tuple[str, ...]:
     """Return that movements of the ground enter no verdict, if it moves."""
-    said = settlement_said(scene)
+    said = _settlement_said(scene)
     return (f"stability: {said}",) if said else ()
 
 

@@ -11,7 +11,7 @@ from math import radians
 from typing import Any
 
 from seqopt.contact.curing import Curing, _find_curing
-from seqopt.contact.mortar import MORTARS, Mortar, find_mortar, mortar_name
+from seqopt.contact.mortar import MORTARS, Mortar, _mortar_name, find_mortar
 from seqopt.errors import ProblemError, SceneError, SeqoptError, StepError, did_you_mean
 from seqopt.plan.calling.formulation import Formulation, as_formulation
 from seqopt.problem._limit_words import LARGEST, NAMES, number_word, split_word
@@ -200,7 +200,7 @@ def asked_mortars(options: argparse.Namespace) -> dict[str, Mortar]:
     }
     own = replace(mortar_word(options.mortar or "epoxy", "--mortar"), **given)
     dry = () if options.mortar else (Mortar(friction=own.friction),)
-    return {mortar_name(mortar): mortar for mortar in (*dry, own)}
+    return {_mortar_name(mortar): mortar for mortar in (*dry, own)}
 
 
 def mortar_word(text: str | Mortar, where: str) -> Mortar:

@@ -107,10 +107,10 @@ def find_mortar(mortar: Mortar | str) -> Mortar:
     return bond_mortar(pascal)
 
 
-def mortar_name(mortar: Mortar) -> str:
+def _mortar_name(mortar: Mortar) -> str:
     """Return what a mortar is called: as `find_mortar` takes it, or its strengths.
 
-    >>> mortar_name(DRY), mortar_name(bond_mortar(3e3)), mortar_name(Mortar(friction=0.6))
+    >>> _mortar_name(DRY), _mortar_name(bond_mortar(3e3)), _mortar_name(Mortar(friction=0.6))
     ('dry', 'bond=3000', 'dry, friction 0.6')
     """
     tension, cohesion = mortar.tensile_strength, mortar.cohesion
@@ -125,10 +125,10 @@ def mortar_name(mortar: Mortar) -> str:
     return f"{next(named, own)}{rough}"
 
 
-def with_mortar(name: str) -> str:
+def _with_mortar(name: str) -> str:
     """Return a mortar's name as what a structure stands with.
 
-    >>> with_mortar("dry"), with_mortar("epoxy")
+    >>> _with_mortar("dry"), _with_mortar("epoxy")
     ('dry', 'with epoxy')
     """
     return name if name.partition(",")[0] == "dry" else f"with {name}"

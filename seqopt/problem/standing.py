@@ -11,7 +11,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.curing import Curing, _find_curing
-from seqopt.contact.mortar import DRY, Mortar, bond_mortar, find_mortar, mortar_name, with_mortar
+from seqopt.contact.mortar import DRY, Mortar, _mortar_name, _with_mortar, bond_mortar, find_mortar
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.responses._grip_sets import KnownRows
@@ -84,7 +84,7 @@ class Standing:
         ('dry', 'with epoxy, tilted by 2.86°')
         """
         tilted = f", tilted by {degrees(self.tilt):.3g}°" if self.tilt else ""
-        return f"{with_mortar(mortar_name(self.mortar))}{tilted}"
+        return f"{_with_mortar(_mortar_name(self.mortar))}{tilted}"
 
     def described(self) -> dict[str, float | str]:
         """Return the demand, ready for JSON: strengths in Pa, tilt in degrees."""

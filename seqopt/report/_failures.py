@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from seqopt.contact.mortar import with_mortar
+from seqopt.contact.mortar import _with_mortar
 from seqopt.engines.interface import Engine
 from seqopt.errors import SeqoptError
 from seqopt.network.build import build_network
@@ -104,13 +104,13 @@ def load_page(
     builds, tables, responses = [], [], analyze(engine, steps)
     caption = "How much load every step bears: the largest multiple, weights as they are"
     for mortar, each in found.items():
-        how = with_mortar(mortar)
+        how = _with_mortar(mortar)
         motions = np.zeros((len(steps), len(engine.network.inner), 6))
         for i, (step, one) in enumerate(zip(steps, each, strict=True)):
             motions[i, : step.bricks] = one.motion
         builds.append(Build(f"{name}, {how}", steps, responses, falls=motions))
         tables.append((f"{caption}, {how}", load_factor_table(steps, each)))
-    words = "; ".join(f"{with_mortar(mortar)}: {text}" for mortar, text in said.items())
+    words = "; ".join(f"{_with_mortar(mortar)}: {text}" for mortar, text in said.items())
     sentence = f"{engine.network.scene.name}, {name}: {words}. A step can be shown as it gives way."
     return report_page(engine, builds, sentence, tables)
 

@@ -18,7 +18,7 @@ from seqopt.responses.quantities import RESPONSES, _plain, length_text, robot_re
 from seqopt.responses.table import OUTSIDE, Departure, _Columns, force_column
 from seqopt.scene.scene import Scene
 from seqopt.stability._builds import BuildVerdicts
-from seqopt.stability._settlement import settlement_said
+from seqopt.stability._settlement import _settlement_said
 from seqopt.stability.assessment import Verdict
 
 _NUMBERED = re.compile(r"rob(?:ot)?[ _-]?(\d+)")
@@ -120,7 +120,7 @@ def _in_a_sentence(
         said = [f"Not buildable: {'; '.join(wrong)}"]
     held = verdicts[:-1] if fallen else verdicts
     said += [] if over else _carried(scene, table)
-    moves = settlement_said(scene) if verdicts else ""
+    moves = _settlement_said(scene) if verdicts else ""
     said += [*_stands(held), *([moves] if moves else [])] or (
         [] if verdicts else ["whether its steps stand was not asked"]
     )

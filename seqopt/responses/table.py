@@ -372,7 +372,7 @@ def archive(network: Network, answers: Iterable[tuple[Step, Fields]]) -> bytes:
     return buffer.getvalue()
 
 
-def with_faults(
+def _with_faults(
     scene: Scene, table: pd.DataFrame, steps: Sequence[Step], faults: Mapping[int, SeqoptError]
 ) -> pd.DataFrame:
     """Return a table with the steps that an engine did not solve, and a column that says why.

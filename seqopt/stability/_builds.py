@@ -14,7 +14,7 @@ import pandas as pd
 
 from seqopt._files import csv_text
 from seqopt.contact._partial_assemblies import PartialAssemblies
-from seqopt.contact.mortar import DRY, EPOXY, Mortar, is_as_strong, with_mortar
+from seqopt.contact.mortar import DRY, EPOXY, Mortar, _with_mortar, is_as_strong
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
@@ -68,7 +68,7 @@ class BuildVerdicts:
     @property
     def how(self) -> str:
         """With what it stands or falls, in words."""
-        return with_mortar(self.mortar)
+        return _with_mortar(self.mortar)
 
     def facts(self) -> dict[str, object]:
         """Return it as numbers and words, for scripts."""

@@ -9,7 +9,7 @@ from seqopt.scene.scene import Scene
 _SMALL = 0.1  # of the smallest side of a brick: what turns and shifts no more changes no balance
 
 
-def settlement_said(scene: Scene) -> str:
+def _settlement_said(scene: Scene) -> str:
     """Return that movements of ground ends enter no verdict, in words; empty where none moves."""
     every = (ground.movement for ground in scene.grounds)
     moved = [np.reshape(each, (2, 3)) for each in every if each is not None and any(each)]

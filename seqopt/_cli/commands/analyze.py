@@ -53,7 +53,7 @@ from seqopt.responses._enough import what_was_enough
 from seqopt.responses._staged import Placing, staged_fields
 from seqopt.responses._tolerance import COLUMN, stiffness_for, with_tolerances
 from seqopt.responses.quantities import _plain, _steps_in_words, length_text
-from seqopt.responses.table import LinearRange, archive, response_table, step_fields, with_faults
+from seqopt.responses.table import LinearRange, _with_faults, archive, response_table, step_fields
 from seqopt.sequence.steps import Step
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps
@@ -122,17 +122,14 @@ def run(options: argparse.Namespace) -> Answer:
     late, ended = _late(options, reached, len(steps), engine, in_time)
     failures, status = (*_faults_said(faults, reached), *late), _status_of(faults, ended)
     if table.empty:
-        none = with_faults(scene, table, steps, faults)
+        none = _with_faults(scene, table, steps, faults)
         said = put_table(options.out, none, _counted(none, faults)) if faults else {}
         return Answer(facts={"steps": none}, failures=failures, status=status, **said)
     computed = [step for step in steps[:reached] if step.number not in faults]
-    off: tuple[str, ...] = ()
-    if options.tolerance is not None:
-        table = with_tolerances(engine, computed, table)
-        off = _tolerance_notes(engine, computed, table, options.tolerance)
+    table, off = _with_tolerances(options, engine, computed, table)
     staged = None if options.staged is None else staged_fields(network, computed, options.staged)
     outside = within.departures(table, staged)
-    whole = with_faults(scene, table, steps, faults) if faults else table
+    whole = _with_faults(scene, table, steps, faults) if faults else table
     said = put_table(options.out, whole, _counted(whole, faults))
     if options.fields is not None:
         write_bytes(options.fields, archive(network, answers))
@@ -217,6 +214,16 @@ def _status_of(faults: Mapping[int, SeqoptError], ended: Status) -> Status:
         return ended
     failed = any(isinstance(error, SolverError) for error in faults.values())
     return Status.FAILED if failed else Status.NO_ANSWER
+
+
+def _with_tolerances(
+    options: argparse.Namespace, engine: Engine, steps: Sequence[Step], table: pd.DataFrame
+) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """Return a table with how far grips may be off, if that is asked for, and what is said."""
+    if options.tolerance is None:
+        return table, ()
+    table = with_tolerances(engine, steps, table)
+    return table, _tolerance_notes(engine, steps, table, options.tolerance)
 
 
 def _tolerance_notes(

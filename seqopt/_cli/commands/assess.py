@@ -16,11 +16,11 @@ import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import (
+    _settlement_notes,
     asked_scene,
     asked_steps,
     carrying_notes,
     scene_facts,
-    settlement_notes,
 )
 from seqopt._cli.mapping import MAP, answer_map
 from seqopt._cli.options import (
@@ -42,7 +42,7 @@ from seqopt._cli.values import MOST_WORKERS, asked_mortars, count_word
 from seqopt._cli.words.given import plan_name
 from seqopt._files import csv_text, read_text
 from seqopt._showing import PAGE
-from seqopt.contact.mortar import Mortar, with_mortar
+from seqopt.contact.mortar import Mortar, _with_mortar
 from seqopt.engines.registry import USUAL, make_engine, versions
 from seqopt.errors import FileError, ProblemError
 from seqopt.network.build import build_network
@@ -82,7 +82,7 @@ def answer_load_factor(options: argparse.Namespace) -> Answer:
 
     written = write_outputs(options, files)
     where = f"written to {options.out}; {options.out / PAGE} shows how steps give way"
-    lines = [f"{with_mortar(name)}: {text}" for name, text in said.items()]
+    lines = [f"{_with_mortar(name)}: {text}" for name, text in said.items()]
     last = tables[-1]  # the mortar that the build counts on
     failing = (last["load_factor"] < 1) | (last["unloaded"] != Verdict.STANDS.value)
     unsure = table["step"][table["load_factor"].isna() & (table["load_N"] > 0)]
@@ -93,7 +93,7 @@ def answer_load_factor(options: argparse.Namespace) -> Answer:
         text="\n".join([*lines, where]) if written else "",
         data="" if written else csv_text(table),
         written=written,
-        notes=settlement_notes(scene),
+        notes=_settlement_notes(scene),
         failures=(unproven,) if len(unsure) else (),
         status=Status.FAILED if len(unsure) else status,
     )
@@ -230,7 +230,7 @@ def run(options: argparse.Namespace) -> Answer:
     table = pd.DataFrame(rows.rows)
     went_on = f"kept: {rows.taken_up} of {len(table)} verdicts, found before, from {rows.path}"
     each = {name: table[table["mortar"] == name] for name in mortars}
-    lines = [f"{with_mortar(name)}: {format_rows(own)}" for name, own in each.items()]
+    lines = [f"{_with_mortar(name)}: {format_rows(own)}" for name, own in each.items()]
     answer = put_table(options.out, table, "\n".join(lines) + ";")
     rows.done()
     undecided = table["verdict"] == Verdict.UNDECIDED.value
@@ -249,7 +249,7 @@ def run(options: argparse.Namespace) -> Answer:
         **answer,
         notes=(
             *((went_on,) if rows.taken_up else ()),
-            *settlement_notes(scene),
+            *_settlement_notes(scene),
             *carrying_notes(scene, steps),
         ),
         failures=(f"seqopt: solver failed: {said}",) if undecided.any() else (),
@@ -277,7 +277,7 @@ def _found(
         for before, (name, mortar) in enumerate(mortars.items()):
             if not (left := steps[max(0, len(rows.rows) - before * len(steps)) :]):
                 continue
-            told = with_progress(f"assessing steps, {with_mortar(name)}", left, options.tell)
+            told = with_progress(f"assessing steps, {_with_mortar(name)}", left, options.tell)
             found = each_stability(network, left, mortar, margins, at, (None, workers))
             for step, result in zip(told, found, strict=True):
                 rows.add({"mortar": name, **stability_row(step, result)})

@@ -73,7 +73,7 @@ from seqopt._cli.words.optimizing import (
 from seqopt._files import csv_text
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph.states.states import States
-from seqopt.plan._softer import payload_advice
+from seqopt.plan._softer import _payload_advice
 from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.plan import Plan
@@ -369,7 +369,7 @@ def _in_range(answer: Answer, plan: Plan) -> Answer:
 def _enough_payload(plan: Plan) -> tuple[str, ...]:
     """Return what is enough for a plan in which a payload is exceeded: one, or softer grips."""
     over = overloads(plan.engine.network.scene, plan._columns)
-    return (payload_advice(plan.engine, plan.steps, over),) if over else ()
+    return (_payload_advice(plan.engine, plan.steps, over),) if over else ()
 
 
 def _time_notes(plan: Plan) -> tuple[str, ...]:

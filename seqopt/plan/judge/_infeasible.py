@@ -24,7 +24,7 @@ from seqopt.graph.paths import distances, least_peak, tied
 from seqopt.graph.scenarios import engine_for
 from seqopt.graph.states._visits import barred, explore
 from seqopt.graph.states.states import States
-from seqopt.plan._softer import HARD, moves, softer, whole_load
+from seqopt.plan._softer import HARD, _ground_moves, _softer, _whole_load
 from seqopt.plan.judge._budget_proof import is_kept, least_within, too_small
 from seqopt.plan.judge._proof import Proof
 from seqopt.plan.judge.certificate import least_sum
@@ -367,13 +367,13 @@ def _opening(problem: States, look: Look) -> Iterator[str]:
     if recipe_of(problem.engine) and not (scene.has_arms or problem.scenarios):
         yield from _enough_reach(scene, lambda other: look.exists(_in_scene(problem, other)))
     yield from _limiting(problem, look)
-    if moves(scene) and not problem.scenarios and (soft := _softer(problem, look)):
+    if _ground_moves(scene) and not problem.scenarios and (soft := _soft_enough(problem, look)):
         yield soft
 
 
-def _softer(problem: States, look: Look) -> str:
+def _soft_enough(problem: States, look: Look) -> str:
     """Return with how soft grips there is a plan, in words; empty if with none."""
-    return softer(problem.engine, lambda scene: look.exists(_in_scene(problem, scene)))
+    return _softer(problem.engine, lambda scene: look.exists(_in_scene(problem, scene)))
 
 
 def _limiting(problem: States, look: Look) -> Iterator[str]:
@@ -460,8 +460,8 @@ def _enough(problem: States, way: str, look: Look) -> str:
     if way == IGNORED and isinstance(problem.rules, FreeRules):
         rules = replace(problem.rules, payload=Payload.IGNORED)
         held = worst_least(replace(problem, rules=rules), LARGEST, look)
-        if held > whole_load(problem.network):
-            return _softer(problem, look)
+        if held > _whole_load(problem.network):
+            return _soft_enough(problem, look)
         newton = _payload_text(max(held, _heaviest(problem)))
         return f"a payload of {newton} N (--payload {newton})"
     return _enough_limit(problem, way, look)
@@ -476,8 +476,8 @@ def _enough_limit(problem: States, way: str, look: Look) -> str:
     rest = tuple(limit for limit in problem.limits if limit not in found)
     least = worst_least(replace(problem, limits=rest), name, look)
     forces = (LARGEST, *(robot_response(r.name) for r in problem.network.scene.robots))
-    if name in forces and least > whole_load(problem.network):
-        return _softer(problem, look)
+    if name in forces and least > _whole_load(problem.network):
+        return _soft_enough(problem, look)
     if is_tolerance(way):
         return f"a tolerance of {length_text(1 / least)} instead of {length_text(found[0].bound)}"
     most, bound = _rounded_up(found[0].shown(least)), found[0].shown(found[0].bound)
@@ -505,7 +505,8 @@ def _enough_payload(problem: States, exists: Callable[[float], bool]) -> str:
     while most - least > 1:
         middle = (least + most) // 2
         least, most = (least, middle) if exists(middle * step) else (middle, most)
-    if most * step > max(whole_load(problem.network), _heaviest(problem)):
+    free = isinstance(problem.rules, FreeRules)
+    if free and most * step > max(_whole_load(problem.network), _heaviest(problem)):
         return ""
     newton = _payload_text(most * step)
     return f"a payload of {newton} N (--payload {newton})"
