@@ -45,7 +45,7 @@ from seqopt.responses.table import (
     _Columns,
     _response_columns,
     _table_of,
-    step_fields,
+    each_fields,
 )
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.schedule import Schedule
@@ -367,7 +367,9 @@ class Plan(ShownBuild):
     @cached_property
     def _columns(self) -> _Columns:
         met = {} if self.search is None else self.search.fields
-        fields = (met.get(s.number) or step_fields(self.engine, s, Want.ALL) for s in self.steps)
+        new = (step for step in self.steps if step.number not in met)
+        others = each_fields(self.engine, new, Want.ALL)
+        fields = (met.get(step.number) or next(others) for step in self.steps)
         # of all fields, which what steps leave is judged by too
         answers = ((s, self._within.seen(s, f)) for s, f in zip(self.steps, fields, strict=True))
         columns = _response_columns(self.engine.network, answers)

@@ -6,11 +6,13 @@ Also its grips: who holds what, from when to when, and with which force.
 from __future__ import annotations
 
 import io
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
+from itertools import chain, groupby
+from operator import attrgetter, itemgetter
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -20,7 +22,7 @@ from seqopt.arrays import Floats, Ints
 from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.contact.mortar import EPOXY
 from seqopt.engines._kinds import ChoosingEngine, OpeningEngine, linear_limit
-from seqopt.engines.interface import Engine, Fields, Want, _empty_site
+from seqopt.engines.interface import Engine, Fields, Want, _empty_site, select_sets
 from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.network import Network
 from seqopt.responses._props import prop_cells
@@ -38,7 +40,7 @@ from seqopt.responses.quantities import (
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import holds
-from seqopt.sequence.steps import Step, StepKind, require_steps
+from seqopt.sequence.steps import Grips, Step, StepKind, require_steps
 
 _MEASURED = Want.BRICKS | Want.JOINTS | Want.SCREEN  # limits are no sharper than six digits
 _TURN = 0.1  # rad; sine and angle differ by 0.2 %, cosine and one by 0.5 %
@@ -49,6 +51,7 @@ _STRESSED = (
 )
 _Columns: TypeAlias = "Mapping[str, Sequence[Any]] | pd.DataFrame"
 """A table of `analyze`, or its columns by name: where no table is needed, pandas takes long."""
+_Key = tuple[int, tuple[int, ...]]  # bricks that stand, and what is held
 _Held = tuple[int, int, tuple[int, ...]]
 """Number of a step, its bricks, and what is held."""
 OUTSIDE = "outside the linear range"
@@ -83,7 +86,7 @@ class LinearRange:
         self.engine, self._network = engine, engine.network
         self._breaks = isinstance(engine, ChoosingEngine | OpeningEngine)
         self._engine = engine.rigid if isinstance(engine, ChoosingEngine) else engine
-        self._known: dict[tuple[int, tuple[int, ...]], Floats] = {}
+        self._known: dict[_Key, Floats] = {}
         thickness = engine.network.springs.thickness
         self._thickness = np.where(np.isnan(thickness) | self._breaks, np.inf, thickness)
         self.unchecked: tuple[str, ...] = ()
@@ -136,7 +139,7 @@ class LinearRange:
 
     def seen(self, step: Step, fields: Fields) -> Fields:
         """Return the fields of a step, all of them, and remember what it is asked of them."""
-        found = self._of(fields)
+        (found,) = self._of(fields)
         if not (self._breaks and found[2] > 0):  # else others than those of rigid bricks
             numbers = self._network.scene.grip_numbers(step.grips, step.bricks)
             self._known[step.bricks, numbers] = found
@@ -144,7 +147,28 @@ class LinearRange:
 
     def of_builds(self, tables: Mapping[str, _Columns]) -> dict[str, tuple[Departure, ...]]:
         """Return the limits that builds leave, for those that leave any, by name."""
+        self._ask(key for table in tables.values() for key in self._keys(table))
         return {name: left for name, each in tables.items() if (left := self.departures(each))}
+
+    def of_steps(self, builds: Mapping[str, Sequence[Step]]) -> dict[str, tuple[Departure, ...]]:
+        """Return the same of builds by their steps: of all states no more is computed."""
+        every = {(step.bricks, step.grips): step for steps in builds.values() for step in steps}
+        states, shift = sorted(every, key=itemgetter(0)), RESPONSES["D_max"]
+        fields = each_fields(self.engine, map(every.__getitem__, states), Want.DISPLACEMENTS)
+        moved = {
+            state: shift.of(self._network, found)[0] * shift.scale if state[0] else 0.0
+            for state, found in zip(states, fields, strict=True)
+        }
+        robots, tables = self._network.scene.robots, {}
+        for name, steps in builds.items():
+            nodes = zip(*(step.grips for step in steps), strict=True)
+            tables[name] = {
+                "step": [step.number for step in steps],
+                "bricks": [step.bricks for step in steps],
+                shift.column: [moved[step.bricks, step.grips] for step in steps],
+                **{f"{robot.name}_node": held for robot, held in zip(robots, nodes, strict=True)},
+            }
+        return self.of_builds(tables)
 
     def closest(self, table: _Columns) -> tuple[float, str, int]:
         """Return which joint comes closest to its elastic limits: Pa below them, name and step.
@@ -161,18 +185,31 @@ class LinearRange:
     def _measured(self, table: _Columns, fields: Iterable[Fields] | None) -> Floats:
         """Return rotation, strain, excess of stress and in which joint, of every step, (n, 4)."""
         if fields is not None:
-            return np.array([self._of(each) for each in fields])
+            return np.concatenate([self._of(each) for each in fields])
         if isinstance(self._engine, OpeningEngine):
             return np.full((len(table["step"]), 4), -np.inf)  # whoever goes far is unstable there
-        keys = [(bricks, held) for _, bricks, held in held_in_table(self._network.scene, table)]
-        for key in keys:  # in order: engines grow with the build
-            if not key[0]:
-                self._known[key] = np.array([0.0, 0.0, -np.inf, 0.0])
-            if key not in self._known:
-                asked = np.array([key[1]], dtype=np.int64).reshape(1, -1)
-                found = self._engine.solve(key[0], asked, _MEASURED)
-                self._known[key] = self._of(found)
+        keys = self._keys(table)
+        self._ask(keys)
         return np.array([self._known[key] for key in keys])
+
+    def _keys(self, table: _Columns) -> list[_Key]:
+        """Return the bricks and what is held of every step."""
+        return [(b, held) for _, b, held in held_in_table(self._network.scene, table)]
+
+    def _ask(self, keys: Iterable[_Key]) -> None:
+        """Measure what is not known: all with as many bricks and grips at once."""
+        if isinstance(self._engine, OpeningEngine):
+            return
+        alike = defaultdict[tuple[int, int], dict[_Key, None]](dict)
+        for key in keys:
+            if key not in self._known:
+                alike[key[0], len(key[1])][key] = None
+        for (bricks, count), new in sorted(alike.items()):  # in order: engines grow with the build
+            found = np.array([[0.0, 0.0, -np.inf, 0.0]])
+            if bricks:
+                sets = np.array([held for _, held in new], dtype=np.int64).reshape(len(new), count)
+                found = self._of(self._engine.solve(bricks, sets, _MEASURED))
+            self._known.update(zip(new, found, strict=True))
 
     @cached_property
     def _lever(self) -> Floats:
@@ -182,23 +219,28 @@ class LinearRange:
         return lengths(assembly.corner - self._network.springs.position[assembly.contact])
 
     def _of(self, fields: Fields) -> Floats:
-        """Return rotation, rad, strain, stress beyond elastic limits, Pa, and in which joint."""
+        """Return rotation, rad, strain, stress beyond elastic limits, Pa, and in which joint.
+
+        A row for every grip set, (S, 4).
+        """
         springs, bricks = self._network.springs, fields.brick_twist.shape[1]
         acting = max(1, int(np.searchsorted(springs.since, bricks, side="right")))
         joints = fields.joint_wrench[:, :acting]  # others bear nothing
-        wrench = joints[0].reshape(-1, 2, 3) @ springs.axes[:acting].transpose(0, 2, 1)
+        wrench = joints.reshape(*joints.shape[:2], 2, 3) @ springs.axes[:acting].transpose(0, 2, 1)
         stiffness = springs.stiffness[:acting].reshape(-1, 2, 3)
         given = np.divide(wrench, stiffness, out=np.zeros_like(wrench), where=stiffness > 0)
-        shift, turn = lengths(given).T
-        turned = np.concatenate([turn, lengths(fields.brick_twist[0][:, 3:])]).max()
+        shift, turn = lengths(given).transpose(2, 0, 1)
+        turned = np.hstack([turn, lengths(fields.brick_twist[..., 3:])]).max(axis=1)
         if self._limits is None:
-            return np.array([turned, (shift / self._thickness[:acting]).max(), -np.inf, 0])
+            strain, none = shift / self._thickness[:acting], np.zeros(len(turned))
+            return np.column_stack([turned, strain.max(axis=1), none - np.inf, none])
         corners = int(np.searchsorted(self._limits.assembly.contact, acting))
         face, lever = self._limits.assembly.contact[:corners], self._lever[:corners]
-        strain = (shift[face] + turn[face] * lever) / self._thickness[face]
-        excess = self._limits.excess(joints)[0]
-        first = np.isclose(excess, excess.max(), rtol=1e-9, atol=0.0).argmax()  # of those that tie
-        return np.array([turned, strain.max(), excess.max(), first])
+        strain = (shift[:, face] + turn[:, face] * lever) / self._thickness[face]
+        excess = self._limits.excess(joints)
+        most = excess.max(axis=1, keepdims=True)
+        first = np.isclose(excess, most, rtol=1e-9, atol=0.0).argmax(axis=1)  # of those that tie
+        return np.column_stack([turned, strain.max(axis=1), most[:, 0], first])
 
 
 def builds_in_words(departures: Mapping[str, Sequence[Departure]]) -> tuple[str, ...]:
@@ -255,8 +297,8 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     if not isinstance(getattr(engine, "network", None), Network):
         kind = type(engine).__name__
         raise SceneError(f"a {kind} is not an engine; give make_engine('compliance', network)")
-    answers = ((step, step_fields(engine, step)) for step in require_steps(steps))
-    return response_table(engine.network, answers)
+    steps = require_steps(steps)
+    return response_table(engine.network, zip(steps, each_fields(engine, steps), strict=True))
 
 
 def response_table(network: Network, answers: Iterable[tuple[Step, Fields]]) -> pd.DataFrame:
@@ -325,6 +367,38 @@ def step_fields(engine: Engine, step: Step, want: Want = Want.RESPONSES) -> Fiel
         return _empty_site(engine.network)
     with step_named(step):
         return engine.solve(step.bricks, _grips_of(engine.network.scene, step), want)
+
+
+def each_fields(
+    engine: Engine, steps: Iterable[Step], want: Want = Want.RESPONSES
+) -> Iterator[Fields]:
+    """Yield the full fields of every step, as `step_fields`.
+
+    Steps that follow each other with as many bricks are solved together, equal ones once.
+    """
+    for bricks, same in groupby(steps, attrgetter("bricks")):
+        near = [*same]
+        try:
+            found = _fields_by_grips(engine, bricks, near, want) if bricks else {}
+        except (MechanismError, SolverError):  # which step it is, each alone says
+            found = {}
+        yield from (found.get(step.grips) or step_fields(engine, step, want) for step in near)
+
+
+def _fields_by_grips(
+    engine: Engine, bricks: int, steps: Sequence[Step], want: Want
+) -> dict[Grips, Fields]:
+    """Return the fields of steps with as many bricks, by who holds which node."""
+    scene, found = engine.network.scene, dict[Grips, Fields]()
+    alike = defaultdict[int, dict[Grips, tuple[int, ...]]](dict)
+    for step in steps:
+        numbers = scene.grip_numbers(step.grips, bricks)
+        alike[len(numbers)][step.grips] = numbers
+    for count, numbers in alike.items():
+        sets = np.array([*numbers.values()], dtype=np.int64).reshape(len(numbers), count)
+        fields = engine.solve(bricks, sets, want)
+        found |= {grips: select_sets(fields, slice(i, i + 1)) for i, grips in enumerate(numbers)}
+    return found
 
 
 def _grips_of(scene: Scene, step: Step) -> Ints:
