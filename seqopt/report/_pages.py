@@ -243,26 +243,24 @@ def folder_builds(engine: Engine, folder: Path, prover: BuildProver) -> list[Bui
 def front_page(
     engine: Engine,
     front: Front,
-    plans: Sequence[pd.DataFrame],
-    departures: Sequence[Sequence[Departure]],
-    verdicts: Sequence[Sequence[BuildVerdicts]],
+    plans: Tables,
+    departures: Mapping[str, Sequence[Departure]],
+    verdicts: Mapping[str, Sequence[BuildVerdicts]],
 ) -> str:
-    """Return the page of a Pareto set: its points, and what is known of each plan."""
+    """Return the page of a Pareto set: its points, and what is known of each plan, by its name."""
     scene, table = engine.network.scene, shown_table(front.table)
-    names = [f"point {number}" for number in range(1, len(plans) + 1)]
     builds = []
-    each = zip(names, front.engines, plans, departures, verdicts, strict=True)
-    for name, own, plan, left, stands in each:
+    for (name, plan), own in zip(plans.items(), front.engines, strict=True):
         placed = own.network.scene
-        (build,) = _builds(placed, {name: plan}, {name: left}, {name: stands})
+        (build,) = _builds(placed, {name: plan}, departures, verdicts)
         another = placed.build_order != scene.build_order
         builds.append(replace(build, order=placed.build_order) if another else build)
     words = {"F_largest": WORDS["F_rob"]}  # another name for the same
-    points = table.rename(columns=words).set_axis(names)
+    points = table.rename(columns=words).set_axis([*plans])
     points = _worded(points.assign(**{n: 1e6 * points[n] for n in ["D_max"] if n in points}))
     shown = points.join(_falls(builds)).rename_axis("plan").reset_index()
-    if any(departures):
-        shown[OUTSIDE] = ["yes" if each else "" for each in departures]
+    if departures:
+        shown[OUTSIDE] = ["yes" if name in departures else "" for name in plans]
     sentence = f"1 plan for {scene.name} is best in everything"
     if len(plans) > 1:
         sentence = f"{len(plans):,} plans for {scene.name}, of which none beats another everywhere"

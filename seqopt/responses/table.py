@@ -152,9 +152,8 @@ class LinearRange:
 
     def of_steps(self, builds: Mapping[str, Sequence[Step]]) -> dict[str, tuple[Departure, ...]]:
         """Return the same of builds by their steps: of all states no more is computed."""
-        every = {(step.bricks, step.grips): step for steps in builds.values() for step in steps}
-        states, shift = sorted(every, key=itemgetter(0)), RESPONSES["D_max"]
-        fields = each_fields(self.engine, map(every.__getitem__, states), Want.DISPLACEMENTS)
+        states, shift = _distinct(builds.values()), RESPONSES["D_max"]
+        fields = each_fields(self.engine, states.values(), Want.DISPLACEMENTS)
         moved = {
             state: shift.of(self._network, found)[0] * shift.scale if state[0] else 0.0
             for state, found in zip(states, fields, strict=True)
@@ -301,6 +300,27 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     return response_table(engine.network, zip(steps, each_fields(engine, steps), strict=True))
 
 
+def analyze_builds(engine: Engine, builds: Sequence[Sequence[Step]]) -> list[pd.DataFrame]:
+    """Return the table of `analyze` of every build; states that builds share are computed once."""
+    states, network = _distinct(builds), engine.network
+    pairs = zip(states.items(), each_fields(engine, states.values()), strict=True)
+    rows = {state: _row(network, step, fields) for (state, step), fields in pairs}
+    every = (
+        [
+            rows[step.bricks, step.grips] | {"step": step.number, "type": step.kind.value}
+            for step in steps
+        ]
+        for steps in builds
+    )
+    return [_table_of(_columns_of(each)) for each in every]
+
+
+def _distinct(builds: Iterable[Sequence[Step]]) -> dict[tuple[int, Grips], Step]:
+    """Return a step for every state of builds, by ascending bricks: engines grow with them."""
+    states = {(step.bricks, step.grips): step for steps in builds for step in steps}
+    return {state: states[state] for state in sorted(states, key=itemgetter(0))}
+
+
 def response_table(network: Network, answers: Iterable[tuple[Step, Fields]]) -> pd.DataFrame:
     """Return a row of responses for every step, as `analyze` does, from the fields of each."""
     return _table_of(_response_columns(network, answers))
@@ -310,7 +330,10 @@ def _response_columns(
     network: Network, answers: Iterable[tuple[Step, Fields]]
 ) -> dict[str, list[object]]:
     """Return the columns of that table, with None where a robot does not grip."""
-    rows = [_row(network, step, fields) for step, fields in answers]
+    return _columns_of([_row(network, step, fields) for step, fields in answers])
+
+
+def _columns_of(rows: Sequence[Mapping[str, object]]) -> dict[str, list[object]]:
     return {name: [row[name] for row in rows] for name in rows[0]} if rows else {}
 
 

@@ -19,6 +19,7 @@ from seqopt.responses._staged import staged_fields
 from seqopt.responses.table import _STRAIN, LinearRange, analyze, response_table
 from seqopt.scene.scene_file import _scene_by_words, save_scene
 from seqopt.sequence.two_robots import cantilever, sequential
+from seqopt.stability._builds import BuildProver
 from seqopt.study.published import published_plan
 from seqopt.workflow import optimize
 from tests.builders import small_arch
@@ -253,6 +254,34 @@ def test_commands_say_it_first_and_tell_scripts(capsys, tmp_path, small_soft, wo
 def small_soft(tmp_path):
     save_scene(changed(small_arch(5), stiffness=1e-6), tmp_path / "soft.json")
     return str(tmp_path / "soft.json")
+
+
+def test_a_set_that_is_printed_makes_neither_page_nor_verdicts(
+    capsys, small_soft, tmp_path, monkeypatch
+):
+    asked = ["pareto", small_soft, "--aim", "steps,D_max", "--json", "--rule", "regrips=0"]
+    assert main([*asked, "--out", str(tmp_path / "out")]) == 1
+    written = json.loads(capsys.readouterr().out)
+    home = "seqopt._cli.commands.pareto"
+    for name in ("front_page", "fixed_methods", "csv_text"):
+        monkeypatch.setattr(f"{home}.{name}", lambda *_, name=name: pytest.fail(name))
+    monkeypatch.setattr(BuildProver, "_ask", lambda *_: pytest.fail("what stands"))
+    assert main(asked) == 1
+    printed = json.loads(capsys.readouterr().out)
+    assert written["outside_linear_range"]
+    same = ("outside_linear_range", "points")
+    assert [printed[name] for name in same] == [written[name] for name in same]
+
+
+def test_what_builds_leave_is_said_by_their_steps_alone(soft):
+    made = make_engine("compliance", build_network(soft))
+    names = {"one": sequential(made.network), "two": cantilever(made.network)}
+    names["short"] = names["one"][:3]
+    tables = {name: analyze(made, steps) for name, steps in names.items()}
+    own, other = LinearRange(made).of_steps(names), LinearRange(made).of_builds(tables)
+    assert [*own] == [*other] == ["one"]
+    for name, left in own.items():
+        assert [(d.what, d.steps) for d in left] == [(d.what, d.steps) for d in other[name]]
 
 
 def test_a_table_on_standard_output_stays_a_table(capsys, small_soft):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -45,13 +46,14 @@ from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, _said_limits
 from seqopt.report._pages import front_page
 from seqopt.report.comparison import fixed_methods, shown_table, worst_of
 from seqopt.responses._tolerance import value_text
-from seqopt.responses.table import OUTSIDE, LinearRange, analyze, builds_in_words
+from seqopt.responses.table import OUTSIDE, Departure, LinearRange, analyze_builds, builds_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import FREE
+from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import SCHEDULES
-from seqopt.stability._builds import BuildProver
+from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
-from seqopt.work.progress import with_progress, within
+from seqopt.work.progress import within
 
 MOST_ROWS = 30  # of a table on the terminal
 FOUR = "F_largest,M_sup,T_max,D_max"
@@ -135,9 +137,13 @@ def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Ans
     """Write a Pareto set, and return what is in it."""
     free = states_of(problem)
     scene = free.engine.network.scene
-    methods = fixed_methods(free.engine)
+    shows = options.out is not None
+    named = any("=" not in text for text in options.under)
+    methods = fixed_methods(free.engine) if shows or named else {}
     provers = {own: asked_prover(options, own.network) for own in {*front.engines}}
-    files, left = _front_files(front, problem, methods, provers, options)
+    departures = _departures(front)
+    left = builds_in_words(departures)
+    files = _front_files(front, problem, methods, provers, departures, options) if shows else {}
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
     if options.out and not options.pick:
@@ -198,19 +204,19 @@ def _front_files(
     problem: Problem,
     methods: Mapping[str, pd.DataFrame],
     provers: Mapping[Engine, BuildProver],
+    departures: Mapping[str, Sequence[Departure]],
     options: argparse.Namespace,
-) -> tuple[dict[str, bytes | str], tuple[str, ...]]:
-    """Return the files of a Pareto set by name, and which points leave the linear range."""
-    engine, free, tell = problem.engine, states_of(problem), options.tell
-    ways = [*zip(front.engines, front.steps, strict=True)]
-    tables = [analyze(own, steps) for own, steps in with_progress("analyzing plans", ways, tell)]
-    tell("drawing and writing the page")
-    ranges = {own: LinearRange(own) for own in {*front.engines}}
-    departures = [
-        ranges[own].departures(table) for (own, _), table in zip(ways, tables, strict=True)
-    ]
-    verdicts = [provers[own].of_builds({"": steps}).get("", ()) for own, steps in ways]
-    said = builds_in_words({f"point {k}": each for k, each in enumerate(departures, start=1)})
+) -> dict[str, bytes | str]:
+    """Return the files of a Pareto set by name."""
+    engine, free = problem.engine, states_of(problem)
+    options.tell("analyzing plans")
+    found: dict[str, pd.DataFrame] = {}
+    verdicts: dict[str, tuple[BuildVerdicts, ...]] = {}
+    for own, builds in _by_engine(front).items():
+        found |= zip(builds, analyze_builds(own, [*builds.values()]), strict=True)
+        verdicts |= provers[own].of_builds(builds)
+    options.tell("drawing and writing the page")
+    tables = {name: found[name] for name in _names(front)}
     posed = {
         "scene": engine.network.scene.name,
         "schedule": str(options.schedule),
@@ -222,26 +228,47 @@ def _front_files(
         "points": len(front.steps),
         "complete": front.complete,
         "seconds": dict(front.seconds),
-        "outside_linear_range": list(said),
+        "outside_linear_range": list(builds_in_words(departures)),
         **posed,
         **provenance(engine),
     }
     numbered = _numbered(front).reset_index()
-    for each in [*zip(*verdicts, strict=True)]:
+    for each in [*zip(*(verdicts.get(name, ()) for name in tables), strict=True)]:
         numbered[f"falls_{each[0].mortar}"] = [found.count(Verdict.FALLS) for found in each]
-    if said:
-        numbered["outside_linear_range"] = ["yes" if each else "" for each in departures]
+    if departures:
+        numbered["outside_linear_range"] = ["yes" if name in departures else "" for name in tables]
     orders = [own.network.scene.build_order for own in front.engines]
     if {*orders} - {engine.network.scene.build_order}:
         numbered["order"] = [",".join(map(str, order)) for order in orders]
-    plans = [table.assign(point=number) for number, table in enumerate(tables, start=1)]
+    plans = [table.assign(point=number) for number, table in enumerate(tables.values(), start=1)]
     return {
         PAGE: front_page(engine, front, tables, departures, verdicts),
         "pareto.csv": csv_text(numbered),
         "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
         **_picture(front, methods),
         "summary.json": json.dumps(summary, indent=2) + "\n",
-    }, said
+    }
+
+
+def _names(front: Front) -> list[str]:
+    """Return what the plans of a Pareto set are called, in the order of its rows."""
+    return [f"point {number}" for number in range(1, len(front.steps) + 1)]
+
+
+def _by_engine(front: Front) -> dict[Engine, dict[str, Sequence[Step]]]:
+    """Return the steps of plans by name, those of one build order under their engine."""
+    found = defaultdict[Engine, dict[str, Sequence[Step]]](dict)
+    for name, own, steps in zip(_names(front), front.engines, front.steps, strict=True):
+        found[own][name] = steps
+    return found
+
+
+def _departures(front: Front) -> dict[str, tuple[Departure, ...]]:
+    """Return how plans leave the linear range, for those that do, by name."""
+    left: dict[str, tuple[Departure, ...]] = {}
+    for own, builds in _by_engine(front).items():
+        left |= LinearRange(own).of_steps(builds)
+    return {name: left[name] for name in _names(front) if name in left}
 
 
 def _numbered(front: Front) -> pd.DataFrame:
