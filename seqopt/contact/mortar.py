@@ -62,12 +62,12 @@ Examples
 MORTARS = {"epoxy": EPOXY, "dry": DRY}
 
 
-def is_as_strong(mortar: Mortar, other: Mortar) -> bool:
+def _is_as_strong(mortar: Mortar, other: Mortar) -> bool:
     """Return whether a mortar carries whatever another one does: what stands with that, stands.
 
     Friction takes from what is carried in shear where a contact is pulled: there it must be equal.
 
-    >>> is_as_strong(EPOXY, DRY), is_as_strong(DRY, EPOXY)
+    >>> _is_as_strong(EPOXY, DRY), _is_as_strong(DRY, EPOXY)
     (True, False)
     """
     slides = mortar.friction - other.friction

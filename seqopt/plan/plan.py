@@ -43,9 +43,9 @@ from seqopt.responses.table import (
     OUTSIDE,
     Departure,
     _Columns,
+    _each_fields,
     _response_columns,
     _table_of,
-    each_fields,
 )
 from seqopt.sequence.rules import Ending, FreeRules
 from seqopt.sequence.schedule import Schedule
@@ -368,7 +368,7 @@ class Plan(ShownBuild):
     def _columns(self) -> _Columns:
         met = {} if self.search is None else self.search.fields
         new = (step for step in self.steps if step.number not in met)
-        others = each_fields(self.engine, new, Want.ALL)
+        others = _each_fields(self.engine, new, Want.ALL)
         fields = (met.get(step.number) or next(others) for step in self.steps)
         # of all fields, which what steps leave is judged by too
         answers = ((s, self._within.seen(s, f)) for s, f in zip(self.steps, fields, strict=True))

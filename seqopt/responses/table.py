@@ -153,7 +153,7 @@ class LinearRange:
     def of_steps(self, builds: Mapping[str, Sequence[Step]]) -> dict[str, tuple[Departure, ...]]:
         """Return the same of builds by their steps: of all states no more is computed."""
         states, shift = _distinct(builds.values()), RESPONSES["D_max"]
-        fields = each_fields(self.engine, states.values(), Want.DISPLACEMENTS)
+        fields = _each_fields(self.engine, states.values(), Want.DISPLACEMENTS)
         moved = {
             state: shift.of(self._network, found)[0] * shift.scale if state[0] else 0.0
             for state, found in zip(states, fields, strict=True)
@@ -297,13 +297,13 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
         kind = type(engine).__name__
         raise SceneError(f"a {kind} is not an engine; give make_engine('compliance', network)")
     steps = require_steps(steps)
-    return response_table(engine.network, zip(steps, each_fields(engine, steps), strict=True))
+    return response_table(engine.network, zip(steps, _each_fields(engine, steps), strict=True))
 
 
-def analyze_builds(engine: Engine, builds: Sequence[Sequence[Step]]) -> list[pd.DataFrame]:
+def _analyze_builds(engine: Engine, builds: Sequence[Sequence[Step]]) -> list[pd.DataFrame]:
     """Return the table of `analyze` of every build; states that builds share are computed once."""
     states, network = _distinct(builds), engine.network
-    pairs = zip(states.items(), each_fields(engine, states.values()), strict=True)
+    pairs = zip(states.items(), _each_fields(engine, states.values()), strict=True)
     rows = {state: _row(network, step, fields) for (state, step), fields in pairs}
     every = (
         [
@@ -392,7 +392,7 @@ def step_fields(engine: Engine, step: Step, want: Want = Want.RESPONSES) -> Fiel
         return engine.solve(step.bricks, _grips_of(engine.network.scene, step), want)
 
 
-def each_fields(
+def _each_fields(
     engine: Engine, steps: Iterable[Step], want: Want = Want.RESPONSES
 ) -> Iterator[Fields]:
     """Yield the full fields of every step, as `step_fields`.

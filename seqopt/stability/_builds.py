@@ -14,7 +14,7 @@ import pandas as pd
 
 from seqopt._files import csv_text
 from seqopt.contact._partial_assemblies import PartialAssemblies
-from seqopt.contact.mortar import DRY, EPOXY, Mortar, _with_mortar, is_as_strong
+from seqopt.contact.mortar import DRY, EPOXY, Mortar, _is_as_strong, _with_mortar
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
@@ -184,8 +184,8 @@ class BuildProver:
         for state, verdict in self._way(name, new)(new, mortar, tell):
             self._known[name][state] = found[state] = verdict
         for other, held in self._mortars.items():
-            sure = {Verdict.STANDS} if is_as_strong(held, mortar) else set()
-            sure |= {Verdict.FALLS} if is_as_strong(mortar, held) else set()
+            sure = {Verdict.STANDS} if _is_as_strong(held, mortar) else set()
+            sure |= {Verdict.FALLS} if _is_as_strong(mortar, held) else set()
             implied = {state: verdict for state, verdict in found.items() if verdict in sure}
             self._known[other] = implied | self._known[other]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from experiments.stability.parts.blocks import stack
-from seqopt.contact.mortar import DRY, EPOXY, Mortar, is_as_strong
+from seqopt.contact.mortar import DRY, EPOXY, Mortar, _is_as_strong
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND
 
@@ -46,11 +46,11 @@ def test_a_mortar_is_as_strong_as_another_where_it_carries_all_of_it():
     press, slide = rng.uniform(-1.2, 3.0, 4000), rng.uniform(0.0, 4.0, 4000)
     borne = [carries(mortar, press, slide) for mortar in every]
     for (weak, first), (strong, second) in product(zip(every, borne, strict=True), repeat=2):
-        assert not is_as_strong(strong, weak) or (second | ~first).all()
-    assert is_as_strong(EPOXY, DRY)
-    assert is_as_strong(Mortar(friction=1.0), Mortar(friction=0.5))
+        assert not _is_as_strong(strong, weak) or (second | ~first).all()
+    assert _is_as_strong(EPOXY, DRY)
+    assert _is_as_strong(Mortar(friction=1.0), Mortar(friction=0.5))
     pulled = Mortar(friction=0.5, tensile_strength=1.0, cohesion=1.0)
     rough = replace(pulled, friction=1.0)
-    assert not is_as_strong(rough, pulled)  # it slides where it is pulled
+    assert not _is_as_strong(rough, pulled)  # it slides where it is pulled
     assert carries(pulled, -1.0, 0.3)
     assert not carries(rough, -1.0, 0.3)

@@ -11,7 +11,7 @@ import seqopt
 from seqopt.engines.interface import FLAGS, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError
-from seqopt.responses.table import analyze, analyze_builds, each_fields, step_fields
+from seqopt.responses.table import _analyze_builds, _each_fields, analyze, step_fields
 from seqopt.sequence.steps import Step, StepKind
 
 
@@ -28,7 +28,7 @@ def builds(engine):
 def test_they_are_those_of_every_step_alone(engine, builds):
     last = Step(99, StepKind.REMOVE, 0, (None,) * len(engine.network.scene.robots))
     steps = [*builds[0], *builds[1], *builds[0][::-1], last]
-    found = each_fields(engine, steps, Want.ALL)
+    found = _each_fields(engine, steps, Want.ALL)
     for step, fields in zip(steps, found, strict=True):
         own = step_fields(engine, step, Want.ALL)
         for name in ("grip_force", *FLAGS):
@@ -47,7 +47,7 @@ def test_equal_states_are_solved_once_and_others_with_as_many_grips_together(
         return real(self, bricks, grips, *how)
 
     monkeypatch.setattr(ComplianceEngine, "solve", noted)
-    tables = analyze_builds(engine, [*builds, *builds])
+    tables = _analyze_builds(engine, [*builds, *builds])
     states = {(step.bricks, step.grips) for steps in builds for step in steps}
     assert sum(count for _, count in calls) == len(states)
     assert len(calls) < len(states)
@@ -69,4 +69,4 @@ def test_an_error_names_the_step_whose_it_is(engine, builds):
     held = next(step for step in builds[0] if step.bricks == 3 and len(step.held) > 1)
     loose = Step(7, StepKind.RELEASE, 3, (None,) * len(scene.robots))
     with pytest.raises(MechanismError, match=r"^step 7: "):
-        [*each_fields(hinged, [held, loose])]
+        [*_each_fields(hinged, [held, loose])]

@@ -46,7 +46,7 @@ from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, _said_limits
 from seqopt.report._pages import front_page
 from seqopt.report.comparison import fixed_methods, shown_table, worst_of
 from seqopt.responses._tolerance import value_text
-from seqopt.responses.table import OUTSIDE, Departure, LinearRange, analyze_builds, builds_in_words
+from seqopt.responses.table import OUTSIDE, Departure, LinearRange, _analyze_builds, builds_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
@@ -213,7 +213,7 @@ def _front_files(
     found: dict[str, pd.DataFrame] = {}
     verdicts: dict[str, tuple[BuildVerdicts, ...]] = {}
     for own, builds in _by_engine(front).items():
-        found |= zip(builds, analyze_builds(own, [*builds.values()]), strict=True)
+        found |= zip(builds, _analyze_builds(own, [*builds.values()]), strict=True)
         verdicts |= provers[own].of_builds(builds)
     options.tell("drawing and writing the page")
     tables = {name: found[name] for name in _names(front)}
