@@ -236,15 +236,15 @@ def test_steps_that_are_given_are_reported():
     assert sum(len(each.steps) for each in down) == len(heavy)
 
 
-def test_a_robot_takes_over_only_what_it_carries():
-    slow = "fetch=30,place=10,approach=10,grip=5,release=5"
-    for third, able in ((150.0, False), (400.0, True)):
-        scene = wall(400.0, 400.0, third).with_durations(slow)
-        engine = seqopt.make_engine("compliance", scene)
-        build = seqopt.plan.build.GivenSequence(engine, seqopt.sequential(engine.network))
-        found = carriers(scene, build.reassigned())
-        assert found[4] == 400
-        assert able or min(found.values()) == 150  # it has another one
+@pytest.mark.parametrize(("payload", "places"), [(20.0, False), (24.0, True)])
+def test_a_robot_takes_over_only_what_it_carries(payload, places):
+    """A third robot is much quicker, and bears what the first grips hold, but not what they lift."""
+    words = "fetch=30,place=10,approach=10,grip=5,release=5"
+    scene = wall(400.0, 400.0, payload).with_durations(words, "rob3:slower=0.01")
+    engine = seqopt.make_engine("compliance", scene)
+    build = seqopt.plan.build.GivenSequence(engine, seqopt.sequential(engine.network))
+    assert build.responses()[["F_rob1_N", "F_rob2_N"]][:3].abs().max().max() < 20 < LIGHT < 24
+    assert (payload in carriers(scene, build.reassigned()).values()) == places
 
 
 def test_the_command_line_names_brick_weight_and_robot(capsys, tmp_path):
