@@ -238,7 +238,7 @@ def test_steps_that_are_given_are_reported():
 
 @pytest.mark.parametrize(("payload", "places"), [(20.0, False), (24.0, True)])
 def test_a_robot_takes_over_only_what_it_carries(payload, places):
-    """A third robot is much quicker, and bears what the first grips hold, but not what they lift."""
+    """A third robot is much quicker, and bears what first grips hold, but not what they lift."""
     words = "fetch=30,place=10,approach=10,grip=5,release=5"
     scene = wall(400.0, 400.0, payload).with_durations(words, "rob3:slower=0.01")
     engine = seqopt.make_engine("compliance", scene)
