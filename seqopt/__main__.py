@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import _thread
 import contextlib
 import gc
 import io
@@ -13,6 +12,8 @@ import threading
 import traceback
 from collections.abc import Callable
 from types import FrameType
+
+from seqopt._interrupts import interrupt_main
 
 INTERRUPTED, FAILED, CRASHED = (
     130,
@@ -87,16 +88,9 @@ def _leave(*_: object) -> None:
 def _raise_again(lost: sys.UnraisableHookArgs) -> None:
     """Ask once more where an interrupt met what cannot raise, as the end of an object."""
     if issubclass(lost.exc_type, KeyboardInterrupt):
-        threading.Timer(AGAIN, _interrupt).start()  # at once it would meet this hook
+        threading.Timer(AGAIN, interrupt_main).start()  # at once it would meet this hook
     else:
         sys.__unraisablehook__(lost)
-
-
-def _interrupt() -> None:
-    if hasattr(signal, "pthread_kill") and (main := threading.main_thread().ident):
-        signal.pthread_kill(main, signal.SIGINT)  # ends a wait too
-    else:
-        _thread.interrupt_main()
 
 
 def _require_room() -> None:

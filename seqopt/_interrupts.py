@@ -68,6 +68,15 @@ def answered(told: Callable[[], object]) -> Iterator[None]:
         give_back()
 
 
+def interrupt_main() -> None:
+    """Interrupt the main thread as ctrl-C does, from any other: where it waits that ends too."""
+    main = threading.main_thread().ident
+    if hasattr(signal, "pthread_kill") and main:
+        signal.pthread_kill(main, signal.SIGINT)
+    else:
+        _thread.interrupt_main()
+
+
 @contextmanager
 def _heard(over: threading.Event) -> Iterator[None]:
     """Let an end be heard where interrupts are ignored, as they are in a background job."""
@@ -102,7 +111,7 @@ def ending(seconds: float) -> Iterator[None]:
 
     def end() -> None:
         over.set()
-        _thread.interrupt_main()
+        interrupt_main()
 
     timer = threading.Timer(min(seconds, threading.TIMEOUT_MAX), end)
     timer.daemon = True

@@ -120,6 +120,10 @@ class SceneWarning(UserWarning):
     """Something in a scene is possible but probably a mistake."""
 
 
+class PluginWarning(UserWarning):
+    """A package of others registers something that cannot be used; it is left out."""
+
+
 def did_you_mean(given: object, known: Iterable[str]) -> str:
     """Return a hint at the word that was probably meant, or nothing where none or two are near.
 

@@ -31,6 +31,7 @@ from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability._settlement import _settlement_said
 from seqopt.stability.assessment import Verdict
 from seqopt.study.published import PUBLISHED
+from seqopt.work._clock import INTERRUPT, TIME, Clock
 
 
 def scene_facts(scene: Scene) -> dict[str, object]:
@@ -199,6 +200,16 @@ def _settlement_notes(scene: Scene) -> tuple[str, ...]:
     """Return that movements of the ground enter no verdict, if it moves."""
     said = _settlement_said(scene)
     return (f"stability: {said}",) if said else ()
+
+
+WHY = {TIME: "time is over", INTERRUPT: "interrupted"}
+
+
+def _not_done(clock: Clock) -> Iterator[str]:
+    """Yield what was left out for lack of time, or at an interrupt, a line for each."""
+    for why in dict.fromkeys(clock.left_out.values()):
+        names = [name for name, reason in clock.left_out.items() if reason == why]
+        yield f"not done, {WHY[why]}: {', '.join(names)}"
 
 
 def marked(answer: Answer, outside: Sequence[object]) -> Answer:

@@ -17,13 +17,11 @@ from seqopt._showing import PAGE
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.states.states import States
 from seqopt.plan.build import ShownBuild
-from seqopt.plan.calling.formulation import trace_rows
 from seqopt.plan.plan import Plan
 from seqopt.scene.scene_file import builtin_scenes, dump_scene
 from seqopt.stability._builds import BuildProver
 
 if TYPE_CHECKING:
-    from seqopt.plan.out_of_sample import Trial
     from seqopt.report._speed._table import SpeedTable
     from seqopt.report.comparison import Comparison
 
@@ -86,20 +84,32 @@ TABLES = {
 }
 
 
-def plan_files(
-    plan: Plan,
-    report: Mapping[str, object],
-    prover: BuildProver,
-    trial: Trial | None = None,
-    *,
-    choices: bool = False,
+def _steps_table(plan: ShownBuild) -> pd.DataFrame:
+    """Return the steps of a plan without any response: as much as reading it again takes."""
+    robots = plan.engine.network.scene.robots
+    rows = [(s.number, s.kind.value, s.bricks, *s.grips) for s in plan.steps]
+    names = ["step", "type", "bricks", *(f"{robot.name}_node" for robot in robots)]
+    return pd.DataFrame(rows, columns=names).astype(
+        {name: "Int64" for name in names if name != "type"}
+    )
+
+
+def _bare_files(
+    plan: ShownBuild, table: pd.DataFrame, report: Mapping[str, object]
 ) -> dict[str, bytes | str]:
-    """Return the tables of a plan, its summary, scene and page, by file name.
+    """Return what a plan is, by file name: a table of its steps, its scene, and its summary."""
+    return {
+        "plan.csv": csv_text(table),
+        "summary.json": json.dumps(_plain(report), indent=2) + "\n",
+        "scene.json": dump_scene(plan.engine.network.scene),
+    }
 
-    The trial is of the plan in other scenarios; ``choices``: whether every choice is in a table.
+
+def plan_files(plan: Plan, *, choices: bool = False) -> dict[str, bytes | str]:
+    """Return the tables and tasks of a plan by file name.
+
+    ``choices``: whether every choice is in a table.
     """
-    from seqopt.report._pages import plan_page  # noqa: PLC0415  # only where files are written
-
     tables = {"plan": plan.responses()}
     if not isinstance(plan.graph, States):
         tables["selection"] = plan.table()
@@ -109,20 +119,10 @@ def plan_files(
         tables["responses"] = plan.alternatives()
     if plan.engine.network.scene.props:
         tables["props"] = plan.props()
-    if rows := trace_rows(plan.trace):
-        tables["trace"] = pd.DataFrame(rows)
-    if trial is not None:
-        tables["scenarios"] = trial.table
     if plan.makespan is not None:
         tables["times"] = plan.times()
-    return {
-        **{f"{name}.csv": csv_text(table) for name, table in tables.items()},
-        "summary.json": json.dumps(_plain(report), indent=2) + "\n",
-        "scene.json": dump_scene(plan.engine.network.scene),
-        **_task_files(plan),
-        **_time_files(plan),
-        PAGE: plan_page(plan, prover, table=tables["plan"]),
-    }
+    files: dict[str, bytes | str] = {f"{n}.csv": csv_text(table) for n, table in tables.items()}
+    return {**files, **_task_files(plan), **_time_files(plan)}
 
 
 def _picked_files(
@@ -135,9 +135,7 @@ def _picked_files(
     scene, table = plan.engine.network.scene, plan.responses()
     tasks = _task_texts(scene, plan.steps)
     return {
-        "plan.csv": csv_text(table),
-        "summary.json": json.dumps(_plain(report), indent=2) + "\n",
-        "scene.json": dump_scene(scene),
+        **_bare_files(plan, table, report),
         **{f"tasks.{kind}": text for kind, text in tasks.items()},
         **_time_files(plan),
         PAGE: plan_page(plan, prover, table=table),
@@ -183,11 +181,11 @@ def put_table(path: Path | None, table: pd.DataFrame, said: str) -> dict[str, An
     return {"text": f"{said} written to {path}", "written": (path,)}
 
 
-def written_to(folder: Path | None) -> str:
+def written_to(folder: Path | None, *, page: bool = True) -> str:
     """Return where a folder with a page was written, and what shows it, or how to have one."""
     if folder is None:
         return "--out DIR writes the plan, its tables and a page that shows it step by step"
-    return f"written to {folder}; {folder / PAGE} shows it step by step"
+    return f"written to {folder}" + f"; {folder / PAGE} shows it step by step" * page
 
 
 def write_outputs(

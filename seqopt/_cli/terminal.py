@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, TextIO
 
-from seqopt.errors import FileError, SceneWarning
+from seqopt.errors import FileError, PluginWarning, SceneWarning
 
 NARROWEST, WIDEST = 40, 100  # columns that text is wrapped to
 STYLES = {"heading": "1", "bad": "1;31", "doubt": "33"}  # of terminals: bold, bold red, yellow
@@ -156,7 +156,7 @@ def silence(stream: TextIO) -> None:
 
 @contextmanager
 def quiet_numbers(*, quiet: bool = False) -> Iterator[None]:
-    """Print warnings about a scene as a line each, or leave them out if it is to be quiet.
+    """Print warnings about a scene or plug-in as a line each, or none if it is to be quiet.
 
     What is not finite is an error of its own.
     """
@@ -165,6 +165,7 @@ def quiet_numbers(*, quiet: bool = False) -> Iterator[None]:
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore", RuntimeWarning)
         warnings.simplefilter("ignore" if quiet else "always", SceneWarning)
+        warnings.simplefilter("ignore" if quiet else "always", PluginWarning)
         warnings.showwarning = _as_a_line(warnings.showwarning)
         yield
 
@@ -175,7 +176,7 @@ def _as_a_line(otherwise: Callable[..., None]) -> Callable[..., None]:
     def show_warning(message: Warning | str, category: type[Warning], *rest: Any) -> None:
         if str(message) in said:
             return
-        if issubclass(category, SceneWarning):
+        if issubclass(category, SceneWarning | PluginWarning):
             said.add(str(message))
             note(f"seqopt: warning: {message}")
         else:

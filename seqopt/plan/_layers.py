@@ -12,7 +12,7 @@ from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers, _require_carried, steps_over, travel
 from seqopt.graph.scenarios import ScenarioLayers, engine_for
-from seqopt.plan.calling._guard import require_fit, require_proof, require_time, select
+from seqopt.plan.calling._guard import readable, require_fit, require_proof, require_time, select
 from seqopt.plan.calling.formulation import (
     End,
     Formulation,
@@ -26,14 +26,16 @@ from seqopt.plan.calling.formulation import (
 )
 from seqopt.plan.judge._posture_rules import check_postures
 from seqopt.plan.judge._shape_rules import check_shape
-from seqopt.plan.judge.certificate import _require_anew, certify_partial, judge
+from seqopt.plan.judge.certificate import Certificate, _require_anew, certify_partial, judge
 from seqopt.plan.plan import Plan
 from seqopt.problem.criteria import Among
 from seqopt.problem.problem import Aim, AskedBudget
 from seqopt.problem.requirements import LINEAR_RANGE
 from seqopt.sequence._rule_check import check_carried
 from seqopt.sequence.steps import Step
+from seqopt.work._clock import INTERRUPT
 
+PROOF = "the proof"  # what it is called where there was no time for it
 CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, without budgets
 
 
@@ -80,6 +82,7 @@ def solve_layers(graph: PlacementProblem, formulation: Formulation, run: Run) ->
         )
     require_fit(graph, formulation, run.options)
     require_time(formulation, run.time_limit)
+    require_time(formulation, run.clock.left)
     if isinstance(graph, Layers):
         graph.require_possible()
     elif isinstance(graph, ScenarioLayers) and isinstance(graph.nominal, Layers):
@@ -104,16 +107,25 @@ def on_the_way(plan: Plan) -> Plan:
 def _solve_all(graph: PlacementProblem, formulation: Formulation, run: Run) -> Plan:
     """Return the certified plan of a formulation that is given the costs of all choices."""
     seconds: dict[str, float] = {}
-    stages = graph.seconds(formulation.aim or Aim.SUM)  # computes costs: solving is timed alone
+    with run.clock.needed("computing the responses of all choices"):
+        stages = graph.seconds(formulation.aim or Aim.SUM)  # of costs: solving is timed alone
     with timed(seconds, "solve"):
-        selection = select(formulation, graph, Watch(run.time_limit, run.progress), **run.options)
+        selection = select(formulation, graph, Watch(run.left, run.progress), **run.options)
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
-    with timed(seconds, "verify"):
-        certificate = judge(graph, selection, formulation)
-        steps = _checked(graph.steps(selection.choice), graph)
+
+    def proven() -> Certificate:
         for layers in _from_cache(graph):
             _require_anew(layers, selection.choice)
+        return judge(graph, selection, formulation)
+
+    with timed(seconds, "verify"):
+        certificate = run.clock.spare(PROOF, proven, None)
+        with readable(formulation.name):
+            steps = _checked(graph.steps(selection.choice), graph)
+    if certificate is None:
+        early = run.clock.left_out[PROOF] == INTERRUPT
+        selection = replace(selection, end=End.INTERRUPTED if early else End.STOPPED)
     stages = {**stages, **{stage: seconds[stage] for stage in ("compile", "solve", "verify")}}
     return Plan(graph, graph, formulation, selection, certificate, steps, stages)
 
@@ -139,7 +151,7 @@ def _solve_windows(graph: PlacementProblem, formulation: Formulation, run: Run) 
 
     seconds: dict[str, float] = {}
     with timed(seconds, "search"):
-        found = search_windows(graph, Watch(run.time_limit), fields=True)
+        found = search_windows(graph, Watch(run.left), fields=True)
     respond = sum(part.evaluation.seconds for part in (found.alone, *found.shared))
     with timed(seconds, "verify"):
         steps = _checked(graph.steps(found.choice), graph)
@@ -159,7 +171,7 @@ def _solve_lazily(graph: PlacementProblem, formulation: Formulation, run: Run) -
 
     seconds: dict[str, float] = {}
     with timed(seconds, "search"):
-        found = search_pairs(graph, formulation, Watch(run.time_limit, run.progress))
+        found = search_pairs(graph, formulation, Watch(run.left, run.progress))
     chosen, along = found.selection, found.along
     with timed(seconds, "verify"):
         certificate = certify_partial(found.costs, chosen, found.objective)

@@ -15,12 +15,16 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, SeqoptError, message_of
 from seqopt.graph.scenarios import ScenarioLayers, engine_for
 from seqopt.graph.states.states import States
+from seqopt.plan.calling._guard import StatePath
+from seqopt.plan.calling.formulation import End
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses._range import Moved, most_moved
 from seqopt.sequence.steps import Step
+from seqopt.work._clock import INTERRUPT, Clock
 
+RANGE = "how far it leaves the linear range"  # what it is called where there was no time for it
 NONE_KEEPS = "no plan keeps it"
 UNKNOWN = "whether any plan keeps it is not known"
 Found = TypeVar("Found")
@@ -46,6 +50,10 @@ class _WithPlans(Protocol):
     def steps(self) -> tuple[tuple[Step, ...], ...]: ...
     @property
     def engines(self) -> tuple[Engine, ...]: ...
+    @property
+    def moved(self) -> tuple[Moved, ...]: ...
+    @property
+    def stopped(self) -> str: ...
 
 
 FoundPlans = TypeVar("FoundPlans", bound=_WithPlans)
@@ -83,20 +91,39 @@ def engines_of(plan: Plan) -> Sequence[Engine]:
     return (plan.engine,)
 
 
-def measured(plan: Plan) -> Plan:
-    """Return a plan with how far its steps move nodes."""
-    return replace(plan, moved=most_moved(engines_of(plan), plan.steps))
+def measured(plan: Plan, clock: Clock) -> Plan:
+    """Return a plan with how far its steps move nodes, as far as there is time to know it."""
+    moved = clock.spare(RANGE, lambda: most_moved(engines_of(plan), plan.steps), None)
+    if moved is None and clock.left_out[RANGE] == INTERRUPT:
+        return interrupted(plan)
+    return replace(plan, moved=moved)
 
 
-def best_within(problem: Problem, solved: Callable[[Problem], Plan]) -> Plan:
+def interrupted(plan: Plan) -> Plan:
+    """Return a plan after which somebody asked for an end."""
+    chosen = plan.selection
+    if isinstance(chosen, StatePath):
+        return replace(plan, selection=replace(chosen, stopped=INTERRUPT))
+    return replace(plan, selection=replace(chosen, end=End.INTERRUPTED))
+
+
+def best_within(problem: Problem, solved: Callable[[Problem], Plan], clock: Clock) -> Plan:
     """Return the best plan of a problem that keeps the linear range, or of all where none does.
 
-    ``solved``: returns the best plan of the problem itself, or of the same with the limit.
+    ``solved``: returns the best plan of the problem itself, or of the same with the limit;
+    ``clock``: of both. An interrupt of the second leaves the first.
     """
-    plan = measured(solved(problem))
+    plan = measured(solved(problem), clock)
     if problem.says_range or plan.moved is None:
         return plan
-    found, why = keeping(plan, plan.moved, lambda: measured(solved(problem.within_range(1.0))))
+    if plan.ended is End.INTERRUPTED:
+        return replace(plan, beyond=f"{UNKNOWN} (interrupted)" * leaves(plan.moved))
+    try:
+        found, why = keeping(
+            plan, plan.moved, lambda: measured(solved(problem.within_range(1.0)), clock)
+        )
+    except KeyboardInterrupt:
+        found, why = interrupted(plan), f"{UNKNOWN} (interrupted)"
     return replace(found, beyond=why)
 
 
@@ -105,23 +132,39 @@ def best_of_several(problem: Problem, found: Callable[[Problem], FoundPlan]) -> 
     if problem.says_range:
         return found(problem)
     first = found(problem.within_range(math.inf))
-    assert first.plan.moved is not None
-    best, why = keeping(first, first.plan.moved, lambda: found(problem.within_range(1.0)))
+    if first.plan.moved is None or first.plan.ended is End.INTERRUPTED:  # there is no more time
+        return first
+    try:
+        best, why = keeping(first, first.plan.moved, lambda: found(problem.within_range(1.0)))
+    except KeyboardInterrupt:
+        best, why = replace(first, plan=interrupted(first.plan)), f"{UNKNOWN} (interrupted)"
     own = replace(best.problem, limits=problem.limits)
     return replace(best, plan=replace(best.plan, problem=own, beyond=why), problem=own)
 
 
-def best_front(problem: Problem, found: Callable[[Problem], FoundPlans]) -> FoundPlans:
+def best_front(
+    problem: Problem, found: Callable[[Problem], FoundPlans], clock: Clock
+) -> FoundPlans:
     """Return the same of a Pareto set: all of its plans keep the range, or none can."""
 
-    def measured_front(asked: Problem) -> tuple[FoundPlans, Moved]:
+    def measured_front(asked: Problem) -> FoundPlans:
         front = found(asked)
-        pairs = zip(front.engines, front.steps, strict=True)
-        moved = tuple(most_moved((own,), steps) for own, steps in pairs)
-        return replace(front, moved=moved), max(moved, key=lambda each: each.share)
 
-    front, farthest = measured_front(problem)
-    if problem.says_range:
+        def measure() -> tuple[Moved, ...]:
+            pairs = zip(front.engines, front.steps, strict=True)
+            return tuple(most_moved((own,), steps) for own, steps in pairs)
+
+        moved: tuple[Moved, ...] = clock.spare(RANGE, measure, ())
+        return replace(front, moved=moved)
+
+    front = measured_front(problem)
+    if problem.says_range or not front.moved:
         return front
-    kept, why = keeping(front, farthest, lambda: measured_front(problem.within_range(1.0))[0])
+    farthest = max(front.moved, key=lambda each: each.share)
+    if front.stopped == INTERRUPT:
+        return replace(front, beyond=f"{UNKNOWN} (interrupted)" * leaves(farthest))
+    try:
+        kept, why = keeping(front, farthest, lambda: measured_front(problem.within_range(1.0)))
+    except KeyboardInterrupt:
+        kept, why = replace(front, stopped=INTERRUPT), f"{UNKNOWN} (interrupted)"
     return replace(kept, beyond=why)

@@ -20,7 +20,7 @@ from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.graph.states._visits import barred, steps_in_hands
 from seqopt.graph.states.states import States
-from seqopt.plan._layers import solve_layers
+from seqopt.plan._layers import PROOF, solve_layers
 from seqopt.plan._status import FoundOrder
 from seqopt.plan.calling._guard import (
     StatePath,
@@ -114,7 +114,7 @@ def solve_instance(instance: Instance, named: Formulation | str | None, run: Run
 def _of_graph(instance: Instance, formulation: Formulation, run: Run) -> Plan:
     """Return the plan of a path through the graph."""
     formulation.require_options(run.options)
-    limit = {} if math.isinf(run.time_limit) else {"seconds": run.time_limit}
+    limit = {} if math.isinf(run.left) else {"seconds": run.left}
     start = time.perf_counter()
     solve = partial(formulation.solve, instance, **run.options, **limit)
     found = called(formulation.name, lambda: instance, StatePath, solve)
@@ -194,24 +194,30 @@ def solve_states(graph: States, formulation: Formulation, run: Run) -> Plan:
     formulation.require_options(run.options)
     if run.lazy:  # it is at any rate
         require_proof(run.proof)
-    told = {} if run.progress is None else {"progress": run.progress}
-    limit = {} if math.isinf(run.time_limit) else {"seconds": run.time_limit}
     with keep(graph.resources.executor, graph.resources.workers):
-        return _solved(graph, formulation, run, {**run.options, **told, **limit})
+        return _solved(graph, formulation, run)
 
 
-def _solved(
-    problem: States, formulation: Formulation, run: Run, options: Mapping[str, Any]
-) -> Plan:
+def _solved(problem: States, formulation: Formulation, run: Run) -> Plan:
     start, twin = time.perf_counter(), replace(problem)  # which no formulation can reach
-    selection = _selected(formulation, (problem, twin), options, explain=run.explains)
-    solved, proof = time.perf_counter(), run.proof
-    if proof and "progress" in options:
-        options["progress"]("proving that no plan is better")
+    told = {} if run.progress is None else {"progress": run.progress}
+    limit = {} if math.isinf(run.left) else {"seconds": run.left}
+    options = {**run.options, **told, **limit}
+    with run.clock.needed("finding a first plan"):
+        selection = _selected(formulation, (problem, twin), options, explain=run.explains)
+    selection = replace(selection, stopped=run.clock.why(selection.stopped))
+    solved = time.perf_counter()
+    if run.proof and run.progress is not None:
+        run.progress("proving that no plan is better")
     steps = steps_in_hands(twin.space, selection.states, selection.grips)
     hint = dict(enumerate(selection.visited, start=twin.space.first))
     exact = formulation.kind is FormulationKind.EXACT
-    certificate = judge_schedule(twin, selection, steps, hint, exact=exact) if proof else None
+    certificate = None
+    if run.proof:
+        judged = partial(judge_schedule, twin, selection, steps, hint, exact=exact)
+        certificate = run.clock.spare(PROOF, judged, None)
+        if certificate is None:
+            selection = replace(selection, stopped=run.clock.left_out[PROOF])
     problem.certified.update(twin.certified)
     seconds = {"solve": solved - start, "verify": time.perf_counter() - solved}
     return Plan(problem, problem, formulation, selection, certificate, steps, seconds)
@@ -266,18 +272,22 @@ def solve_orders(problem: AllOrders, formulation: Formulation, run: Run) -> Plan
     """
     formulation.require_options(run.options)
     start, options = time.perf_counter(), dict(run.options)
-    if not np.isinf(run.time_limit):
-        options["seconds"] = run.time_limit
+    if not np.isinf(run.left):
+        options["seconds"] = run.left
     means = problem.states.resources
     means = replace(means, progress=run.progress or means.progress)
     twin = _judged_orders(problem)  # which no formulation can reach
     ends = start + float(options.get("seconds", inf))
     solve = partial(formulation.solve, problem, resources=means, **options)
-    selection = _selected_order(formulation, (problem, twin), ends, solve)
+    with run.clock.needed("finding a first plan"):
+        selection = _selected_order(formulation, (problem, twin), ends, solve)
+    selection = replace(selection, stopped=run.clock.why(selection.stopped))
     seconds = {"order": time.perf_counter() - start}
-    plan = _planned(formulation.name, twin, selection, proof=run.proof)
+    proof = run.proof and run.clock.left > 0
+    plan = _planned(formulation.name, twin, selection, proof=proof)
     start = time.perf_counter()
-    proven = run.proof and _proven(formulation.name, twin, selection, ends)
+    prove = partial(_proven, formulation.name, twin, selection, ends)
+    proven = proof and run.clock.spare(PROOF, prove, otherwise=False)
     seconds |= {**plan.seconds, "order_proof": time.perf_counter() - start}
     found = FoundOrder(twin, selection, proven)
     return replace(plan, problem=problem, formulation=formulation, seconds=seconds, order=found)

@@ -28,7 +28,7 @@ class Status(StrEnum):
     OUTSIDE = "optimal in the linear model alone"  # or claimed so; it does not hold of the plan
     CLAIMED = "claimed optimal"  # the formulation says so; less is proven
     FEASIBLE = "feasible"  # it ended early, is a heuristic, or its bound leaves something open
-    UNPROVEN = "unproven"  # no proof was asked for
+    UNPROVEN = "unproven"  # no proof was asked for, or it was left out
 
 
 def bare_summary(plan: Any) -> dict[str, object]:

@@ -13,13 +13,14 @@ import pandas as pd
 
 from seqopt.arrays import Floats, FrozenValue, Ints, Terse
 from seqopt.engines.interface import Engine
-from seqopt.errors import InfeasibleError, ProblemError, SolverError, did_you_mean
+from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError, did_you_mean
 from seqopt.graph._explore import Explorer, Key, Visited
 from seqopt.graph.graph import Graph
 from seqopt.graph.orders import MOST_PARTS, AllOrders, OrderStates
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
 from seqopt.graph.states._visits import barred, explore, steps_of, steps_with, with_held
 from seqopt.graph.states.states import States
+from seqopt.plan._layers import PROOF
 from seqopt.plan._range import best_front, leaves
 from seqopt.plan._rounding import _rounded_up, _rounding_steps
 from seqopt.plan.calling._guard import called, readable, text
@@ -34,6 +35,7 @@ from seqopt.responses.table import OUTSIDE
 from seqopt.scene.scene import Order
 from seqopt.sequence.rules import Ending
 from seqopt.sequence.steps import Step, StepKind
+from seqopt.work._clock import INTERRUPT, Clock
 from seqopt.work._workers import free_memory
 from seqopt.work.progress import Tell, with_progress
 
@@ -291,7 +293,8 @@ class Front(Terse):
     every row; ``engines``: what computes its responses, of the scene in its build order;
     ``complete``: whether it was proven that no further point exists; ``seconds``: by stage, s:
     solve, verify; ``moved``: how far plans move nodes, over the limit of the linear range, where
-    that was asked; ``beyond``: why some leave it, in a few words.
+    that was asked; ``beyond``: why some leave it, in a few words; ``stopped``: why it ended early:
+    ``time`` or ``interrupt``; empty if it did not.
     """
 
     table: pd.DataFrame
@@ -301,6 +304,7 @@ class Front(Terse):
     seconds: Mapping[str, float]
     moved: tuple[Moved, ...] = ()
     beyond: str = ""
+    stopped: str = ""
 
     def __repr__(self) -> str:
         whole = "complete" if self.complete else "not complete"
@@ -310,6 +314,9 @@ class Front(Terse):
         )
 
 
+_NONE_YET = "no plan was found yet; give more"
+
+
 def find_front(
     problem: Problem | _FrontProblem,
     formulation: Formulation | str = "pareto_zones",
@@ -317,6 +324,7 @@ def find_front(
     rounding: Mapping[str, float] | None = None,
     seconds: float = np.inf,
     progress: Tell = lambda _: None,
+    clock: Clock | None = None,
 ) -> Front:
     """Return the Pareto set of a problem, its points recomputed and its completeness judged.
 
@@ -324,29 +332,37 @@ def find_front(
     to multiples of, by name, SI units, which thins the set; of a problem that is posed. Its plans
     keep the linear range if any does, unless a limit on ``linear_range`` says otherwise.
     ``seconds``: after which the points found are returned; ``progress``: told how far it is, in a
-    few words or as a `seqopt.work.Stage`. Raises `InfeasibleError` if no plan is allowed;
-    `SolverError` if a plan is not worth what is claimed, or the set lacks a point.
+    few words or as a `seqopt.work.Stage`; ``clock``: of all there is to do, the proof too. Raises
+    `InfeasibleError` if no plan is allowed; `SolverError` if a plan is not worth what is claimed,
+    or the set lacks a point; `TimeUpError` if there is none in time.
     """
     formulation = as_formulation(formulation, On.FRONTS)
     if not isinstance(problem, Problem):
-        return _front_of(problem, formulation, seconds, progress)
-    end = time.perf_counter() + seconds
+        return _front_of(problem, formulation, seconds, progress, clock or Clock())
+    end, watch = time.perf_counter() + seconds, clock or Clock()
 
     def found(asked: Problem) -> Front:
-        graph, left = _posed(asked, rounding), max(0.0, end - time.perf_counter())
-        return _front_of(graph, formulation, left, progress)
+        with watch.needed("posing the problem"):
+            graph = _posed(asked, rounding)
+        left = max(0.0, end - time.perf_counter())
+        return _front_of(graph, formulation, left, progress, watch)
 
-    return best_front(problem, found)
+    return best_front(problem, found, watch)
 
 
 def _front_of(
-    problem: _FrontProblem, formulation: Formulation, seconds: float, progress: Tell
+    problem: _FrontProblem, formulation: Formulation, seconds: float, progress: Tell, clock: Clock
 ) -> Front:
     """Return the Pareto set of a problem, judged."""
     start = time.perf_counter()
     twin, name = problem.anew(), formulation.name  # which no formulation can reach
-    solve = partial(formulation.solve, problem, seconds=seconds, progress=progress)
-    found = _found(name, (problem, twin), solve)
+    limit = min(seconds, clock.left)
+    solve = partial(formulation.solve, problem, seconds=limit, progress=progress)
+    with clock.needed("finding a first plan"):
+        found = _found(name, (problem, twin), solve)
+    found = replace(found, stopped=clock.why(found.stopped))
+    if found.stopped and not len(found.points):
+        raise KeyboardInterrupt if found.stopped == INTERRUPT else TimeUpError(_NONE_YET)
     solved, problem = time.perf_counter(), twin
     points = found.points[order := np.lexsort(found.points.T[::-1])]
     with readable(name):
@@ -359,11 +375,15 @@ def _front_of(
                 f"the values of a plan are {values.tolist()}, not {point.tolist()} as claimed"
             )
     _require_apart(points)
-    if not found.stopped:
-        _require_complete(problem, points, progress)
+    stopped = found.stopped
+    if not stopped:
+        complete = partial(_require_complete, problem, points, progress)
+        whole = clock.spare(PROOF, lambda: complete() or True, otherwise=False)
+        stopped = "" if whole else clock.left_out[PROOF]
     spent = {"solve": solved - start, "verify": time.perf_counter() - solved}
     engines = tuple(map(problem.engine, chosen))
-    return Front(_table(problem, points, plans), plans, engines, not found.stopped, spent)
+    found_points = _table(problem, points, plans)
+    return Front(found_points, plans, engines, not stopped, spent, stopped=stopped)
 
 
 def _posed(problem: Problem, rounding: Mapping[str, float] | None) -> _FrontProblem:

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from seqopt.plan._tables import Objectives
     from seqopt.plan.search._window_search import WindowSearch
 
+_UNCOMPARED = "not compared with the optimum"
 COUNTED = ("looked_at", "programs", "undecided")  # of what is known of the stability of states
 
 
@@ -211,7 +212,10 @@ class Plan(ShownBuild):
         """The value of every goal by its name; of a tilt, what is survived, in degrees."""
         if isinstance(self.selection, StatePath):
             return self._by_goal(self.selection.objective)
-        return {} if self.certificate is None else self._by_goal(self.certificate.values)
+        if self.certificate is not None:
+            return self._by_goal(self.certificate.values)
+        claimed = self.selection.objective
+        return self._by_goal((claimed,)) if isfinite(claimed) else {}
 
     def _by_goal(self, values: Sequence[float]) -> dict[str, float]:
         """Return values of the first goals by their names, as people read them."""
@@ -295,7 +299,8 @@ class Plan(ShownBuild):
             among = f" among candidates {among}" if among else ""
             return f"{values}, {self.status}{within}{among}"
         if self.certificate is None:
-            return "not compared with the optimum"
+            values = ", ".join(f"{name} {value:.6g}" for name, value in self.objective.items())
+            return f"{values} (claimed), {self.status}" if values else _UNCOMPARED
         among = self.among if isinstance(self.graph, Layers | ScenarioLayers) else ""
         gap = f"gap {100 * _known_gap(self.certificate.gap):.3g} %"
         proven = f"heuristic: {among}" if among else gap
@@ -456,6 +461,22 @@ class Plan(ShownBuild):
         bare = isinstance(self.graph, CostProblem | Instance)
         return bare_summary(self) if bare else _summarized(self)
 
+    def brief(self) -> dict[str, object]:
+        """Return what is known of the plan without its responses: the first lines of a summary."""
+        return {
+            "scene": self.scene_name,
+            "schedule": self.method,
+            "formulation": self.formulation.name,
+            "kind": self.formulation.kind.value,
+            "status": str(self.status),
+            "ended": self.ended.value,
+            "stopped": self.stopped,
+            "objective": self.objective,
+            "bound": _bounds(self),
+            "gap": self.gap,
+            "steps": len(self.steps),
+        }
+
 
 def _summarized(plan: Plan) -> dict[str, object]:
     """Return the summary of a plan, with the same keys whatever it was chosen from."""
@@ -541,6 +562,8 @@ def _bounds(plan: Plan) -> dict[str, float | None]:
         elif chosen.stopped and not isfinite(proof.gap):
             bounds = tuple(map(max, chosen.bound, bounds))
         bounds = bounds[: len(plan.states.aims)]
+    elif proof is None and plan.objective:  # of a search without models nothing is known
+        bounds = (chosen.bound,)
     found = plan._by_goal(bounds) if bounds else {}
     return {name: bound if isfinite(bound) else None for name, bound in found.items()}
 

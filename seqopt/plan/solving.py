@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import recipe_of
-from seqopt.errors import NothingFoundError, ProblemError
+from seqopt.errors import NothingFoundError, ProblemError, TimeUpError
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.scenarios import ScenarioLayers, engine_for, in_scenarios
@@ -75,6 +75,8 @@ def _with_postures(problem: Problem, plan: Plan, solved: Callable[[Problem], Pla
             other = solved(_narrowed(problem, plan, fewer))
         except (ProblemError, NothingFoundError):
             continue
+        except TimeUpError:
+            break
         found = _found(other)
         if not found.unreached:
             best = bool(floor) and _no_worse(other, floor)
@@ -407,7 +409,8 @@ def solve(
         Solve only the models that the proof needs, as is always done where states are chosen.
     time_limit : float, optional
         Seconds of choosing after which it returns its best choice and a bound, as at an interrupt;
-        without proof of all it does: an error names the moves that were chosen by then.
+        without proof of all it does: an error names the moves that were chosen by then. An
+        interrupt of the proof leaves that out: values and bounds are then claimed.
     progress : callable, optional
         Called with every better choice and bound as it is found, or with a few words.
     **options
@@ -429,11 +432,15 @@ def solve(
     >>> seqopt.solve(problem, "overlap_lp").status
     <Status.OPTIMAL: 'optimal'>
     """
-    return _solved(problem, formulation, Run(time_limit, progress, proof, lazy, options))
+    return _solve_run(problem, formulation, Run(time_limit, progress, proof, lazy, options))
 
 
-def _solved(problem: Any, formulation: Formulation | str | None, run: Run) -> Plan:
-    """Return the plan of a problem, or of a graph of choices that is given."""
+def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) -> Plan:
+    """Return the plan of a problem, or of a graph of choices that is given: `solve` in parts.
+
+    What a run has no time for is left out, which its clock notes: with the proof a plan has values
+    and bounds that are claimed. Raises `TimeUpError` if there is no plan by then.
+    """
     if not isinstance(problem, Problem):
         return _of_graph(problem, formulation, run)
     found = as_formulation(formulation or usual(problem), *_able(problem))
@@ -453,11 +460,13 @@ def _solved(problem: Any, formulation: Formulation | str | None, run: Run) -> Pl
         how = replace(run, time_limit=left, explains=own)
 
         def solved(one: Problem) -> Plan:
-            return _solver(on)(graph_of(one, on), found, how)
+            with run.clock.needed("posing the problem"):
+                graph = graph_of(one, on)
+            return _solver(on)(graph, found, how)
 
         return _with_postures(asked, solved(asked), solved)
 
-    return replace(best_within(problem, best), problem=problem)
+    return replace(best_within(problem, best, run.clock), problem=problem)
 
 
 def _able(problem: Problem) -> tuple[On, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -24,7 +24,7 @@ from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import pose, solve
 from seqopt.problem._arms import arm_faults
-from seqopt.problem.criteria import RankSum, WorstRatio
+from seqopt.problem.criteria import WORST_OVER_METHODS, RankSum, WorstRatio
 from seqopt.problem.problem import Aim, Problem
 from seqopt.problem.requirements import LINEAR_RANGE, Criterion, Limit, _prop_faults, overloads
 from seqopt.report._speed._measure import speed_accuracy
@@ -36,7 +36,7 @@ from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
 from seqopt.responses.resources import Resources
 from seqopt.responses.table import Departure, LinearRange, analyze, force_column
 from seqopt.scene.scene import Scene
-from seqopt.sequence.rules import FREE, FreeRules
+from seqopt.sequence.rules import FREE, FreeRules, Newest, Payload
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.schedule_file import MOST, find_schedule, parse_plan
 from seqopt.sequence.steps import _idle_note
@@ -158,7 +158,7 @@ def compare(
     Comparison
     """
     scene = engine.network.scene
-    tables, notes = method_tables(engine, robots)
+    tables, notes, refused = _method_tables(engine, robots)
     maxima = pd.DataFrame({name: _quantities(scene, table) for name, table in tables.items()})
     printed = printed_maxima().set_axis(maxima.index) if PUBLISHED in tables else None
     rows: dict[str, dict[str, object]] = {name: {"problem": CLOSED} for name in tables}
@@ -167,9 +167,11 @@ def compare(
     rows |= {name: _row(plan) for name, plan in plans.items()}
     loop = None if problem is None else _facts(problem, rows, robots)
     fixed = [largest(scene, tables[str(name)]) for name in maxima]
-    free, refused = _free_plan(engine, _free_criterion(criterion, fixed), robots, progress)
+    free, why = _free_plan(engine, _free_criterion(criterion, fixed), robots, progress)
+    if not tables and free is None:  # whose refusal says most
+        raise StepError(f"{next(iter(refused.values()))}; {why[0]}")
     measured = _speed(engine, (problem, free), seconds=speed, progress=progress) if speed else None
-    notes += refused + _loop_notes(scene, problem)
+    notes += why + _loop_notes(scene, problem)
     if free is not None:
         tables[FREE], rows[FREE] = free.responses(), _free_row(free)
     notes += _add_largest(scene, rows, tables)
@@ -369,6 +371,16 @@ def method_tables(
         Why other methods cannot build the scene or are not what they are called, and which robots
         never grip.
     """
+    tables, notes, refused = _method_tables(engine, robots)
+    if not tables:
+        raise next(iter(refused.values()))
+    return tables, notes
+
+
+def _method_tables(
+    engine: Engine, robots: Sequence[str]
+) -> tuple[dict[str, pd.DataFrame], list[str], dict[str, StepError]]:
+    """Return the same, though it may be none, and why each method that is left out is."""
     scene = engine.network.scene
     tables: dict[str, pd.DataFrame] = {}
     refused: dict[str, StepError | MechanismError] = {}
@@ -383,12 +395,10 @@ def method_tables(
         why = degeneration(engine.network, name)
         notes += [f"{name}: {why}"] if why else []
         notes += _idle_note(scene, name, steps)
-    if not tables:
-        raise next(iter(refused.values()))
-    if is_reference_arch(scene):
+    if tables and is_reference_arch(scene):
         tables[PUBLISHED] = analyze(engine, published_plan(scene))
     refusals = [f"{name}: not possible here; {error}" for name, error in refused.items()]
-    return tables, refusals + notes
+    return tables, refusals + notes, refused
 
 
 def _free_criterion(criterion: Criterion, rows: Sequence[Mapping[str, float]]) -> Criterion:
@@ -399,22 +409,43 @@ def _free_criterion(criterion: Criterion, rows: Sequence[Mapping[str, float]]) -
     """
     if not isinstance(criterion, RankSum):
         return criterion
+    if not rows:
+        return WORST_OVER_METHODS  # of none: over what the scene itself says
     units = {"D_max": 1e-6}  # m of 1e-3 mm
     least = {n: units.get(n, 1.0) * min(r[n] for r in rows) or 1.0 for n in LARGEST}
     limits = [("F_largest", least.pop("F_rob")), *least.items()]
     return WorstRatio("worst-ratio-to-rows", tuple(limits))
 
 
+_LONE = (  # by which one robot builds, if any
+    FreeRules(least_grips=0, newest=Newest.FREE),
+    FreeRules(least_grips=0, newest=Newest.FREE, payload=Payload.IGNORED),
+)
+
+
 def _free_plan(
     engine: Engine, criterion: Criterion, robots: Sequence[str], progress: Tell
 ) -> tuple[Plan | None, list[str]]:
-    """Return the shortest free schedule with the smallest worst step, or why there is none."""
-    try:
-        rules = FreeRules(robots=tuple(robots))
-        problem = pose(engine, rules, criterion, "minmax,steps")
-        return solve(problem, "schedule_search", time_limit=PATIENCE, progress=progress), []
-    except SeqoptError as error:
-        return None, [f"{FREE}: {error}"]
+    """Return the shortest free schedule with the smallest worst step, and what is to say of it.
+
+    That is why there is none, or by which rules alone one robot builds.
+    """
+    usual = FreeRules(robots=tuple(robots))
+    alone = len(robots or engine.network.scene.robots) == 1 and not engine.network.scene.props
+    said, plan = list[str](), None
+    for rules in _LONE if alone else (usual,):
+        try:
+            asked = replace(rules, robots=usual.robots)
+            problem = pose(engine, asked, criterion, "minmax,steps")
+            plan = solve(problem, "schedule_search", time_limit=PATIENCE, progress=progress)
+        except SeqoptError as error:
+            said = said or [f"{FREE}: {error}"]
+        else:
+            kept = "" if rules.payload is Payload.KEPT else ", payload=ignored"
+            how = f"{FREE}: one robot lets go of a brick before it brings the next"
+            said = [f"{how} (least_grips=0, newest=free{kept})"] if alone else []
+            break
+    return None if plan is None else on_the_way(plan), said
 
 
 def fixed_methods(engine: Engine) -> dict[str, pd.DataFrame]:

@@ -256,3 +256,34 @@ def test_what_does_not_go_with_the_search_of_orders(capsys, tmp_path, arch, word
     assert status == 2
     assert said in err
     assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("scene", "words"),
+    [
+        ("wall:columns=2,courses=2", ("--robots", "1")),
+        ("chain:bricks=8", ("--robots", "1")),
+        ("wall:columns=2,courses=2", ("--robots", "3", "--rule", "least_grips=5")),
+    ],
+)
+def test_robots_that_are_too_few_get_one_advice_that_works(capsys, scene, words):
+    asked = ("optimize", scene, "--schedule", "free", *words)
+    status, _, err = run(capsys, *asked)
+    assert status == 2
+    assert err.startswith("seqopt: error: rule least_grips: ")
+    advice = re.search(r"\((--rule [^)]*)\)$", err.strip())[1].split()
+    assert run(capsys, *asked, *advice)[0] == 0
+
+
+@pytest.mark.parametrize("scene", ["wall:columns=2,courses=2", "chain:bricks=8"])
+def test_one_robot_is_compared_by_what_it_can_do_alone(capsys, tmp_path, scene):
+    """What needs two is named; with two nothing is left out."""
+    status, out, _ = run(capsys, "compare", scene, "--robots", "1", "--out", str(tmp_path / "c"))
+    assert status == 0
+    for name in ("sequential", "cantilever"):
+        assert f"- {name}: not possible here; scene" in out
+    assert "- free: one robot lets go of a brick before it brings the next" in out
+    assert [*pd.read_csv(tmp_path / "c" / "comparison.csv").iloc[:, 0]] == ["free"]
+    status, out, _ = run(capsys, "compare", scene, "--robots", "2", "--no-stability")
+    assert status == 0
+    assert "not possible here" not in out

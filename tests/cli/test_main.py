@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import re
 import subprocess
 import sys
@@ -72,9 +73,9 @@ def test_compare_says_what_is_not_possible(capsys, tmp_path):
     assert "<td>cantilever</td>" in (folder / "report.html").read_text("utf-8")
     assert "cantilever" in (folder / "comparison.csv").read_text("utf-8")
     path = scene_file(capsys, tmp_path, lambda d: d.update(robots=d["robots"][:1]))
-    status, _, err = run(capsys, "compare", str(path))
-    assert (status, err.count("\n")) == (2, 1)
-    assert "needs two" in err
+    status, out, _ = run(capsys, "compare", str(path))
+    assert status == 0
+    assert "needs two" in out
 
 
 def scene_file(capsys, tmp_path, change):
@@ -186,7 +187,8 @@ def test_an_interrupt_of_analyze_leaves_the_rows_so_far(tmp_path):
     assert pd.read_csv(path)["step"].tolist() == [1, 2]
 
 
-def test_a_time_limit_of_analyze_before_the_first_row_is_one_line(capsys, tmp_path):
+def test_a_time_limit_of_analyze_before_the_first_row_is_one_line(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)  # what comes before is not late
     path = tmp_path / "rows.csv"
     words = ("analyze", "--method", "cantilever", "--time-limit", "0", "--out", str(path))
     assert run(capsys, *words) == (
@@ -645,7 +647,8 @@ def test_a_budget_is_given_once(tmp_path, capsys):
     assert "budget travel=0.5: it stands there twice" in capsys.readouterr().err
 
 
-def test_a_time_limit_ends_with_a_choice_and_a_trace(tmp_path, capsys):
+def test_a_time_limit_ends_with_a_choice_and_a_trace(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)  # choosing alone is late
     words = ("--formulation", "overlap_dp", "--time-limit", "0", "--no-stability")
     words = (*words, "--out", str(tmp_path / "a"))
     assert main(["optimize", "arch25", *words]) == 0

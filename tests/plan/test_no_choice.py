@@ -14,6 +14,7 @@ from seqopt.errors import (
     InfeasibleError,
     MemoryShortError,
     NothingFoundError,
+    PluginWarning,
     ProblemError,
     SolverError,
 )
@@ -22,7 +23,12 @@ from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
 from seqopt.plan.calling import formulation as registry
-from seqopt.plan.calling.formulation import FormulationKind, Selection, find_formulation
+from seqopt.plan.calling.formulation import (
+    FormulationKind,
+    Selection,
+    find_formulation,
+    formulations,
+)
 from seqopt.plan.solving import solve
 from seqopt.responses import _blocks as batches
 from seqopt.scene.arch import ArchShape, arch_scene
@@ -216,3 +222,26 @@ def test_the_estimate_of_memory_is_about_right(problem):
     kept = sum(a.nbytes for s in problem.evaluation.steps for a in s.responses.values())
     assert 1 < batches._bytes_of_choices(problem.schedule, problem.evaluation.wanted) / kept < 5
     assert batches.free_memory() > 1e6
+
+
+def test_one_that_cannot_be_used_is_left_out_of_all_others(monkeypatch, tmp_path, capsys):
+    """A package of others that is wrong spoils no command that does not ask for it."""
+    whole = formulations()
+    folder = tmp_path / "odd-1.0.dist-info"
+    folder.mkdir()
+    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: odd\nVersion: 1.0\n")
+    entries = "odd = math:pi\nodder = no_such_package:X\noddest = odd_formulation:X\n"
+    (folder / "entry_points.txt").write_text(f"[seqopt.formulations]\n{entries}")
+    text = "from formulations.layers.cascade import FORMULATION as F\n"
+    text += "from dataclasses import replace\nX = replace(F, kind='exact')\n"
+    (tmp_path / "odd_formulation.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.warns(PluginWarning) as seen:
+        assert formulations() == whole
+    assert [str(each.message).split("'")[1] for each in seen] == ["odd", "odder", "oddest"]
+    words = ("wall:columns=2,courses=2", "--no-stability")
+    assert main(["compare", *words]) == 0
+    lines = [x for x in capsys.readouterr().err.splitlines() if x.startswith("seqopt: warning")]
+    assert ["math:pi is a float" in x for x in lines] == [True, False, False]
+    assert lines[2].endswith("has str as kind; correct it; it is left out")
+    assert main(["optimize", *words, "--formulation", "odd"]) == 2

@@ -13,6 +13,7 @@ from seqopt._cli.options import WRITTEN, declare
 from seqopt._cli.outputs import keep_apart
 from seqopt._cli.posing import asked_problem
 from seqopt._cli.screens import question
+from seqopt._cli.values import parse_time_limit
 from seqopt._cli.words.given import file_name, take
 from seqopt.errors import ProblemError
 from seqopt.graph.instances._files import WRITERS, save_instance
@@ -20,6 +21,7 @@ from seqopt.plan._compiled import compile_instance
 from seqopt.plan.calling.formulation import find_formulation
 from seqopt.plan.judge._bare._claims import first_stage
 from seqopt.problem._limit_words import number_word
+from seqopt.work._clock import Clock
 
 DESCRIPTION = (
     "Write the graph of a problem: its nodes and arcs, what they take, what is to be small and "
@@ -61,7 +63,9 @@ def run(options: argparse.Namespace) -> Answer:
         raise ProblemError("--bases: an instance is of one scene; leave it out")
     below = number_word(options.below, "--below") if options.below is not None else float("inf")
     options.out, options.command = None, "optimize"
-    problem = asked_problem(options).problem
+    clock = Clock(parse_time_limit(options.time_limit))
+    with clock.needed("posing the problem"):
+        problem = asked_problem(options).problem
     if path is None:
         path = file_name(problem.engine.network.scene.name, ".npz")
         take(options, f"file: {path}; --out names another, or a folder for every format")
@@ -70,7 +74,8 @@ def run(options: argparse.Namespace) -> Answer:
     aim = None if named is None else named.aim
     facts = {"made_by": _made_by(options.words)}
     name = options.name or path.stem
-    instance = compile_instance(problem, name=name, aim=aim, below=below, facts=facts)
+    with clock.needed("writing down the graph"):
+        instance = compile_instance(problem, name=name, aim=aim, below=below, facts=facts)
     options.tell("writing the instance")
     keep_apart(options, path)
     save_instance(instance, path)

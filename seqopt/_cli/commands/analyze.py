@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 
 import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import (
+    _not_done,
     arm_notes,
     asked_engine,
     asked_scene,
@@ -49,7 +50,7 @@ from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.build import build_network
 from seqopt.problem._limit_words import length_word
 from seqopt.problem.requirements import _prop_faults, overloads
-from seqopt.responses._enough import what_was_enough
+from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._staged import Placing, staged_fields
 from seqopt.responses._tolerance import COLUMN, stiffness_for, with_tolerances
 from seqopt.responses.quantities import _plain, _steps_in_words, length_text
@@ -57,6 +58,7 @@ from seqopt.responses.table import LinearRange, _with_faults, archive, response_
 from seqopt.sequence.steps import Step
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps
+from seqopt.work._clock import Clock
 from seqopt.work.progress import with_progress
 
 DESCRIPTION = (
@@ -71,6 +73,7 @@ EXAMPLES = (
 )
 
 
+INTERRUPTED = "seqopt: interrupted; the steps are those that were computed"
 UNITS = "in the name of each column: N, Nm, 1e-3mm"
 
 
@@ -98,7 +101,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     about = {
         "--fields FILE": "also write every edge force, node displacement and reaction, as a NumPy "
         "archive (.npz)",
-        "--time-limit SECONDS": "stop after it, with the steps that were computed by then",
+        "--time-limit SECONDS": "limit of the whole command, with what is said of the steps: those "
+        "that were computed by then are written, and what there was no time for is named",
     }
     declare(how, POSTURES)
     declare(question(command, WRITTEN), CSV_OUT | about)
@@ -108,13 +112,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> Answer:
     """Analyze every step of a sequence."""
     keep_apart(options, options.out, options.fields)
-    scene = asked_scene(options)
-    find_postures(scene, options.cache, options.tell)
-    network = build_network(scene)
-    engine, steps = asked_engine(options, network), asked_steps(options, network)
-    limit, faults = parse_time_limit(options.time_limit), dict[int, SeqoptError]()
-    within = LinearRange(engine)
-    in_time = _InTime(_step_answers(options, within, steps), limit)
+    clock, faults = Clock(parse_time_limit(options.time_limit)), dict[int, SeqoptError]()
+    with clock.needed("reading scene and steps"):
+        engine, steps = _asked(options)
+    network, within = engine.network, LinearRange(engine)
+    scene = network.scene
+    in_time = _InTime(_step_answers(options, within, steps), clock)
     solved = _solved(engine, in_time, faults)
     answers = solved if options.fields is None else list(solved)
     table = response_table(network, answers)
@@ -126,33 +129,49 @@ def run(options: argparse.Namespace) -> Answer:
         said = put_table(options.out, none, _counted(none, faults)) if faults else {}
         return Answer(facts={"steps": none}, failures=failures, status=status, **said)
     computed = [step for step in steps[:reached] if step.number not in faults]
-    table, off = _with_tolerances(options, engine, computed, table)
+    tolerances = partial(_with_tolerances, options, engine, computed, table)
+    table, off = clock.spare("tolerances", tolerances, (table, tuple[str, ...]()))
     staged = None if options.staged is None else staged_fields(network, computed, options.staged)
-    outside = within.departures(table, staged)
+    departures = partial(within.departures, table, staged)
+    outside = clock.spare("whether they are in the linear range", departures, ())
     whole = _with_faults(scene, table, steps, faults) if faults else table
     said = put_table(options.out, whole, _counted(whole, faults))
     if options.fields is not None:
         write_bytes(options.fields, archive(network, answers))
         said["written"] = (*said.get("written", ()), options.fields)
-    enough = what_was_enough(within, {"": table}, staged=staged is not None)
+    found = partial(what_was_enough, within, {"": table}, staged=staged is not None)
+    enough = clock.spare("which model is enough", found, None)
     facts = {"scene": scene_facts(scene), "units": UNITS, "steps": whole, **provenance(engine)}
     answer = Answer(
-        facts={**facts, "enough": enough.facts()},
-        notes=(
-            *off,
-            *level_notes(engine),
-            *within.unchecked,
-            *enough.lines,
-            *(f"payload exceeded: {excess}" for excess in overloads(scene, table)),
-            *(f"props: {fault}" for fault in _prop_faults(scene, table)),
-            *idle_notes(scene, steps),
-        ),
-        failures=failures,
-        status=status,
+        facts={**facts, "enough": None if enough is None else enough.facts()},
+        notes=(*off, *_notes(within, steps, table, enough), *_not_done(clock)),
+        failures=(*failures, *([INTERRUPTED] if clock.interrupted else ())),
+        status=Status.INTERRUPTED if clock.interrupted else status,
         **said,
     )
     unreached = arm_notes(scene, {"": computed})
     return strictly(answer, options, exceeded(scene, table), outside, unreached=unreached)
+
+
+def _asked(options: argparse.Namespace) -> tuple[Engine, tuple[Step, ...]]:
+    """Return the steps that are asked for, and what computes their responses."""
+    scene = asked_scene(options)
+    find_postures(scene, options.cache, options.tell)
+    network = build_network(scene)
+    return asked_engine(options, network), asked_steps(options, network)
+
+
+def _notes(
+    within: LinearRange, steps: Sequence[Step], table: pd.DataFrame, enough: Enough | None
+) -> Iterator[str]:
+    """Yield what is worth knowing of steps beside their responses."""
+    scene = within.engine.network.scene
+    yield from level_notes(within.engine)
+    yield from within.unchecked
+    yield from () if enough is None else enough.lines
+    yield from (f"payload exceeded: {excess}" for excess in overloads(scene, table))
+    yield from (f"props: {fault}" for fault in _prop_faults(scene, table))
+    yield from idle_notes(scene, steps)
 
 
 def _solved(
@@ -295,17 +314,16 @@ class _InTime:
     ``interrupted``: whether somebody ended them; those that were there by then are not lost.
     """
 
-    def __init__(self, answers: Iterator[_Answered], seconds: float) -> None:
-        self._answers, self._seconds, self.interrupted = answers, seconds, False
+    def __init__(self, answers: Iterator[_Answered], clock: Clock) -> None:
+        self._answers, self._clock, self.interrupted = answers, clock, False
 
     def __iter__(self) -> Iterator[_Answered]:
-        end = time.perf_counter() + self._seconds
-        while (answer := self._next(end - time.perf_counter())) is not None:
+        while (answer := self._next()) is not None:
             yield answer
 
-    def _next(self, seconds: float) -> _Answered | None:
+    def _next(self) -> _Answered | None:
         try:
-            with ending(seconds):
+            with ending(self._clock.left):
                 return next(self._answers, None)
         except TimeoutError:
             return None

@@ -397,6 +397,8 @@ def _of_steps(comparison: Comparison, criterion: Criterion) -> str:
     """Return what the objective is of aims that are about the worst step, in words."""
     if not isinstance(criterion, RankSum):
         return "of minimax and the free schedule its largest step"
+    if comparison.maxima.empty:
+        return "of the free schedule, which has no ranks, its worst response over what it may be"
     known = "the fixed sequences" + (" and the published plan" * (PUBLISHED in comparison.tables))
     return (
         "of minimax its largest step, of the free schedule, which has no ranks, its worst response "

@@ -5,14 +5,18 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
-from functools import cached_property
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
+
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import (
+    WHY,
+    _not_done,
     asked_prover,
     asked_scene,
     exceeded,
@@ -45,7 +49,16 @@ from seqopt._cli.options import (
     robots_option,
     scene_options,
 )
-from seqopt._cli.outputs import ALWAYS, TABLES, plan_files, require_out, write_outputs, written_to
+from seqopt._cli.outputs import (
+    ALWAYS,
+    TABLES,
+    _bare_files,
+    _steps_table,
+    plan_files,
+    require_out,
+    write_outputs,
+    written_to,
+)
 from seqopt._cli.posing import Asked, asked_problem
 from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
@@ -71,13 +84,14 @@ from seqopt._cli.words.optimizing import (
     WORKERS,
 )
 from seqopt._files import csv_text
-from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
+from seqopt._showing import PAGE
+from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, TimeUpError
 from seqopt.graph.states.states import States
 from seqopt.plan._softer import _payload_advice
-from seqopt.plan.calling.formulation import End, Formulation, On, as_formulation
+from seqopt.plan.calling.formulation import End, Formulation, On, Run, as_formulation, trace_rows
 from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.plan import Plan
-from seqopt.plan.solving import solve, usual
+from seqopt.plan.solving import _solve_run, usual
 from seqopt.problem._arms import faults_in_words
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, OWN, overloads
@@ -87,6 +101,7 @@ from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.study.published import paper_models
+from seqopt.work._clock import Clock
 from seqopt.work.progress import within
 
 if TYPE_CHECKING:
@@ -111,6 +126,7 @@ EXAMPLES = (
     "seqopt optimize my.json --criteria worst-ratio --limit payload --out mine",
 )
 INTERRUPTED = "seqopt: interrupted; the plan is the best that was met"
+VERDICTS, UNSEEN = "which steps stand", "its values in unseen scenarios"
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -139,7 +155,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Found:
-    """A plan, what was asked, and how the plan does in scenarios that it was not chosen by."""
+    """A plan, what was asked, and what there is time to say of it: from its responses to a page."""
 
     asked: Asked
     plan: Plan
@@ -148,28 +164,48 @@ class Found:
     bases: FoundBases | None = None
     whole: str = ""
     props: FoundProps | None = None
+    clock: Clock = field(default_factory=Clock)
 
     @cached_property
     def trial(self) -> Trial | None:
         """Beside other plans, where candidates were chosen over scenarios."""
-        if self.asked.unseen is None or isinstance(self.plan.graph, States):
+        unseen = self.asked.unseen
+        if unseen is None or isinstance(self.plan.graph, States):
             return None
         from seqopt.plan.out_of_sample import judge_unseen  # noqa: PLC0415  # few plans are robust
 
-        return judge_unseen(self.plan, self.asked.unseen)
+        return self.clock.spare(UNSEEN, lambda: judge_unseen(self.plan, unseen), None)
+
+    @cached_property
+    def analyzed(self) -> bool:
+        """Whether there was time for the responses of the plan, and for what is said by them."""
+
+        def analyze() -> bool:
+            _ = self.plan.departures, self.plan.enough, self.plan.overloads
+            return True
+
+        return self.clock.spare("the responses of its steps", analyze, otherwise=False)
+
+    @cached_property
+    def summary(self) -> dict[str, object]:
+        """The summary of the plan, or what there was time for of it."""
+        brief = self.plan.brief()
+        if not self.analyzed:
+            return brief
+        return self.clock.spare("the whole summary", self.plan.summary, brief)
 
     @cached_property
     def verdicts(self) -> dict[str, tuple[BuildVerdicts, ...]]:
         """Which steps of the plan stand."""
-        try:
-            return self.prover.of_builds({self.plan.title: self.plan.steps})
-        except KeyboardInterrupt:  # the plan is there, and is not lost
-            self.prover.refusal = "interrupted"
-            return {}
+        builds = {self.plan.title: self.plan.steps}
+        found = self.clock.spare(VERDICTS, lambda: self.prover.of_builds(builds), None)
+        if found is None:  # nobody is to ask again
+            self.prover.refusal = WHY[self.clock.left_out.pop(VERDICTS)]
+        return found or {}
 
     def proving(self) -> AbstractContextManager[None]:
         """Let another process begin to prove what stands: a command may start one, no script."""
-        return self.prover.begun(self.plan.steps)
+        return self.prover.begun(self.plan.steps) if self.clock.left else nullcontext()
 
     @property
     def own(self) -> tuple[BuildVerdicts, ...]:
@@ -179,22 +215,25 @@ class Found:
     @cached_property
     def report(self) -> dict[str, object]:
         """The summary, and what the command adds to it."""
-        out = self.plan.summary() | {
+        out = self.summary | {
             "seconds": {"assemble": self.assemble, **self.plan.seconds},
             "models_paper_count": _paper_count(self.plan),
             "stability": {each.mortar: each.facts() for each in self.own},
         }
+        out |= {"left_out": dict(self.clock.left_out)} if self.clock.left_out else {}
         out |= {} if self.props is None else {"fewest_props": self.props.described()}
         known, unseen = self.asked.known, self.asked.unseen
         if known is None or unseen is None:
             return out
         out |= {"robust": str(self.asked.aim), "scenarios": known.settings}
-        if self.trial is None:
+        if self.trial is not None:
+            return out | {"unseen": unseen.settings, "worth": self.trial.summary()}
+        worst = None
+        if isinstance(self.plan.graph, States):
             from seqopt.plan.out_of_sample import worst_values  # noqa: PLC0415
 
-            worst = worst_values(self.plan, unseen)
-            return out | {"unseen": {**unseen.settings, "worst": worst}}
-        return out | {"unseen": unseen.settings, "worth": self.trial.summary()}
+            worst = self.clock.spare(UNSEEN, lambda: worst_values(self.plan, unseen), None)
+        return out | {"unseen": {**unseen.settings, "worst": worst}}
 
 
 def run(options: argparse.Namespace) -> Answer:
@@ -206,19 +245,31 @@ def run(options: argparse.Namespace) -> Answer:
 
 def find(options: argparse.Namespace) -> Found:
     """Choose every open grip of a build, or every step."""
-    limit = parse_time_limit(options.time_limit)
+    clock = Clock(parse_time_limit(options.time_limit))
     if getattr(options, "policy", False) and options.out is None:
         raise ProblemError("--policy: it is written to a folder; give --out DIR")
     require_out(options, *ALWAYS)
     start = time.perf_counter()
-    asked = asked_problem(options)
-    formulation = as_formulation(options.formulation or usual(asked.problem))
+    with clock.needed("posing the problem"):
+        asked = asked_problem(options)
+        formulation = as_formulation(options.formulation or usual(asked.problem))
     how = _how(options, formulation)
     assemble = time.perf_counter() - start
-    tell = options.tell if formulation.on in (On.STATES, On.TIMES) else within(options.tell, limit)
+    in_stages = formulation.on in (On.STATES, On.TIMES)
+    run = replace(how, progress=options.tell, clock=clock)
+    if not in_stages:
+        run = replace(run, progress=within(options.tell, clock.left))
 
     def choose(problem: Problem) -> Plan:
-        return solve(problem, formulation, time_limit=limit, progress=tell, **how)
+        if clock.interrupted:  # one that came between two plans ends the next
+            raise KeyboardInterrupt
+        try:
+            plan = _solve_run(problem, formulation, run)
+        except KeyboardInterrupt:
+            clock.interrupted = True
+            raise
+        clock.interrupted |= plan.ended is End.INTERRUPTED
+        return plan
 
     bases = None if options.bases is None else _bases(options, asked.problem, choose)
     props = None if asked.fewest is None else _props(options, asked, choose)
@@ -226,24 +277,44 @@ def find(options: argparse.Namespace) -> Found:
     plan = choose(asked.problem) if outer is None else outer.plan
     prover = asked_prover(options, plan.engine.network)
     whole = _from_empty(asked.whole, plan, choose)
-    return Found(asked, plan, assemble, prover, bases, whole, props)
+    return Found(asked, plan, assemble, prover, bases, whole, props, clock)
 
 
 def answered(options: argparse.Namespace, found: Found) -> Answer:
-    """Write a plan, and return what it is worth."""
-    plan, outer = found.plan, found.bases or found.props
-
-    def files() -> dict[str, bytes | str]:
+    """Write a plan, and return what it is worth; what there is no time for is left out."""
+    made: dict[str, bytes | str] = {}
+    if found.analyzed and found.summary and options.out is not None:  # what says most comes first
         choices = getattr(options, "tables", None) == "all"
-        made = plan_files(plan, found.report, found.prover, found.trial, choices=choices)
-        if getattr(options, "policy", False):
-            from seqopt.plan.policy import FILE, find_policy  # noqa: PLC0415  # few ask for one
+        tables = partial(plan_files, found.plan, choices=choices)
+        made = found.clock.spare("its tables", tables, made)
+    _ = found.verdicts, found.trial
+    return _answer(options, found, write_outputs(options, lambda: _files(options, found) | made))
 
-            made[FILE] = find_policy(found.asked.problem, options.tell).content()
+
+def _files(options: argparse.Namespace, found: Found) -> dict[str, bytes | str]:
+    """Return the files of a plan by name, its tables and tasks aside; at least what it is alone."""
+    plan, outer, made = found.plan, found.bases or found.props, dict[str, bytes | str]()
+    asked: dict[str, Callable[[], str | bytes]] = {}
+    if getattr(options, "policy", False):
+        from seqopt.plan.policy import FILE, find_policy  # noqa: PLC0415  # few ask for one
+
+        asked[FILE] = lambda: find_policy(found.asked.problem, options.tell).content()
+    if found.analyzed:
+        from seqopt.report._pages import plan_page  # noqa: PLC0415  # only where files are written
+
+        asked[PAGE] = lambda: plan_page(plan, found.prover)
+    for name, make in asked.items():
+        content = found.clock.spare(name, make, None)
+        made |= {} if content is None else {name: content}
+    if outer is not None:
         name = "bases.csv" if found.props is None else "fewest_props.csv"
-        return made if outer is None else made | {name: csv_text(outer.tried)}
-
-    return _answer(options, found, write_outputs(options, files))
+        made[name] = csv_text(outer.tried)
+    if found.trial is not None:
+        made["scenarios.csv"] = csv_text(found.trial.table)
+    if rows := trace_rows(plan.trace):
+        made["trace.csv"] = csv_text(pd.DataFrame(rows))
+    table = plan.responses() if found.analyzed else _steps_table(plan)
+    return {**_bare_files(plan, table, found.report), **made}
 
 
 def _from_empty(whole: Problem | None, plan: Plan, choose: Callable[[Problem], Plan]) -> str:
@@ -260,6 +331,8 @@ def _from_empty(whole: Problem | None, plan: Plan, choose: Callable[[Problem], P
         return f"{done}; from {site} there is no plan"
     except NothingFoundError:
         return f"{done}; from {site} no plan was found"
+    except (TimeUpError, KeyboardInterrupt):
+        return f"{done}; what the best from {site} takes was not found in time"
 
 
 def _values(plan: Plan) -> str:
@@ -295,7 +368,7 @@ def _bases(
     return choose_bases(problem, scene, places, choose, options.tell)
 
 
-def _how(options: argparse.Namespace, formulation: Formulation) -> dict[str, Any]:
+def _how(options: argparse.Namespace, formulation: Formulation) -> Run:
     """Return how a formulation is to be run, its own options among it."""
     how: dict[str, Any] = parse_options(formulation, options.option)
     if options.max_memory is not None and formulation.on is On.ORDERS:
@@ -304,21 +377,19 @@ def _how(options: argparse.Namespace, formulation: Formulation) -> dict[str, Any
         )
     if options.max_memory is not None and "max_memory" in formulation.options:
         how["max_memory"] = parse_size(options.max_memory)
-    return {"proof": not options.no_proof, "lazy": options.lazy, **how}
+    return Run(proof=not options.no_proof, lazy=options.lazy, options=how)
 
 
 def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...]) -> Answer:
     """Return what a plan is worth, once it is written."""
-    from seqopt.report.text import _headline  # noqa: PLC0415  # where there is a plan
-
-    plan = found.plan
-    table, scene = plan._columns, plan.engine.network.scene
-    stopped = plan.ended is End.INTERRUPTED
-    over = () if stopped else exceeded(scene, table)
+    plan, clock = found.plan, found.clock
+    scene = plan.engine.network.scene
+    early = plan.ended is End.INTERRUPTED
+    over = exceeded(scene, plan._columns) if found.analyzed and not early else ()
     enough = _enough_payload(plan) if over else ()
-    first = f"{OUTSIDE}: " if plan.outside else ""
-    lines = [f"{first}{_headline(scene, table)}; {_value(found)}"]
-    lines += [f"{_search(plan)}; {written_to(options.out)}"]
+    page = found.analyzed and PAGE not in clock.left_out
+    lines = [_value(found) if not found.analyzed else f"{_held(plan)}; {_value(found)}"]
+    lines += [f"{_search(plan)}; {written_to(options.out, page=page)}"]
     lines += map(wrapped, waits_said(plan) if plan.certificate is not None else ())
     lines += [f"stability, {each}" for each in found.own]
     lines += [wrapped(each.said) for each in (found.bases, found.props) if each is not None]
@@ -336,25 +407,27 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
         order = plan.order.selection.order
         facts["order"] = order
         lines.append(wrapped(", ".join(map(str, order)), first="order: "))
-    arms = () if plan.arms is None else (f"arms: {plan.arms}",)
+    said = (*(plan.enough.lines if found.analyzed else ()), f"proof: {_proof(plan)}")
     answer = Answer(
-        facts={**facts, "plan": plan.responses},
+        facts={**facts, "plan": plan.responses if found.analyzed else _steps_table(plan)},
         text="\n".join([*lines, *(f"payload exceeded: {excess}" for excess in over), *enough]),
         written=written,
         notes=(
             *_posed_notes(found.asked.problem),
             *rule_notes(found.asked.problem.moves, scene),
-            *arms,
-            *(() if stopped else (*plan.enough.lines, f"proof: {_proof(plan)}")),
+            *(() if plan.arms is None else (f"arms: {plan.arms}",)),
+            *(() if early else said),
             *idle_notes(scene, plan.steps),
             *_time_notes(plan),
             *refused(found.prover),
+            *_not_done(clock),
         ),
-        failures=(INTERRUPTED,) if stopped else (),
-        status=Status.INTERRUPTED if stopped else Status.DONE,
+        failures=_interrupted(clock, early=early),
+        status=Status.INTERRUPTED if clock.interrupted else Status.DONE,
     )
     unreached = () if plan.arms is None else faults_in_words(plan.arms.postures)
-    answer = strictly(answer, options, over, plan.departures, found.verdicts, unreached)
+    left = plan.departures if found.analyzed else ()
+    answer = strictly(answer, options, over, left, found.verdicts, unreached)
     return answer if found.asked.problem.lifts_range else _in_range(answer, plan)
 
 
@@ -364,6 +437,21 @@ def _in_range(answer: Answer, plan: Plan) -> Answer:
         return answer
     said = f"seqopt: {OUTSIDE}: {plan.beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
     return replace(answer, failures=(*answer.failures, said), status=Status.DOES_NOT_HOLD)
+
+
+def _held(plan: Plan) -> str:
+    """Return how much robots hold and nodes move at most, and whether that is to be relied on."""
+    from seqopt.report.text import _headline  # noqa: PLC0415  # where there is a plan
+
+    first = f"{OUTSIDE}: " if plan.outside else ""
+    return f"{first}{_headline(plan.engine.network.scene, plan._columns)}"
+
+
+def _interrupted(clock: Clock, *, early: bool) -> tuple[str, ...]:
+    """Return what an interrupt ended, in a line. ``early``: whether choosing or its proof."""
+    if early:
+        return (INTERRUPTED,)
+    return ("seqopt: interrupted; the plan was chosen by then",) if clock.interrupted else ()
 
 
 def _enough_payload(plan: Plan) -> tuple[str, ...]:
@@ -415,6 +503,8 @@ def _posed_notes(problem: Problem) -> tuple[str, ...]:
 def _proof(plan: Plan) -> str:
     """Return which proof was enough, and what another could still change."""
     proof, looked = plan.certificate, f"{plan.models:,} models"
+    if proof is None and plan.ended is End.STOPPED:
+        return "left out, time is over; values and bounds are claimed"
     if proof is None or plan.gap is None:
         return "none; how much better another plan may be is not known"
     if proof.states:

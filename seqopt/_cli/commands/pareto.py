@@ -7,11 +7,20 @@ import json
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import pandas as pd
 
 from seqopt._cli.answer import Answer, Status
-from seqopt._cli.asked import asked_prover, level_notes, marked, refused, rule_notes, scene_facts
+from seqopt._cli.asked import (
+    _not_done,
+    asked_prover,
+    level_notes,
+    marked,
+    refused,
+    rule_notes,
+    scene_facts,
+)
 from seqopt._cli.options import (
     BEST,
     BUILT,
@@ -29,7 +38,7 @@ from seqopt._cli.options import (
     robots_option,
     scene_options,
 )
-from seqopt._cli.outputs import _picked_files, figure_notes, write_outputs, written_to
+from seqopt._cli.outputs import _picked_files, _steps_table, figure_notes, write_outputs, written_to
 from seqopt._cli.posing import asked_problem
 from seqopt._cli.screens import question
 from seqopt._cli.values import parse_numbers
@@ -37,7 +46,7 @@ from seqopt._files import csv_text, write_folder
 from seqopt._showing import PAGE
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
-from seqopt.errors import ProblemError, did_you_mean
+from seqopt.errors import ProblemError, TimeUpError, did_you_mean
 from seqopt.plan.build import GivenSequence
 from seqopt.plan.front import Front, find_front, pick
 from seqopt.plan.solving import states_of
@@ -53,8 +62,11 @@ from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
+from seqopt.work._clock import INTERRUPT, Clock
 from seqopt.work.progress import within
 
+DETAILS = "responses, verdicts and the page"
+INTERRUPTED = "seqopt: interrupted; the points are those that were found"
 MOST_ROWS = 30  # of a table on the terminal
 FOUR = "F_largest,M_sup,T_max,D_max"
 DESCRIPTION = (
@@ -88,7 +100,10 @@ OF_MOVES = (
     "and not with --to."
 )
 OF_HOLDS = "--friction and --tilt go with --stands."
-SECONDS = {"--seconds S": "end the search after so long"}
+SECONDS = {
+    "--seconds S": "limit of the whole command, with its proof, verdicts and page: what it has no "
+    "time for is left out and named; the points that were found by then are there"
+}
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -123,31 +138,47 @@ def run(options: argparse.Namespace) -> Answer:
 
 def find(options: argparse.Namespace) -> tuple[Problem, Front]:
     """Find all plans that no other beats in every aim; with the problem that they are plans of."""
-    problem = asked_problem(options).problem
-    free = states_of(problem)
-    rounding = parse_numbers("--round", options.round, [str(goal) for goal in free.goals])
     seconds = float(options.seconds)
-    front = find_front(
-        problem, rounding=rounding, seconds=seconds, progress=within(options.tell, seconds)
-    )
+    if not seconds >= 0:
+        raise ProblemError(f"--seconds {seconds:g}: give a number from 0")
+    clock = options.clock = Clock(seconds)
+    with clock.needed("posing the problem"):
+        problem = asked_problem(options).problem
+        free = states_of(problem)
+    rounding = parse_numbers("--round", options.round, [str(goal) for goal in free.goals])
+    tell = within(options.tell, clock.left)
+    front = find_front(problem, rounding=rounding, progress=tell, clock=clock)
+    clock.interrupted |= front.stopped == INTERRUPT
     return problem, front
 
 
 def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Answer:
-    """Write a Pareto set, and return what is in it."""
-    free = states_of(problem)
+    """Write a Pareto set, and return what is in it; what there is no time for is left out."""
+    free, clock = states_of(problem), options.clock
     scene = free.engine.network.scene
     shows = options.out is not None
     named = any("=" not in text for text in options.under)
-    methods = fixed_methods(free.engine) if shows or named else {}
+    methods = (
+        clock.spare("fixed methods beside", partial(fixed_methods, free.engine), {})
+        if (shows or named)
+        else {}
+    )
     provers = {own: asked_prover(options, own.network) for own in {*front.engines}}
-    departures = _departures(front)
+    none: dict[str, Sequence[Departure]] = {}
+    departures = clock.spare(
+        "which points leave the linear range", partial(_departures, front), none
+    )
     left = builds_in_words(departures)
-    files = _front_files(front, problem, methods, provers, departures, options) if shows else {}
+    files = _bare_files(front) if shows else {}
+    if shows:
+        found = partial(_front_files, front, problem, methods, provers, departures, options)
+        files = clock.spare(DETAILS, found, files)
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
     if options.out and not options.pick:
         said += "; --pick D_max also writes a folder of the plan with the least"
+    if options.pick and options.under and not methods:
+        raise TimeUpError(f"--pick {options.pick}: --under was not looked at; give more")
     if options.pick:
         chosen = pick(front.table, options.pick, _under(options.under, methods))
         scene = front.engines[chosen].network.scene  # in the order of what is picked
@@ -159,7 +190,9 @@ def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Ans
     shown = "" if written else f"{_numbered(front).to_string(max_rows=MOST_ROWS)}\n"
     missing = figure_notes() if written else ()
     if written and picked is not None:
-        _write_picked(options, front, chosen, picked, provers[front.engines[chosen]])
+        prover = provers[front.engines[chosen]]
+        write = partial(_write_picked, options, front, chosen, picked, prover)
+        clock.spare("the folder of the plan that is picked", write, None)
     answer = Answer(
         facts={
             "scene": scene_facts(scene),
@@ -168,20 +201,38 @@ def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Ans
             "points": shown_table(front.table),
             "picked": picked,
         },
-        text=f"{shown}{said}; {written_to(options.out)}",
+        text=f"{shown}{said}; {written_to(options.out, page=DETAILS not in clock.left_out)}",
         written=written,
         notes=(
             *level_notes(free.engine),
             *rule_notes(free.rules, scene),
             *refused(next(iter(provers.values()))),
             *missing,
+            *_not_done(clock),
         ),
+        failures=(INTERRUPTED,) if clock.interrupted else (),
+        status=Status.INTERRUPTED if clock.interrupted else Status.DONE,
     )
     answer = marked(answer, left)
-    if not front.beyond:
+    if not front.beyond or clock.interrupted:
         return answer
     said = f"seqopt: {OUTSIDE}: {front.beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
     return replace(answer, failures=(said,), status=Status.DOES_NOT_HOLD)
+
+
+def _bare_files(front: Front) -> dict[str, bytes | str]:
+    """Return a Pareto set without what takes time: its points, and the steps of their plans."""
+    pairs = zip(front.engines, front.steps, strict=True)
+    plans = [
+        _steps_table(_Picked(own, steps)).assign(point=number)
+        for number, (own, steps) in enumerate(pairs, start=1)
+    ]
+    summary = {"points": len(plans), "complete": front.complete, "seconds": dict(front.seconds)}
+    return {
+        "pareto.csv": csv_text(_numbered(front).reset_index()),
+        "plans.csv": csv_text(pd.concat(plans, ignore_index=True)),
+        "summary.json": json.dumps(summary, indent=2) + "\n",
+    }
 
 
 def _write_picked(

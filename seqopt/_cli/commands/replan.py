@@ -125,11 +125,16 @@ def answered(
     """Write the new plan, and say what it changes."""
     scene = load_scene(options.plan / "scene.json")
     steps = read_plan(scene, options.plan / "plan.csv")
-    answer = optimize.answered(base, found)
     old = [step for step in steps if step.number > int(options.at)]
-    facts = compared(found.plan, old)
-    if options.measured is not None:
-        facts |= _off(scene, found.plan)
+
+    def differs() -> dict[str, object]:
+        off = {} if options.measured is None else _off(scene, found.plan)
+        return compared(found.plan, old) | off
+
+    facts = found.clock.spare("what the new plan changes", differs, None)
+    answer = optimize.answered(base, found)
+    if facts is None:
+        return answer
     return replace(
         answer,
         facts={**answer.facts, "replanned": facts},

@@ -45,8 +45,9 @@ ROBUST = {
     "are not rigid, by a factor up to it)",
 }
 TIME = {
-    "--time-limit SECONDS": "stop choosing after it, with the best choice so far and a bound; with "
-    "--no-proof, where choosing and computing are one, with the moves that were chosen by then"
+    "--time-limit SECONDS": "limit of the whole command, of choosing, proof and verdicts: the best "
+    "choice by then is written with its bound, and what there was no time for is named; with "
+    "--no-proof, where choosing and computing are one, the moves that were chosen by then"
 }
 WORKERS = {
     "--workers N": "processes to share the work among; pays from about ten seconds (default: "

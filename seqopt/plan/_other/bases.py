@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from math import inf
 
@@ -20,8 +21,9 @@ import pandas as pd
 from seqopt.arms._permits import permits, within_reach
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Terse, Vector
-from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SceneError
+from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SceneError, TimeUpError
 from seqopt.plan._range import best_of_several
+from seqopt.plan.calling.formulation import End
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _moved
 from seqopt.problem.problem import Problem
@@ -211,6 +213,9 @@ def _with_arms(scene: Scene, change: Callable[[Arm], Arm | None]) -> Scene:
     )
 
 
+_Outcome = tuple[str, tuple[float, ...]]  # of a problem, in words, and its values or bounds
+
+
 class Tried:
     """The best plan so far of problems that are alike, and what became of each."""
 
@@ -221,6 +226,7 @@ class Tried:
         self._of: Problem | None = None
         self._rows: list[dict[str, object]] = []
         self._left: list[tuple[float, ...]] = []  # bounds of sets whose best plan is not proven
+        self._over = False  # whether somebody ended it before all were looked at
 
     def _none(self, why: str) -> InfeasibleError | NothingFoundError:
         """Return the error that says why there is no plan, or that none was found."""
@@ -236,11 +242,25 @@ class Tried:
     @property
     def _proven(self) -> bool:
         """Whether no set that was looked at allows a better plan."""
-        return not any(_is_below(bound, self._best) for bound in self._left)
+        return not (self._over or any(_is_below(bound, self._best) for bound in self._left))
+
+    def _in_time(self, outcome: Callable[[], _Outcome]) -> _Outcome | None:
+        """Return what became of a problem; None if somebody ended it, and a plan is there by then.
+
+        What is ended is the rest too.
+        """
+        try:
+            return outcome()
+        except (TimeUpError, KeyboardInterrupt):
+            if self._plan is None:
+                raise
+            self._over = True
+            return None
 
     def _kept(self, problem: Problem, plan: Plan) -> tuple[str, tuple[float, ...]]:
         """Take a plan that is better than those before; return what to say of it."""
         value, bound = _value(plan), _bound(plan)
+        self._over |= plan.ended is End.INTERRUPTED
         if _is_below(bound, value):
             self._left.append(bound)
         if self._plan is None or _is_below(value, self._best):
@@ -266,9 +286,14 @@ class _Search(Tried):
             if self._plan is not None and not _is_below(floor, self._best):
                 outcome, bound = "skipped: no robots do better", floor
             else:
-                outcome, bound = self._outcome(scene)
+                found = self._in_time(partial(self._outcome, scene))
+                if found is None:
+                    break
+                outcome, bound = found
             said = {name: str(base) for name, base in bases.items()}
             self._rows.append({**said, "outcome": outcome, **self._named(bound)})
+            if self._over:
+                break
         if self._plan is None or self._of is None:
             raise self._none(
                 f"bases: none of {len(sets)} sets of bases allows a plan: {self._why}; give other "

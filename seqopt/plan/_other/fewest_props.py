@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import comb, inf
 from operator import itemgetter
 
@@ -176,9 +177,13 @@ class _Search(Tried):
         props = [self._candidates[i] for i in chosen]
         nodes = " ".join(str(prop.node) for prop in props)
         self._tell(f"props, {len(self._rows)} sets looked at, now {nodes or 'none'}")
-        outcome, value = self._outcome(chosen, self._problem.scene.with_props(*props))
+        scene = self._problem.scene.with_props(*props)
+        found = self._in_time(partial(self._outcome, chosen, scene))
+        if found is None:
+            return False
+        outcome, value = found
         self._rows.append({"nodes": nodes, "outcome": outcome, **self._named(value)})
-        return len(self._rows) < _MOST
+        return len(self._rows) < _MOST and not self._over
 
     def _outcome(self, chosen: _Set, scene: Scene) -> tuple[str, tuple[float, ...]]:
         """Return what is known of a set, in words, and the values of its best plan."""

@@ -87,7 +87,7 @@ def readable(name: str) -> Iterator[None]:
     """Say that a formulation, by name, failed where what it returned cannot be read."""
     try:
         yield
-    except (TypeError, ValueError, AttributeError, OverflowError) as error:
+    except (TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
         raise SolverError(f"formulation {name} returned nonsense: {message_of(error)}") from error
 
 

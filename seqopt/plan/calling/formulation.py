@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -15,17 +16,19 @@ from typing import Any
 import numpy as np
 
 from seqopt.arrays import FrozenValue
-from seqopt.errors import ProblemError, did_you_mean, message_of, plugins
+from seqopt.errors import PluginWarning, ProblemError, did_you_mean, message_of, plugins
 from seqopt.problem.problem import Aim
+from seqopt.work._clock import Clock
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run:
     """How long a formulation may take, who is told what it finds, and which models it is given.
 
-    ``time_limit``: s; ``proof``: whether the answer is proven; ``lazy``: whether only models that
-    the proof needs are solved; ``options``: of the formulation; ``explains``: whether it is said
-    what helps where there is no plan.
+    ``time_limit``: of choosing alone, s; ``proof``: whether the answer is proven; ``lazy``: whether
+    only models that the proof needs are solved; ``options``: of the formulation; ``explains``:
+    whether it is said what helps where there is no plan; ``clock``: of all there is to do,
+    responses and proof too.
     """
 
     time_limit: float = math.inf
@@ -34,6 +37,12 @@ class Run:
     lazy: bool = False
     options: dict[str, Any] = field(default_factory=dict)
     explains: bool = True
+    clock: Clock = field(default_factory=Clock)
+
+    @property
+    def left(self) -> float:
+        """How much time is left to choose, s."""
+        return min(self.time_limit, self.clock.left)
 
 
 @contextmanager
@@ -293,8 +302,9 @@ def formulation_names(*on: On) -> tuple[str, ...]:
 
     ``*on``: what they are given; by default anything. Result: in alphabetical order.
     """
-    names = tuple(sorted(plugins(GROUP)))
-    return tuple(name for name in names if find_formulation(name).on in on) if on else names
+    if not on:
+        return tuple(sorted(plugins(GROUP)))
+    return tuple(name for name, found in _loaded(GROUP).items() if found.on in on)
 
 
 def formulations(*on: On) -> dict[str, Formulation]:
@@ -310,13 +320,18 @@ def formulations(*on: On) -> dict[str, Formulation]:
     dict of str to Formulation
         By name, in alphabetical order.
 
+    Warns
+    -----
+    PluginWarning
+        Of one that cannot be used, which is left out.
+
     Examples
     --------
     >>> import seqopt
     >>> [name for name, f in seqopt.formulations().items() if f.takes_budgets and f.aim]
     ['labels', 'lagrangian', 'overlap_lp', 'overlap_mip']
     """
-    return {name: find_formulation(name) for name in formulation_names(*on)}
+    return {name: found for name, found in _loaded(GROUP).items() if not on or found.on in on}
 
 
 def exhibits() -> dict[str, Formulation]:
@@ -327,7 +342,18 @@ def exhibits() -> dict[str, Formulation]:
 
     Result: by name, in alphabetical order.
     """
-    return {name: _load(entry) for name, entry in sorted(plugins(EXHIBITS).items())}
+    return _loaded(EXHIBITS)
+
+
+def _loaded(group: str) -> dict[str, Formulation]:
+    """Return the formulations of a group; of one that cannot be used it is warned."""
+    out = {}
+    for name, entry in sorted(plugins(group).items()):
+        try:
+            out[name] = _load(entry)
+        except ProblemError as error:
+            warnings.warn(f"{error}; it is left out", PluginWarning, stacklevel=1)
+    return out
 
 
 def _load(entry: EntryPoint) -> Formulation:
@@ -343,6 +369,16 @@ def _load(entry: EntryPoint) -> Formulation:
             f"formulation {entry.name!r}: {entry.value} is a {type(found).__name__}; "
             "let the entry point name a Formulation"
         )
+    kinds: dict[str, Any] = {"name": str, "summary": str, "kind": FormulationKind, "on": On}
+    kinds |= {"also": tuple, "reads": Reads, "takes_budgets": bool, "aim": Aim | None}
+    kinds["solve"] = Callable
+    for field_name, kind in kinds.items():
+        value = getattr(found, field_name)
+        if not isinstance(value, kind):
+            raise ProblemError(
+                f"formulation {entry.name!r}: {entry.value} has {type(value).__name__} as "
+                f"{field_name}; correct it"
+            )
     return found
 
 

@@ -1,0 +1,270 @@
+"""A limit of time, and an interrupt, wherever a command is: what is there is not lost."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+from functools import partial
+
+import pandas as pd
+import pytest
+
+import seqopt
+from seqopt import Prop
+from seqopt._cli.arguments import parser
+from seqopt._cli.commands import analyze, optimize, pareto, replan
+from seqopt._cli.main import main
+from seqopt.errors import TimeUpError
+from seqopt.plan import _layers, _states
+from seqopt.plan._other.fewest_props import fewest_props
+from seqopt.plan.calling.formulation import End
+from seqopt.plan.front import find_front
+from seqopt.plan.plan import Status
+from seqopt.sequence.schedule_file import read_plan
+from seqopt.work._clock import INTERRUPT, TIME, Clock
+from tests.builders import small_arch
+
+WALL = "wall:columns=2,courses=2"
+FREE = ("optimize", WALL, "--schedule", "free", "--aim", "minmax,steps")
+LOOP = ("optimize", WALL, "--formulation", "overlap_dp")
+
+
+def ended(command, words, when, how=KeyboardInterrupt):
+    """Run a command that is ended as it says that it begins with something; return its answer.
+
+    As ``how``: an interrupt, or the end of the time, which comes between two instructions too.
+    """
+    options = parser(words[0]).parse_args([*map(str, words)])
+    options.words = words
+    told = []
+
+    def tell(what):
+        told.append(str(what))
+        if when in told[-1] and sum(when in each for each in told) == 1:
+            raise how
+
+    options.tell = tell
+    answer = command.run(options)
+    assert any(when in each for each in told)
+    return answer
+
+
+@pytest.mark.parametrize(("how", "status"), [(KeyboardInterrupt, 130), (TimeoutError, 0)])
+@pytest.mark.parametrize("words", [FREE, LOOP])
+def test_verdicts_that_are_ended_are_left_out(tmp_path, capsys, monkeypatch, words, how, status):
+    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
+    out = tmp_path / "out"
+    answer = ended(optimize, [*words, "--out", out], "proving what stands", how)
+    assert answer.status == status
+    why = "interrupted" if status else "time is over"
+    assert f"stability: not proven; {why}" in answer.notes
+    assert [f for f in answer.failures if "interrupted" in f] == list(answer.failures)
+    assert len(answer.failures) == bool(status)
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["stability"] == {}
+    assert summary["bound"]
+    assert {"plan.csv", "scene.json", "report.html"} <= {path.name for path in out.iterdir()}
+    assert main([*words]) == 0
+    assert "not proven" not in capsys.readouterr().err
+
+
+def in_the_midst(monkeypatch, module, name, how):
+    """Let a function of a module end as if time were over in it."""
+
+    def ends(*_, **__):
+        raise how
+
+    monkeypatch.setattr(module, name, ends)
+
+
+@pytest.mark.parametrize(
+    ("how", "why", "status"), [(TimeoutError, TIME, 0), (KeyboardInterrupt, INTERRUPT, 130)]
+)
+@pytest.mark.parametrize(
+    ("words", "module", "judge"), [(FREE, _states, "judge_schedule"), (LOOP, _layers, "judge")]
+)
+def test_a_proof_that_is_ended_leaves_what_is_claimed(
+    tmp_path, monkeypatch, words, module, judge, how, why, status
+):
+    whole, out = tmp_path / "whole", tmp_path / "out"
+    assert main([*words, "--out", str(whole)]) == 0
+    in_the_midst(monkeypatch, module, judge, how)
+    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
+    assert main([*words, "--out", str(out)]) == status
+    known, found = (json.loads((f / "summary.json").read_text()) for f in (whole, out))
+    assert found["objective"] == pytest.approx(known["objective"])
+    assert found["bound"] == pytest.approx(known["bound"])
+    assert found["left_out"] == {"the proof": why}
+    assert "left_out" not in known
+    assert (found["gap"], known["gap"]) == (None, 0)
+    assert found["ended"] == ("interrupted" if status else "stopped")
+    scene = seqopt.load_scene(out / "scene.json")
+    assert read_plan(scene, out / "plan.csv") == read_plan(scene, whole / "plan.csv")
+
+
+def test_an_interrupt_of_the_proof_leaves_a_plan_in_python_too(monkeypatch):
+    engine = seqopt.make_engine("compliance", seqopt.load_scene(WALL))
+    problem = seqopt.pose(engine, seqopt.FreeRules(), seqopt.CRITERIA["worst-ratio"], "minmax")
+    in_the_midst(monkeypatch, _states, "judge_schedule", KeyboardInterrupt)
+    plan = seqopt.solve(problem)
+    assert (plan.ended, plan.status, plan.certificate) == (End.INTERRUPTED, Status.FEASIBLE, None)
+    assert "feasible" in repr(plan)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        FREE,
+        LOOP,
+        ("pareto", WALL, "--seconds", "0"),
+        ("instance", WALL, "--schedule", "free"),
+        ("analyze", WALL, "--method", "sequential"),
+    ],
+)
+def test_a_limit_that_is_over_at_once_is_a_line(capsys, monkeypatch, tmp_path, words):
+    """Whatever comes first, and where nothing is late the same words have an answer."""
+    monkeypatch.chdir(tmp_path)
+    limit = () if words[0] == "pareto" else ("--time-limit", "0")
+    monkeypatch.setattr("seqopt.work._clock.GRACE", 0.0)
+    assert main([*words, *limit]) == 4
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert err.startswith("seqopt: time is over: ")
+    assert [*tmp_path.iterdir()] == []
+    with pytest.raises(TimeUpError, match="takes longer; give more"), Clock(0.0).needed("all"):
+        pass
+
+
+@pytest.mark.parametrize(("how", "status"), [(KeyboardInterrupt, 130), (TimeoutError, 0)])
+def test_a_page_that_is_ended_is_left_out(tmp_path, monkeypatch, how, status):
+    """Without its tables too a plan is there, and its folder can be read again."""
+    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
+    in_the_midst(monkeypatch, seqopt.report._pages, "plan_page", how)
+    in_the_midst(monkeypatch, optimize, "plan_files", how)
+    out = tmp_path / "out"
+    assert main([*FREE, "--out", str(out)]) == status
+    assert {p.name for p in out.iterdir()} == {"plan.csv", "scene.json", "summary.json"}
+    left = json.loads((out / "summary.json").read_text())["left_out"]
+    assert {*left} == {"its tables", "report.html"}
+    assert main(["analyze", str(out), "--out", str(tmp_path / "x.csv")]) == 0
+
+
+def test_without_responses_a_plan_is_its_steps(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
+    assert main([*FREE, "--out", str(tmp_path / "whole")]) == 0
+    in_the_midst(monkeypatch, seqopt.plan.build, "what_was_enough", TimeoutError)
+    capsys.readouterr()
+    out = tmp_path / "out"
+    assert main([*FREE, "--out", str(out)]) == 0
+    said, err = capsys.readouterr()
+    assert "minmax" in said
+    assert "not done, time is over: the responses of its steps" in err
+    rows, whole = (pd.read_csv(tmp_path / f / "plan.csv") for f in ("out", "whole"))
+    pd.testing.assert_frame_equal(rows, whole[[*rows.columns]])
+    known, found = (
+        json.loads((tmp_path / f / "summary.json").read_text()) for f in ("whole", "out")
+    )
+    for name in ("objective", "bound", "gap", "status", "steps"):
+        assert found[name] == known[name]
+
+
+@pytest.mark.parametrize(("how", "status"), [(KeyboardInterrupt, 130), (TimeoutError, 0)])
+def test_a_pareto_set_that_is_ended_has_its_points(tmp_path, monkeypatch, how, status):
+    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
+    words = ("pareto", "chain:bricks=6", "--rule", "least_grips=1", "--aim", "F_largest,M_sup")
+    out = tmp_path / "out"
+    answer = ended(pareto, [*words, "--out", out], "drawing and writing the page", how)
+    assert answer.status == status
+    assert {p.name for p in out.iterdir()} == {
+        *("pareto.csv", "plans.csv", "summary.json", "scene.json")
+    }
+    points = pd.read_csv(out / "pareto.csv")
+    assert pd.read_csv(out / "plans.csv")["point"].nunique() == len(points) > 1
+    assert len(answer.failures) == bool(status)
+
+
+def test_an_interrupted_search_of_a_pareto_set_has_the_status_of_interrupts():
+    words = ("pareto", "chain:bricks=6", "--rule", "least_grips=1", "--aim", "F_largest,M_sup")
+    answer = ended(pareto, words, "1 plans found")
+    assert answer.status == 130
+    assert not answer.facts["complete"]
+    assert len(answer.facts["points"]) == 1
+    with pytest.raises(KeyboardInterrupt):  # nothing is there that could be lost
+        ended(pareto, words, "0 plans found")
+
+
+def test_a_pareto_set_whose_proof_is_ended_is_not_complete(monkeypatch):
+    engine = seqopt.make_engine("compliance", small_arch(4))
+    worst, rules = seqopt.CRITERIA["worst-ratio"], seqopt.FreeRules(least_grips=1)
+    problem = seqopt.pose(engine, rules, worst, "F_largest,M_sup")
+    assert find_front(problem).complete
+    in_the_midst(monkeypatch, seqopt.plan.front, "_require_complete", KeyboardInterrupt)
+    found = find_front(problem)
+    assert (found.complete, found.stopped) == (False, INTERRUPT)
+
+
+@pytest.mark.parametrize("how", [KeyboardInterrupt, TimeUpError("no plan was found yet")])
+def test_props_that_were_found_are_not_lost(how):
+    """The set that is best by then is kept, and nothing is said of those that are left."""
+    scene = small_arch(5)
+    weak = scene.with_robots(*(seqopt.Robot(name=r.name, payload=75.0) for r in scene.robots[:2]))
+    engine = seqopt.make_engine("compliance", weak)
+    rules, worst = seqopt.FreeRules(least_grips=1), seqopt.CRITERIA["worst-ratio"]
+    problem = seqopt.pose(engine, rules, worst, "minmax,steps")
+    nodes = [n for b in weak.placed for n in b.nodes if n not in weak.blocked_nodes]
+    plans = []
+
+    def solve(problem):
+        if plans:
+            raise how
+        plans.append(seqopt.solve(problem))
+        return plans[0]
+
+    pick = partial(fewest_props, problem, [Prop(node=n) for n in nodes])
+    whole = pick(seqopt.solve)
+    found = pick(solve)
+    assert found.plan is plans[0]
+    assert whole.proven
+    assert not found.proven
+    assert found.count == whole.count
+
+
+def test_the_comparison_of_a_new_plan_is_left_out(tmp_path, monkeypatch):
+    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
+    assert main([*FREE, "--out", str(tmp_path / "a")]) == 0
+    in_the_midst(monkeypatch, replan, "compared", TimeoutError)
+    words = ["replan", str(tmp_path / "a"), "--at", "2", "--out", str(tmp_path / "b")]
+    assert main(words) == 0
+    left = json.loads((tmp_path / "b" / "summary.json").read_text())["left_out"]
+    assert left == {"what the new plan changes": TIME}
+
+
+def test_what_is_said_of_steps_is_left_out(tmp_path, monkeypatch):
+    monkeypatch.setattr("seqopt.work._clock.GRACE", math.inf)
+    words = ["analyze", WALL, "--method", "sequential", "--out", str(tmp_path / "a.csv")]
+    for how, status in ((TimeoutError, 0), (KeyboardInterrupt, 130)):
+        in_the_midst(monkeypatch, analyze, "what_was_enough", how)
+        assert main(words) == status
+        assert len(pd.read_csv(tmp_path / "a.csv")) == 7
+
+
+def test_a_clock_ends_what_is_late_and_names_it():
+    clock = Clock(100.0)
+    assert clock.spare("a", lambda: 3, 4) == 3
+    assert (clock.left_out, clock.late, 0 < clock.left <= 100.0) == ({}, False, True)
+    with pytest.raises(KeyboardInterrupt), clock.needed("b"):
+        signal.raise_signal(signal.SIGINT)
+    assert clock.spare("b", partial(signal.raise_signal, signal.SIGINT), 4) == 4
+    assert (clock.left_out, clock.interrupted) == ({"b": INTERRUPT}, True)
+    assert [clock.why(stopped) for stopped in (INTERRUPT, "memory", "")] == [
+        *(INTERRUPT, "memory", "")
+    ]
+
+
+def test_a_clock_that_is_over_begins_with_nothing(monkeypatch):
+    monkeypatch.setattr("seqopt.work._clock.GRACE", 0.0)
+    clock, done = Clock(0.0), []
+    assert clock.spare("a", lambda: done.append(1), "none") == "none"
+    assert (done, clock.left_out, clock.left, clock.late) == ([], {"a": TIME}, 0.0, True)
+    assert clock.why(INTERRUPT) == TIME
