@@ -105,7 +105,7 @@ def _bare_files(
     }
 
 
-def plan_files(plan: Plan, *, choices: bool = False) -> dict[str, bytes | str]:
+def _plan_files(plan: Plan, *, choices: bool = False) -> dict[str, bytes | str]:
     """Return the tables and tasks of a plan by file name.
 
     ``choices``: whether every choice is in a table.

@@ -28,7 +28,7 @@ from seqopt.report._style import (
     plain,
     styled,
 )
-from seqopt.report.comparison import LARGEST, Comparison, _in_shown_unit, worst_of
+from seqopt.report.comparison import LARGEST, Comparison, _in_shown_unit, _worst_of
 from seqopt.report.page import Build
 from seqopt.report.text import in_words, typed
 from seqopt.study.published import PUBLISHED
@@ -266,7 +266,7 @@ def front_figure(
     down = -(-len(others) // across)
     figure = new_figure(0.8 + 2.5 * down)
     panels = figure.subplots(down, across, squeeze=False).ravel()
-    marks = {name: worst_of(rows) | {"steps": len(rows)} for name, rows in methods.items()}
+    marks = {name: _worst_of(rows) | {"steps": len(rows)} for name, rows in methods.items()}
     for axes, name in zip(panels, others, strict=False):
         for label, other in (beside or {}).items():
             ways = (_in_shown_unit(other[c], c) for c in (first, name))

@@ -142,10 +142,8 @@ def compare(
 
     Parameters
     ----------
-    engine, criterion : Engine, Criterion
-        What computes responses, and has the scene; what a step costs.
-    progress : callable, optional
-        Told how far it is, in a few words or as a `seqopt.work.Stage`.
+    engine, criterion, progress : Engine, Criterion, callable
+        What computes responses, and has the scene; what a step costs; what is told how far it is.
     robots : sequence of str, optional
         Of those that take part, as many as a method needs; found from reach by default.
     prover : BuildProver, optional
@@ -157,17 +155,16 @@ def compare(
     -------
     Comparison
     """
-    scene = engine.network.scene
-    tables, notes, refused = _method_tables(engine, robots)
-    maxima = pd.DataFrame({name: _quantities(scene, table) for name, table in tables.items()})
+    scene, (tables, notes, refused) = engine.network.scene, _method_tables(engine, robots)
+    maxima = pd.DataFrame({name: _quantities(scene, t) for name, t in tables.items()})
     printed = printed_maxima().set_axis(maxima.index) if PUBLISHED in tables else None
     rows: dict[str, dict[str, object]] = {name: {"problem": CLOSED} for name in tables}
+    fixed = [largest(scene, table) for table in tables.values()]
     plans, problem, refusal = _plans(engine, criterion, progress, robots)
     tables |= {name: plan.responses() for name, plan in plans.items()}
     rows |= {name: _row(plan) for name, plan in plans.items()}
     loop = None if problem is None else _facts(problem, rows, robots)
-    fixed = [largest(scene, tables[str(name)]) for name in maxima]
-    free, why = _free_plan(engine, _free_criterion(criterion, fixed), robots, progress)
+    free, why = _free_plan(engine, criterion, fixed, robots, progress)
     if not tables and free is None:  # whose refusal says most
         raise StepError(f"{next(iter(refused.values()))}; {why[0]}")
     measured = _speed(engine, (problem, free), seconds=speed, progress=progress) if speed else None
@@ -179,8 +176,8 @@ def compare(
     table = _table(rows, left := (within := LinearRange(engine)).of_builds(tables), verdicts)
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
     found = (maxima, printed, table, tables, loop, tuple(notes), refusal, left)
-    judged = (_criteria(problem, free), verdicts, what_was_enough(within, tables))
-    return Comparison(*found, *judged, measured)
+    enough = what_was_enough(within, tables)
+    return Comparison(*found, _criteria(problem, free), verdicts, enough, measured)
 
 
 def _loop_notes(scene: Scene, loop: Layers | None) -> list[str]:
@@ -424,12 +421,18 @@ _LONE = (  # by which one robot builds, if any
 
 
 def _free_plan(
-    engine: Engine, criterion: Criterion, robots: Sequence[str], progress: Tell
+    engine: Engine,
+    criterion: Criterion,
+    fixed: Sequence[Mapping[str, float]],
+    robots: Sequence[str],
+    progress: Tell,
 ) -> tuple[Plan | None, list[str]]:
     """Return the shortest free schedule with the smallest worst step, and what is to say of it.
 
-    That is why there is none, or by which rules alone one robot builds.
+    That is why there is none, or by which rules alone one robot builds. ``fixed``: the largest
+    responses of fixed methods.
     """
+    criterion = _free_criterion(criterion, fixed)
     usual = FreeRules(robots=tuple(robots))
     alone = len(robots or engine.network.scene.robots) == 1 and not engine.network.scene.props
     said, plan = list[str](), None
@@ -469,7 +472,7 @@ def _free_row(plan: Plan) -> dict[str, object]:
     }
 
 
-def worst_of(table: pd.DataFrame) -> dict[str, float]:
+def _worst_of(table: pd.DataFrame) -> dict[str, float]:
     """Return the worst responses of any step of a table from `seqopt.analyze`, SI units."""
     nodes = [str(c).removesuffix("_node") for c in table.columns if str(c).endswith("_node")]
     columns = [c for c in table.columns if any(c in (f"F_{n}_N", f"F_[{n}]_N") for n in nodes)]

@@ -53,8 +53,8 @@ from seqopt._cli.outputs import (
     ALWAYS,
     TABLES,
     _bare_files,
+    _plan_files,
     _steps_table,
-    plan_files,
     require_out,
     write_outputs,
     written_to,
@@ -285,7 +285,7 @@ def answered(options: argparse.Namespace, found: Found) -> Answer:
     made: dict[str, bytes | str] = {}
     if found.analyzed and found.summary and options.out is not None:  # what says most comes first
         choices = getattr(options, "tables", None) == "all"
-        tables = partial(plan_files, found.plan, choices=choices)
+        tables = partial(_plan_files, found.plan, choices=choices)
         made = found.clock.spare("its tables", tables, made)
     _ = found.verdicts, found.trial
     return _answer(options, found, write_outputs(options, lambda: _files(options, found) | made))

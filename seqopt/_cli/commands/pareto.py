@@ -53,7 +53,7 @@ from seqopt.plan.solving import states_of
 from seqopt.problem.problem import Problem, judged_by
 from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, _said_limits
 from seqopt.report._pages import front_page
-from seqopt.report.comparison import fixed_methods, shown_table, worst_of
+from seqopt.report.comparison import _worst_of, fixed_methods, shown_table
 from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import OUTSIDE, Departure, LinearRange, _analyze_builds, builds_in_words
 from seqopt.scene.scene_file import dump_scene
@@ -177,14 +177,9 @@ def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Ans
     picked = None
     if options.out and not options.pick:
         said += "; --pick D_max also writes a folder of the plan with the least"
-    if options.pick and options.under and not methods:
-        raise TimeUpError(f"--pick {options.pick}: --under was not looked at; give more")
     if options.pick:
-        chosen = pick(front.table, options.pick, _under(options.under, methods))
+        chosen, picked, row = _chosen(options, front, methods)
         scene = front.engines[chosen].network.scene  # in the order of what is picked
-        values = shown_table(front.table).iloc[chosen]
-        picked = {"point": chosen + 1, **values}
-        row = ", ".join(f"{name} {value_text(str(name), v)}" for name, v in values.items())
         said += f"; picked row {chosen + 1}: {row}"
     written = write_outputs(options, lambda: files | {"scene.json": dump_scene(scene)})
     shown = "" if written else f"{_numbered(front).to_string(max_rows=MOST_ROWS)}\n"
@@ -218,6 +213,18 @@ def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Ans
         return answer
     said = f"seqopt: {OUTSIDE}: {front.beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
     return replace(answer, failures=(said,), status=Status.DOES_NOT_HOLD)
+
+
+def _chosen(
+    options: argparse.Namespace, front: Front, methods: Mapping[str, pd.DataFrame]
+) -> tuple[int, dict[str, object], str]:
+    """Return which plan is picked, its point, and that in words."""
+    if options.under and not methods and options.clock.left_out:
+        raise TimeUpError(f"--pick {options.pick}: --under was not looked at; give more")
+    chosen = pick(front.table, options.pick, _under(options.under, methods))
+    values = shown_table(front.table).iloc[chosen]
+    row = ", ".join(f"{name} {value_text(str(name), v)}" for name, v in values.items())
+    return chosen, {"point": chosen + 1, **values}, row
 
 
 def _bare_files(front: Front) -> dict[str, bytes | str]:
@@ -346,7 +353,7 @@ def _under(texts: Sequence[str], methods: Mapping[str, pd.DataFrame]) -> dict[st
             known = ", ".join(methods)
             why = f"no such method{did_you_mean(text, methods)}"
             raise ProblemError(f"--under {text}: {why}; give {known}, or a bound as F_largest=250")
-        bounds = worst_of(methods[text]) if text in methods else parse_numbers("--under", [text])
+        bounds = _worst_of(methods[text]) if text in methods else parse_numbers("--under", [text])
         for name, value in bounds.items():
             out[name] = min(value, out.get(name, value))
     return out
