@@ -258,19 +258,11 @@ def test_what_does_not_go_with_the_search_of_orders(capsys, tmp_path, arch, word
     assert err.count("\n") == 1
 
 
-@pytest.mark.parametrize(
-    ("scene", "words"),
-    [
-        ("wall:columns=2,courses=2", ("--robots", "1")),
-        ("chain:bricks=8", ("--robots", "1")),
-        ("wall:columns=2,courses=2", ("--robots", "3", "--rule", "least_grips=5")),
-    ],
-)
-def test_robots_that_are_too_few_get_one_advice_that_works(capsys, scene, words):
-    asked = ("optimize", scene, "--schedule", "free", *words)
+@pytest.mark.parametrize("scene", ["wall:columns=2,courses=2", "chain:bricks=8"])
+def test_one_robot_gets_one_advice_that_works(capsys, scene):
+    asked = ("optimize", scene, "--schedule", "free", "--robots", "1")
     status, _, err = run(capsys, *asked)
-    assert status == 2
-    assert err.startswith("seqopt: error: rule least_grips: ")
+    assert status == 3
     advice = re.search(r"\((--rule [^)]*)\)$", err.strip())[1].split()
     assert run(capsys, *asked, *advice)[0] == 0
 
