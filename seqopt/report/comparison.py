@@ -166,7 +166,7 @@ def compare(
     loop = None if problem is None else _facts(problem, rows, robots)
     free, why = _free_plan(engine, criterion, fixed, robots, progress)
     if not tables and free is None:  # whose refusal says most
-        raise StepError(f"{next(iter(refused.values()))}; {why[0]}")
+        raise type(first := next(iter(refused.values())))(f"{first}; {why[0]}")
     measured = _speed(engine, (problem, free), seconds=speed, progress=progress) if speed else None
     notes += why + _loop_notes(scene, problem)
     if free is not None:
@@ -376,7 +376,7 @@ def method_tables(
 
 def _method_tables(
     engine: Engine, robots: Sequence[str]
-) -> tuple[dict[str, pd.DataFrame], list[str], dict[str, StepError]]:
+) -> tuple[dict[str, pd.DataFrame], list[str], dict[str, StepError | MechanismError]]:
     """Return the same, though it may be none, and why each method that is left out is."""
     scene = engine.network.scene
     tables: dict[str, pd.DataFrame] = {}

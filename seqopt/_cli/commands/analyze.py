@@ -54,7 +54,14 @@ from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._staged import Placing, staged_fields
 from seqopt.responses._tolerance import COLUMN, stiffness_for, with_tolerances
 from seqopt.responses.quantities import _plain, _steps_in_words, length_text
-from seqopt.responses.table import LinearRange, _with_faults, archive, response_table, step_fields
+from seqopt.responses.table import (
+    Departure,
+    LinearRange,
+    _with_faults,
+    archive,
+    response_table,
+    step_fields,
+)
 from seqopt.sequence.steps import Step
 from seqopt.stability.assessment import Verdict
 from seqopt.stability.steps import assess_steps
@@ -133,7 +140,9 @@ def run(options: argparse.Namespace) -> Answer:
     table, off = clock.spare("tolerances", tolerances, (table, tuple[str, ...]()))
     staged = None if options.staged is None else staged_fields(network, computed, options.staged)
     departures = partial(within.departures, table, staged)
-    outside = clock.spare("whether they are in the linear range", departures, ())
+    outside = clock.spare(
+        "whether they are in the linear range", departures, tuple[Departure, ...]()
+    )
     whole = _with_faults(scene, table, steps, faults) if faults else table
     said = put_table(options.out, whole, _counted(whole, faults))
     if options.fields is not None:
