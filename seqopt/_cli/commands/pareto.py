@@ -65,6 +65,7 @@ from seqopt.stability.assessment import Verdict
 from seqopt.work._clock import INTERRUPT, Clock
 from seqopt.work.progress import within
 
+RANGE = "which points leave the linear range"
 DETAILS = "responses, verdicts and the page"
 INTERRUPTED = "seqopt: interrupted; the points are those that were found"
 MOST_ROWS = 30  # of a table on the terminal
@@ -156,23 +157,8 @@ def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Ans
     """Write a Pareto set, and return what is in it; what there is no time for is left out."""
     free, clock = states_of(problem), options.clock
     scene = free.engine.network.scene
-    shows = options.out is not None
-    named = any("=" not in text for text in options.under)
-    methods = (
-        clock.spare("fixed methods beside", partial(fixed_methods, free.engine), {})
-        if (shows or named)
-        else {}
-    )
     provers = {own: asked_prover(options, own.network) for own in {*front.engines}}
-    none: dict[str, Sequence[Departure]] = {}
-    departures = clock.spare(
-        "which points leave the linear range", partial(_departures, front), none
-    )
-    left = builds_in_words(departures)
-    files = _bare_files(front) if shows else {}
-    if shows:
-        found = partial(_front_files, front, problem, methods, provers, departures, options)
-        files = clock.spare(DETAILS, found, files)
+    methods, left, files = _content(options, problem, front, provers)
     said = f"{len(front.steps)} points, {'complete' if front.complete else 'not complete'}"
     picked = None
     if options.out and not options.pick:
@@ -181,7 +167,7 @@ def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Ans
         chosen, picked, row = _chosen(options, front, methods)
         scene = front.engines[chosen].network.scene  # in the order of what is picked
         said += f"; picked row {chosen + 1}: {row}"
-    written = write_outputs(options, lambda: files | {"scene.json": dump_scene(scene)})
+    written = write_outputs(options, lambda: {**files, "scene.json": dump_scene(scene)})
     shown = "" if written else f"{_numbered(front).to_string(max_rows=MOST_ROWS)}\n"
     missing = figure_notes() if written else ()
     if written and picked is not None:
@@ -213,6 +199,27 @@ def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Ans
         return answer
     said = f"seqopt: {OUTSIDE}: {front.beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
     return replace(answer, failures=(said,), status=Status.DOES_NOT_HOLD)
+
+
+def _content(
+    options: argparse.Namespace,
+    problem: Problem,
+    front: Front,
+    provers: Mapping[Engine, BuildProver],
+) -> tuple[Mapping[str, pd.DataFrame], tuple[str, ...], Mapping[str, bytes | str]]:
+    """Return fixed methods, which points leave the linear range, and files, as far as needed."""
+    shows, clock = options.out is not None, options.clock
+    methods: Mapping[str, pd.DataFrame] = {}
+    if shows or any("=" not in text for text in options.under):
+        beside = partial(fixed_methods, problem.engine)
+        methods = clock.spare("fixed methods beside", beside, methods)
+    none: dict[str, tuple[Departure, ...]] = {}
+    departures = clock.spare(RANGE, partial(_departures, front), none)
+    files: Mapping[str, bytes | str] = _bare_files(front) if shows else {}
+    if shows:
+        found = partial(_front_files, front, problem, methods, provers, departures, options)
+        files = clock.spare(DETAILS, found, files)
+    return methods, builds_in_words(departures), files
 
 
 def _chosen(
