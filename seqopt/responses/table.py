@@ -158,7 +158,7 @@ class LinearRange:
             state: shift.of(self._network, found)[0] * shift.scale if state[0] else 0.0
             for state, found in zip(states, fields, strict=True)
         }
-        robots, tables = self._network.scene.robots, {}
+        robots, tables = self._network.scene.robots, dict[str, _Columns]()
         for name, steps in builds.items():
             nodes = zip(*(step.grips for step in steps), strict=True)
             tables[name] = {
@@ -417,10 +417,10 @@ def _fields_by_grips(
     for step in steps:
         numbers = scene.grip_numbers(step.grips, bricks)
         alike[len(numbers)][step.grips] = numbers
-    for count, numbers in alike.items():
-        sets = np.array([*numbers.values()], dtype=np.int64).reshape(len(numbers), count)
+    for count, held in alike.items():
+        sets = np.array([*held.values()], dtype=np.int64).reshape(len(held), count)
         fields = engine.solve(bricks, sets, want)
-        found |= {grips: select_sets(fields, slice(i, i + 1)) for i, grips in enumerate(numbers)}
+        found |= {grips: select_sets(fields, np.array([i])) for i, grips in enumerate(held)}
     return found
 
 
