@@ -44,6 +44,9 @@ STARTS = (  # of lines on standard error
         "proof: ",
         "robots: ",
         "payload: ",
+        "payload exceeded: ",
+        "not done, ",
+        "rules: ",
         "kept: ",
         "stresses in joints are not checked: ",
         "stability: not proven; ",
@@ -118,7 +121,7 @@ def _fault(case: Case, folder: Path, status: int, said: tuple[str, str]) -> str:
         return "a sign that steers a terminal"
     if (folder / "scene.json").read_bytes() != case.scene and not _is_output(case.words):
         return "the input was changed"
-    return _fault_of_files(folder, status) or _fault_of_text(case, status, said[0])
+    return _fault_of_files(case, folder, status) or _fault_of_text(case, status, said[0])
 
 
 def _is_output(words: tuple[str, ...]) -> bool:
@@ -127,12 +130,13 @@ def _is_output(words: tuple[str, ...]) -> bool:
     return bool(before) and all(word in ("--out", "--export", "--fields") for word in before)
 
 
-def _fault_of_files(folder: Path, status: int) -> str:
+def _fault_of_files(case: Case, folder: Path, status: int) -> str:
     left = {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
     new = left - {"scene.json", "plan.csv"}
     if any(Path(path).name.startswith(".") for path in left):
         return f"left over: {sorted(left)}"
-    if new and status in (Status.BAD_INPUT, Status.NO_ANSWER):
+    rows = status == Status.NO_ANSWER and case.words[0] == "analyze"  # of steps that are answered
+    if new and status in (Status.BAD_INPUT, Status.NO_ANSWER) and not rows:
         return f"status {status}, and written: {sorted(new)}"
     for path in new:
         folder_of_path = (folder / path).parent
@@ -179,6 +183,10 @@ def _fault_of_table(text: str) -> str:
         proven = (table["verdict"] == "stands") & (table["unproven"] == 0) & tilts.notna().any()
         return "" if np.isfinite(tilts[proven]).all() else "a tilt"
     columns = [r.column for r in RESPONSES.values()]
+    if "finding" in table:  # steps without an answer have none
+        table = table[table["finding"].isna()]
+    if not len(table) or columns[0] not in table:  # steps alone, where time was over
+        return ""
     if not np.isfinite(table[columns].to_numpy(float)).all():
         return "a response is not finite"
     for node in (column for column in table if column.endswith("_node")):

@@ -167,10 +167,10 @@ def _arrays(mesh: Any, source: str) -> tuple[Floats, Ints]:
 def _loaded(content: bytes, source: str, form: str, loader: str) -> Any:
     """Return what trimesh makes of bytes; what it logs is for those who asked for logs."""
     require_readers(form, source)
-    content = _BOUNDED[form](content, source) if form in _BOUNDED else content
     logging.getLogger("trimesh").addHandler(_UNASKED)
     joined = {"merge_primitives": True} if form == "glb" else {}  # of several materials
     try:
+        content = _BOUNDED[form](content) if form in _BOUNDED else content
         load = getattr(import_module("trimesh"), loader)
         return load(io.BytesIO(content), file_type=form, process=False, **joined)
     except MemoryError:
@@ -180,28 +180,28 @@ def _loaded(content: bytes, source: str, form: str, loader: str) -> Any:
         raise SceneError(f"{source}: no {form} file that can be read: {said}") from error
 
 
-def _unpacked(content: bytes, source: str) -> bytes:
+def _unpacked(content: bytes) -> bytes:
     """Return an archive with the same parts, none of them packed: it takes no more when read."""
-    archive, out = Archive(content, source), io.BytesIO()
+    archive, out = Archive(content, "its archive"), io.BytesIO()
     with ZipFile(out, "w") as plain:
         for name in archive.names:
             plain.writestr(name, archive.read(name))
     return out.getvalue()
 
 
-def _counted_glb(content: bytes, source: str) -> bytes:
+def _counted_glb(content: bytes) -> bytes:
     """Return a GLB whose arrays have no more numbers than it has bytes.
 
     One without numbers of its own is all zeros, as many as it says.
     """
     length = int.from_bytes(content[12:16], "little")
     text = content[20 : 20 + length].decode("utf-8", "replace")
-    document = parse_json(text, source, SceneError)
+    document = parse_json(text, "its text")
     arrays = document.get("accessors", ()) if isinstance(document, dict) else ()
     counts = [each.get("count", 0) if isinstance(each, dict) else 0 for each in arrays]
     numbers = [count for count in counts if isinstance(count, int | float)]
     if not sum(numbers) <= len(content):
-        raise SceneError(f"{source}: it counts {sum(numbers):g} points or corners, and has none")
+        raise FileError(f"it counts {sum(numbers):g} points or corners, and has none")
     return content
 
 
