@@ -29,6 +29,7 @@ from seqopt.engines.rigid._response_maps import ResponseMaps, scene_maps
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network._mechanics import build_statics
 from seqopt.network.build import build_network
+from seqopt.scene._overlaps import _faces
 from seqopt.scene.boxes import boxes
 from seqopt.scene.imports.contacts import flat_face, touching_faces
 from seqopt.scene.library.common import _overlaps
@@ -59,10 +60,12 @@ def values(arch25):
     maps, operator = scene_maps(network), OperatorBuilder(network, tree).operator(2)
     shapes = boxes(arch25.bricks)
     joined = _overlaps(shapes, [(0, 1)])
+    cube = box((1, 1, 1))
     (touching,) = touching_faces([box((1, 1, 1)), box((1, 1, 1), at=(0, 0, 1))], 1e-3)
     every = (
         *(maps, ResponseMaps(maps, 2)),
         *(shapes, joined, joined.shared, joined.faces[0]),
+        *_faces(np.array(cube.vertices), cube),
         *(touching, flat_face(touching.corners), Surface(np.zeros((3, 3)), ((0, 1, 2),))),
         *(network, network.springs, build_statics(network)),
         *(assembly, face_quadrature(assembly), find_elastic_limits(network, EPOXY)),

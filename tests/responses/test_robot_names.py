@@ -44,14 +44,18 @@ NAMES = [
     "a=b",
     "]",
 ]
+PAYLOAD = 40.0  # N
 ALSO = ("F_move", "F_largest", "T_max", "M_sup")
 EVERY = replace(EQUATIONS, before=(("F_each", 1.0),), after=(("F_each", 1.0),))
 
 
 def called(*names):
-    """The arch of six bricks with robots of other names and payloads that bind."""
+    """The arch of six bricks with robots of other names and payloads that bind.
+
+    They can carry a brick, of 36 N.
+    """
     scene = six_bricks()
-    robots = [replace(r, name=n, payload=20.0) for n, r in zip(names, scene.robots, strict=True)]
+    robots = [replace(r, name=n, payload=PAYLOAD) for n, r in zip(names, scene.robots, strict=True)]
     return replace(scene, robots=tuple(robots))
 
 
@@ -108,7 +112,7 @@ def test_a_name_hides_no_overload(name):
 def test_limits_and_budgets_mean_the_robot(name):
     scene = called("one", name, "three")
     limits = payload_limits(scene)
-    assert limits[1] == Limit(robot_response(name), 20.0)
+    assert limits[1] == Limit(robot_response(name), PAYLOAD)
     problem = posed(scene, EQUATIONS, limits=limits, also=(robot_response(name),))
     own = [step.responses[robot_response(name)] for step in problem.evaluation.steps]
     budget = steps_over(problem, robot_response(name), 0.0, 99.0)
