@@ -19,7 +19,14 @@ import numpy as np
 
 from seqopt.arrays import Floats, Terse
 from seqopt.errors import ProblemError, message_of
-from seqopt.problem.requirements import NEVER, ROUNDED, SCALED, ChoiceResponses, SceneFacts
+from seqopt.problem.requirements import (
+    NEVER,
+    ROUNDED,
+    SCALED,
+    ChoiceResponses,
+    Criterion,
+    SceneFacts,
+)
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import robot_response
 from seqopt.scene._checks import short
@@ -285,6 +292,14 @@ OVER_METHODS = WeightedSum("weighted", tuple((name, 1.0, None) for name in SCALE
 """The sum of responses over what the scene's fixed methods reach."""
 WORST_OVER_METHODS = WorstRatio("worst-ratio", tuple((name, None) for name in SCALED))
 """The largest of these ratios."""
+
+
+def _counts_every_step(criterion: Criterion) -> bool:
+    """Return whether a criterion is defined in every step, so that sums are over all of them.
+
+    Ranks are among the candidates of open grips, and in other steps no robot takes its grip.
+    """
+    return not isinstance(criterion, RankSum) and "F_move" not in criterion.wanted(1)
 
 
 StepFunction = Callable[[Mapping[str, Floats], int], Floats]

@@ -46,6 +46,7 @@ from seqopt.responses._blocks import (
     work,
     worker_for,
 )
+from seqopt.responses._given_steps import GivenSteps
 from seqopt.responses.resources import HERE, Resources
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
 from seqopt.work._workers import Crew, Lanes, hire, map_ordered
@@ -221,6 +222,11 @@ class Evaluation(Terse):
     wanted: Wanted
     resources: Resources = HERE
     more_work: float = 0.0
+
+    @cached_property
+    def given(self) -> GivenSteps:
+        """The steps without an open grip."""
+        return GivenSteps(self.engine, self.schedule)
 
     @property
     def work(self) -> float:

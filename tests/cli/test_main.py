@@ -614,7 +614,7 @@ def test_budgets_are_kept_as_asked(capsys):
     budgets = ("--budget", "travel=0.8", "--budget", "steps_over:F_largest=300:3")
     found = summary(capsys, "--formulation", "labels", *budgets)
     way, steps = found["budgets"].values()
-    assert way["bound"] == pytest.approx(0.8 * 24.006771, rel=1e-6)
+    assert way["bound"] == pytest.approx(0.8 * 24.522771, rel=1e-6)
     assert way["spent"] <= way["bound"]
     assert way["price"] > 0
     assert steps["spent"] <= steps["bound"] == 3
@@ -625,7 +625,7 @@ def test_budgets_are_kept_as_asked(capsys):
 @pytest.mark.parametrize(
     ("budget", "status", "said"),
     [
-        ("travel=2m", 3, "every choice uses at least 10.8316 of 'robot travel [m]', more than 2"),
+        ("travel=2m", 3, "every choice uses at least 11.3476 of 'robot travel [m]', more than 2"),
         ("travel=few", 2, "'few' is not a number from 0"),
         ("travel=-1m", 2, "'-1' is not a number from 0"),
         ("travel=250:3", 2, "does not exist; give travel=0.8"),

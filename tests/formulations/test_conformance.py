@@ -214,7 +214,7 @@ def test_an_interrupt_leaves_an_allowed_choice_and_a_bound_that_holds(name, prob
     """It comes with the first finding; a second one would end the program."""
     formulation, best, came = ALL[name], ALL["overlap_dp"].solve(problem25).objective, []
     if formulation.takes_budgets:
-        problem25 = replace(problem25, budgets=(travel(problem25, 20.0),))
+        problem25 = replace(problem25, budgets=(travel(problem25, 20.516),))
 
     def interrupt(finding):
         if not came:

@@ -177,7 +177,7 @@ def test_few_labels_stop_with_a_bound(problem25):
     assert few.selection.bound <= best.certificate.objective <= few.certificate.objective
     assert few.selection.end is End.STOPPED or few.selection.bound == few.selection.objective
     assert few.certificate.claimed_gap < 0.02
-    tight = replace(capped, budgets=(*capped.budgets, travel(problem25, 10.9)))
+    tight = replace(capped, budgets=(*capped.budgets, travel(problem25, 11.4)))
     with pytest.raises(SolverError, match="before any choice within all budgets was found"):
         solve(tight, "labels", most=1, time_limit=0)
 

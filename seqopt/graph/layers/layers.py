@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 import time
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain
-from typing import cast
+from itertools import chain, pairwise
 
 import numpy as np
 import pandas as pd
@@ -19,7 +18,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, ProblemError, did_you_mean
 from seqopt.graph.layers.costs import Budget, Joined, LayeredCosts
-from seqopt.problem.criteria import Among, Ranked, RankSum
+from seqopt.problem.criteria import Among, Ranked, RankSum, _counts_every_step
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import (
     Criterion,
@@ -29,18 +28,18 @@ from seqopt.problem.requirements import (
     SceneFacts,
     _carrying_excesses,
     _excesses,
+    _response_along,
     _step_limits,
     robots_of,
 )
 from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, StepChoices
-from seqopt.responses._tolerance import is_tolerance, with_tolerances
+from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import PROP_EXCESS, _payload_text, robot_response
 from seqopt.responses.resources import HERE, Resources
-from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.site import _begin_step
-from seqopt.sequence.steps import Grips, Step
+from seqopt.sequence.steps import Step
 
 
 def window(
@@ -197,8 +196,13 @@ class Layers(Shown):
         return self._joined(np.maximum)
 
     def _joined(self, join: np.ufunc) -> tuple[LayeredCosts, float]:
-        """Return the costs of all choices, steps of the same moves joined, and the seconds."""
+        """Return the costs of all choices, steps of the same moves joined, and the seconds.
+
+        What steps without an open grip cost is joined to those of the first move.
+        """
         joined = Joined([len(move.candidates) for move in self.schedule.moves], join)
+        for cost in self.given_costs:
+            joined.add((-1, 0), np.full((1, len(self.schedule.moves[0].candidates)), cost))
         seconds = 0.0
         for steps in self.evaluation.levels():
             start = time.perf_counter()
@@ -206,6 +210,36 @@ class Layers(Shown):
                 joined.add(faced.moves, self.step_costs(faced))
             seconds += time.perf_counter() - start
         return joined.layered(), seconds
+
+    @property
+    def given(self) -> tuple[Step, ...]:
+        """The steps without an open grip, in which bricks stand."""
+        return self.evaluation.given.steps
+
+    def given_values(self, response: str) -> Floats:
+        """Return a response of every given step (n,), SI units; NaN where a robot does not grip."""
+        table = self.evaluation.given.table([response])
+        return _response_along(self.schedule.scene, table, response)
+
+    @cached_property
+    def given_costs(self) -> Floats:
+        """What every given step costs (n,); none where the criterion is not defined in them.
+
+        An `InfeasibleError` names one that the criterion does not allow.
+        """
+        if not (self.given and _counts_every_step(self.criterion)):
+            return np.zeros(0)
+        found = {name: self.given_values(name) for name in self.criterion.wanted(1)}
+        costs = np.zeros(len(self.given))
+        for k, step in enumerate(self.given):
+            row = {name: values[k : k + 1] for name, values in found.items()}
+            costs[k] = self.criterion.costs(row, step.bricks, 1)[0]
+            if not np.isfinite(costs[k]):
+                raise InfeasibleError(
+                    f"criterion {self.criterion.name}: step {step.number}, where no grip is left "
+                    "to choose, is not allowed; change the criterion or the schedule"
+                )
+        return costs
 
     def faced(self, choices: StepChoices, before: int | None = None) -> StepChoices:
         """Return a step as its choices are compared: for itself, or after every choice before.
@@ -274,7 +308,10 @@ class Layers(Shown):
         spread = len(choices.moves) > len(choices.step.moves)  # over pairs, to be ranked by rows
         if spread and isinstance(criterion, RankSum):
             criterion = replace(criterion, ranked=Ranked.CONDITIONAL)
-        costs = criterion.costs(choices.responses, move.bricks, len(move.candidates))
+        bricks = move.bricks  # of ranks, which are those of the move
+        if _counts_every_step(criterion) and {*criterion.wanted(1)} <= {*choices.responses}:
+            bricks = choices.step.bricks
+        costs = criterion.costs(choices.responses, bricks, len(move.candidates))
         costs = np.where(np.isfinite(costs) & _possible(choices), costs, np.inf)
         for limit in self.limits:
             costs[limit.exceeded(choices.responses[limit.response])] = np.inf
@@ -286,13 +323,9 @@ class Layers(Shown):
         Raises `InfeasibleError`, naming the limit, the value and the steps.
         """
         _require_carried(self.schedule, [self.engine.network.scene])
-        given = (step for step in self.schedule.steps if not step.moves)
-        fixed = [Step(s.number, s.kind, s.bricks, cast(Grips, s.grips)) for s in given]
-        if not (self.limits and fixed):
+        if not (self.limits and self.given):
             return
-        table = analyze(self.engine, fixed)
-        for name in {each.response for each in self.limits if is_tolerance(each.response)}:
-            table = with_tolerances(self.engine, fixed, table, name)
+        table = self.evaluation.given.table(limit.response for limit in self.limits)
         for excess in _excesses(self.schedule.scene, table, self.limits):
             raise InfeasibleError(
                 f"{excess}, where no grip is left to choose; relax the limit or change the schedule"
@@ -354,12 +387,13 @@ def candidate_layers(
 
 
 def steps_over(problem: Layers, response: str, level: float, bound: float) -> Budget:
-    """Return a bound on the number of open steps in which a response exceeds a level.
+    """Return a bound on the number of steps in which a response exceeds a level.
 
     ``problem``: whose choices the budget is for; ``response``: among those that the problem
     evaluates (``also`` of `seqopt.pose`); ``level``: SI units; ``bound``: how many steps may exceed
-    it. Result: each choice, and each pair, takes the number of its steps that exceed the level.
-    Raises `ProblemError` if the problem does not evaluate the response.
+    it. Result: each choice, and each pair, takes the number of its steps that exceed the level; the
+    first move those without an open grip too, in which no robot takes its grip (``F_move``). Raises
+    `ProblemError` if the problem does not evaluate the response.
     """
     single, shared = _empty(problem)
     for choices in chain.from_iterable(problem.evaluation.levels()):
@@ -370,29 +404,53 @@ def steps_over(problem: Layers, response: str, level: float, bound: float) -> Bu
             )
         target = single if len(choices.moves) == 1 else shared
         target[choices.moves[-1]] += choices.responses[response] > level
+    if response != "F_move" and problem.given:
+        shared[0] += (problem.given_values(response) > level).sum()
     return Budget(f"steps with {response} over {level:g}", tuple(single), tuple(shared), bound)
 
 
 def travel(problem: Layers, bound: float) -> Budget:
-    """Return a bound on the distance that robots travel to chosen grips and on to their next ones.
+    """Return a bound on how far robots go straight from one grip to the next, over the whole build.
 
-    ``problem``: whose choices the budget is for; ``bound``: m. Result: each choice takes straight
-    lines between its node and the given nodes that its robot holds before and after, each pair the
-    line between its two nodes; m.
+    ``problem``: whose choices the budget is for; ``bound``: m. Result: each choice takes the ways
+    between its node and given ones before and after it, each pair that between its two nodes; the
+    first move those between given nodes too; m. Raises `ProblemError` if a robot goes from the grip
+    of a move to that of another one that is not the next.
     """
     single, shared = _empty(problem)
-    schedule = problem.schedule
-    for k, move in enumerate(schedule.moves):
-        robot = [r.name for r in schedule.scene.robots].index(move.robot)
-        held = [step.grips[robot] for step in schedule.steps if step.grips[robot] is not None]
-        first, count = held.index(OpenGrip(k)), held.count(OpenGrip(k))
-        before, after = [None, *held][first], [*held, None][first + count]
-        for other in (before, after):
-            if isinstance(other, int):
-                single[k] += _distances(problem, move.candidates, (other,))[:, 0]
-        if before == OpenGrip(k - 1):
-            shared[k] += _distances(problem, schedule.moves[k - 1].candidates, move.candidates)
+    for robot, ends in _ways(problem.schedule):
+        moves = [end.move for end in ends if isinstance(end, OpenGrip)]
+        way = _distances(problem, *(_nodes(problem.schedule, end) for end in ends))
+        if not moves:
+            shared[0] += way[0, 0]
+        elif len(moves) == 1:
+            single[moves[0]] += way.ravel()
+        elif moves[1] == moves[0] + 1:
+            shared[moves[1]] += way
+        else:
+            raise ProblemError(
+                f"budget travel: {robot} goes from the grip of move {moves[0] + 1} to that of move "
+                f"{moves[1] + 1}, and candidates are chosen move by move; name an aim, as minmax"
+            )
     return Budget("robot travel [m]", tuple(single), tuple(shared), bound)
+
+
+_Grip = int | OpenGrip
+
+
+def _ways(schedule: Schedule) -> Iterator[tuple[str, tuple[_Grip, _Grip]]]:
+    """Yield who goes from which grip to which other one, also from where the build begins."""
+    scene, site = schedule.scene, schedule.begin
+    before = () if site is None else (site.stays or site.holds(scene), site.holds(scene))
+    every = zip(*before, *(step.grips for step in schedule.steps), strict=True)
+    for robot, grips in zip(scene.robots, every, strict=True):
+        for ends in pairwise(grip for grip in grips if grip is not None):
+            if ends[0] != ends[1]:
+                yield robot.name, ends
+
+
+def _nodes(schedule: Schedule, grip: _Grip) -> tuple[int, ...]:
+    return schedule.moves[grip.move].candidates if isinstance(grip, OpenGrip) else (grip,)
 
 
 def _empty(problem: Layers) -> tuple[list[Floats], list[Floats]]:

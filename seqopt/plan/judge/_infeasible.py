@@ -165,7 +165,8 @@ def confirmed(
     is open whether some states stand.
     """
     end, capped = time.perf_counter() + seconds, problem.goals[len(problem.aims) :]
-    steps = replace(_with_any_margin(problem), goals=(*STEPS, *capped))
+    goals = (*STEPS, *_of_criterion(problem), *capped)
+    steps = replace(_with_any_margin(problem), goals=goals)
     try:
         hint = None
         if barred(steps) is None:
@@ -232,6 +233,11 @@ def _with_any_margin(problem: States) -> States:
     return problem
 
 
+def _of_criterion(problem: States) -> tuple[Goal, ...]:
+    """Return the aims that the criterion is asked for, which may forbid states."""
+    return tuple(goal for goal in problem.aims if goal.of_states and not goal.response)
+
+
 def _why_impossible(problem: States, seconds: float = np.inf) -> str:
     """Return why no plan is allowed, in a line.
 
@@ -245,6 +251,9 @@ def _why_impossible(problem: States, seconds: float = np.inf) -> str:
     look = Look(time.perf_counter() + seconds)
     where = "no plan is allowed"
     try:
+        steps = replace(problem, goals=STEPS)
+        if _of_criterion(problem) and barred(steps) is None and look(steps).whole:
+            return f"{problem.title}: criterion {problem.criterion.name} allows no plan"
         where = _where(problem, look)
         return f"{problem.title}: {where}{_what_helps(problem, look)}"
     except _LateError:

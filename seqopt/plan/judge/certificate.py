@@ -123,7 +123,7 @@ class Certificate(FrozenValue):
     >>> import seqopt
     >>> proof = seqopt.optimize("arch25", criterion="worst-ratio-published").certificate
     >>> round(proof.objective, 3), round(proof.bound, 3), proof.gap
-    (57.538, 57.538, 0.0)
+    (57.941, 57.941, 0.0)
     """
 
     values: tuple[float, ...]

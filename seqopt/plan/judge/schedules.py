@@ -247,7 +247,7 @@ def plan_values(
         elif not goal.of_states:
             out.append(float(moves[goal.measure]))
         else:
-            costs = _costs(problem, goal, columns, len(steps))
+            costs = _costs(problem, goal, columns, [step.bricks for step in steps])
             out.append(float(costs.max() if goal.measure is Measure.PEAK else costs.sum()))
     return tuple(out)
 
@@ -318,8 +318,14 @@ def _travel_of(problem: States, steps: Sequence[Step]) -> float:
 
 
 def _costs(
-    problem: States, goal: Goal, columns: Mapping[str, np.ndarray], count: int
+    problem: States, goal: Goal, columns: Mapping[str, np.ndarray], bricks: Sequence[int]
 ) -> np.ndarray:
+    """Return what a goal takes of every step (n,), in which so many bricks stand."""
     if goal.response:
         return columns[goal.response]
-    return np.asarray(problem.criterion.costs(columns, 1, count))
+    out = np.zeros(len(bricks))
+    for stand in {*bricks} - {0}:  # an empty site takes nothing
+        rows = np.flatnonzero(np.array(bricks) == stand)
+        found = {name: values[rows] for name, values in columns.items()}
+        out[rows] = problem.criterion.costs(found, stand, len(rows))
+    return out

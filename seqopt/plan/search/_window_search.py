@@ -213,20 +213,22 @@ class PairSearch:
 
     ``costs``: all that it looked at; ``selection``: the best choice of which all pairs are known;
     its trace tells how choice and bound met; ``along``: the steps that the choice meets, move by
-    move, to be solved anew; ``models``: how many models were solved.
+    move, to be solved anew; ``models``: how many models were solved; ``given`` (n,): what steps
+    without an open grip cost.
     """
 
     costs: PartialCosts
     selection: Selection
     along: WindowSearch
     models: int
+    given: Floats
 
     @property
     def objective(self) -> float:
-        """What the steps cost that the choice meets."""
+        """What all steps cost, those that the choice meets and those that are given."""
         aim = self.costs.aim
         parts = [zip(aim.costs(part).single, some, strict=True) for part, some in self.along.met]
-        met = [own[now] for part in parts for own, now in part]
+        met = [*self.given, *(own[now] for part in parts for own, now in part)]
         return float(sum(met) if aim is Aim.SUM else max(met))
 
 
@@ -248,7 +250,8 @@ def search_pairs(problem: Layers, formulation: Formulation, watch: Watch) -> Pai
             raise TimeUpError("no choice was found yet; give more")
         raise InfeasibleError("no choice is allowed; relax a limit or widen a reach")
     selection = _best_known(costs, formulation, watch)
-    return PairSearch(costs, selection, walk.along(selection.choice), walk.models)
+    along = walk.along(selection.choice)
+    return PairSearch(costs, selection, along, walk.models, problem.given_costs)
 
 
 def _best_known(costs: PartialCosts, formulation: Formulation, watch: Watch) -> Selection:
@@ -301,7 +304,10 @@ class _Pairs:
         for k, before in enumerate(first.choice[:-1], start=1):
             row = self._allowed(k, before, aim.costs(first.shared[k]).single[0])
             rows[k].setdefault(before, row)
-        self.costs = PartialCosts(aim.costs(self._alone).single, tuple(rows), floor, aim)
+        single = [*aim.costs(self._alone).single]
+        for cost in problem.given_costs.tolist():
+            single[0] = (np.add if aim is Aim.SUM else np.maximum)(single[0], cost)
+        self.costs = PartialCosts(tuple(single), tuple(rows), floor, aim)
 
     def _free(self, move: int, sizes: Sequence[int]) -> dict[int, Floats]:
         """Return the rows of a move that shares no step with the one before: nothing."""

@@ -1,0 +1,231 @@
+"""One question has one number, whoever is asked: layers of candidates, states, instances, lazily.
+
+A sum and a worst value are over every step for which the criterion is defined: responses in all of
+them, ranks where a grip is open. Travel is that of all robots, from every grip to the next.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import seqopt
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph.layers.layers import steps_over, travel
+from seqopt.plan._compiled import compile_instance
+from seqopt.plan.calling.formulation import FormulationKind, On, exhibits, formulations
+from seqopt.plan.judge.schedules import plan_values
+from seqopt.plan.solving import layers_of, states_of
+from seqopt.problem.criteria import StepCost, WeightedSum
+from seqopt.problem.problem import Aim
+from seqopt.responses.quantities import RESPONSES
+from seqopt.sequence.three_robots import make_schedule
+from seqopt.study.published import EQUATIONS
+from tests.brute_force import ONES
+from tests.builders import small_arch
+
+SCHEDULES = ("three-robot", "modified-sequential", "two-robot")
+WEIGHED = WeightedSum("weighed", (("T_max", 1.0, 10.0), ("F_largest", 2.0, 50.0)))
+BY_BRICKS = StepCost("by bricks", ("M_sup", "T_max"), lambda r, b: b * r["M_sup"] + r["T_max"])
+CRITERIA = {"ratio": ONES, "weighed": WEIGHED, "by bricks": BY_BRICKS}
+GOALS = {Aim.SUM: "sum", Aim.PEAK: "minmax"}
+
+
+@cache
+def posed(schedule, criterion="ratio", bricks=5):
+    """A problem without goals: the formulation says what is minimized."""
+    engine = seqopt.make_engine("compliance", small_arch(bricks))
+    moves = make_schedule(schedule, engine.network)
+    return seqopt.pose(engine, moves, CRITERIA.get(criterion, EQUATIONS))
+
+
+def exact(on, aim=None):
+    """Every formulation that promises the least, exhibits among them."""
+    every = formulations(on) | {n: f for n, f in exhibits().items() if f.on is on}
+    found = [n for n, f in every.items() if f.aim is aim and f.kind is FormulationKind.EXACT]
+    return found + (["overlap_lp", "lagrangian"] if aim is Aim.SUM else [])
+
+
+def by_layers(problem, aim):
+    """What layers of candidates say, by every exact formulation, and by two made exact."""
+    for name in exact(On.LAYERS, aim):
+        yield name, seqopt.solve(problem, name).certificate.objective
+    if aim is Aim.SUM:
+        size = max(len(move.candidates) for move in problem.schedule.moves)
+        yield "beam", seqopt.solve(problem, "beam", width=size).certificate.objective
+        yield "instance", seqopt.solve(compile_instance(problem)).certificate.objective
+    else:
+        told = compile_instance(problem, aim=Aim.PEAK)
+        yield "instance", seqopt.solve(told).certificate.objective
+
+
+def by_states(problem, aim):
+    """What states of the same schedule say, by every exact formulation."""
+    asked = problem.but(goals=GOALS[aim])
+    for name in exact(On.STATES):
+        yield name, seqopt.solve(asked, name).objective[GOALS[aim]]
+    yield "instance", seqopt.solve(compile_instance(asked)).objective[GOALS[aim]]
+
+
+def lazily(problem, aim):
+    name = "overlap_dp" if aim is Aim.SUM else "minimax"
+    yield "lazy", seqopt.solve(problem, name, lazy=True).certificate.objective
+
+
+def of_table(table, name):
+    """A response of every step of a table, SI units."""
+    return table[RESPONSES[name].column].to_numpy(float) / RESPONSES[name].scale
+
+
+def of_steps(problem, aim):
+    """What the steps of the best plan cost, from their table alone."""
+    plan = seqopt.solve(problem, "overlap_dp" if aim is Aim.SUM else "minimax")
+    table = plan.responses()
+    found = {name: of_table(table, name) for name in ("T_max", "M_sup", "D_max")}
+    forces = table[[c for c in table if c.startswith("F_rob")]].abs().max(axis=1)
+    found["F_largest"] = forces.fillna(0.0).to_numpy(float)
+    rows = [{n: v[k : k + 1] for n, v in found.items()} for k in range(len(plan.steps))]
+    each = [
+        float(layers_of(problem).criterion.costs(row, step.bricks, 1)[0])
+        for row, step in zip(rows, plan.steps, strict=True)
+    ]
+    yield "steps", sum(each) if aim is Aim.SUM else max(each)
+
+
+@pytest.mark.parametrize("aim", Aim)
+@pytest.mark.parametrize("criterion", CRITERIA)
+@pytest.mark.parametrize("schedule", SCHEDULES)
+def test_sums_and_worst_values_of_responses_are_one_number(schedule, criterion, aim):
+    problem = posed(schedule, criterion)
+    found = dict(of_steps(problem, aim))
+    kinds = {"layers": by_layers, "states": by_states}
+    if criterion != "by bricks":  # of which no least is said
+        kinds["lazily"] = lazily
+    for kind, ask in kinds.items():
+        found |= {f"{kind}, {name}": value for name, value in ask(problem, aim)}
+    assert len(found) > 10
+    assert found == pytest.approx(dict.fromkeys(found, found["steps"]), rel=1e-6)
+
+
+@pytest.mark.parametrize("aim", Aim)
+@pytest.mark.parametrize("schedule", SCHEDULES)
+def test_ranks_are_of_open_grips_alone(schedule, aim):
+    """Other steps have no candidates: no rank of one out of one is added."""
+    problem = posed(schedule, "ranks")
+    found = dict(by_layers(problem, aim))
+    assert found == pytest.approx(dict.fromkeys(found, next(iter(found.values()))), rel=1e-6)
+    layers = layers_of(problem)
+    assert layers.given
+    assert not len(layers.given_costs)
+    with pytest.raises(ProblemError, match="it ranks the choices of a move"):
+        seqopt.solve(problem.but(goals="sum"))
+
+
+def test_who_takes_a_grip_is_known_of_open_ones_alone():
+    move = WeightedSum("move", (("F_move", 1.0, 50.0),))
+    engine = seqopt.make_engine("compliance", small_arch(5))
+    problem = seqopt.pose(engine, seqopt.three_robot_loop(engine.network), move)
+    assert not len(layers_of(problem).given_costs)
+    assert seqopt.solve(problem, "overlap_dp").certificate.gap < 1e-9
+
+
+def test_a_given_step_that_the_criterion_forbids_leaves_no_plan():
+    """With one brick no grip is open: layers and states say so alike."""
+
+    def several(responses, bricks):
+        return np.full_like(responses["F_largest"], 1.0 if bricks > 1 else np.inf)
+
+    problem = posed("three-robot")
+    assert layers_of(problem).given[0].bricks == 1
+    problem = problem.but(criterion=StepCost("several", ("F_largest",), several))
+    with pytest.raises(InfeasibleError, match=r"criterion several: step 1, where no grip is left"):
+        seqopt.solve(problem, "overlap_dp")
+    with pytest.raises(InfeasibleError, match="schedule: criterion several allows no plan"):
+        seqopt.solve(problem.but(goals="sum"))
+
+
+def ways(scene, steps):
+    """How far robots go straight from one grip to the next, m."""
+    total = 0.0
+    for grips in zip(*(step.grips for step in steps), strict=True):
+        held = [np.array(scene.node_position(n)) for n in grips if n is not None]
+        total += sum(float(np.linalg.norm(b - a)) for a, b in pairwise(held))
+    return total
+
+
+@pytest.mark.parametrize("schedule", ["three-robot", "modified-sequential"])
+def test_travel_is_one_number(schedule):
+    """The least that layers and states say, and what a budget says that each plan goes."""
+    problem = posed(schedule)
+    layers, scene = layers_of(problem), problem.scene
+    budget = travel(layers, np.inf)
+    least = seqopt.solve(problem.but(goals="travel"))
+    goes = states_of(problem.but(goals="travel"))
+    capped = replace(layers, budgets=(replace(budget, bound=least.objective["travel"]),))
+    for name in ("labels", "overlap_mip"):
+        plan = seqopt.solve(capped, name)
+        assert budget.spent(plan.choice) == pytest.approx(least.objective["travel"], rel=1e-6)
+        assert ways(scene, plan.steps) == pytest.approx(budget.spent(plan.choice))
+        assert plan_values(goes, plan.steps)[0] == pytest.approx(budget.spent(plan.choice))
+    assert ways(scene, least.steps) == pytest.approx(least.objective["travel"])
+    rng = np.random.default_rng(1)
+    for _ in range(5):  # any choice, whatever it costs
+        choice = [int(rng.integers(len(move.candidates))) for move in layers.schedule.moves]
+        nodes = dict(enumerate(layers.nodes(choice)))
+        grips = [
+            tuple(nodes[g.move] if hasattr(g, "move") else g for g in step.grips)
+            for step in layers.schedule.steps
+        ]
+        steps = [replace(least.steps[0], grips=each) for each in grips]
+        assert budget.spent(choice) == pytest.approx(ways(scene, steps))
+
+
+def test_ways_between_moves_that_are_not_neighbors_are_refused():
+    """They were left out, so that any budget was kept."""
+    with pytest.raises(ProblemError, match="from the grip of move 1 to that of move 3"):
+        travel(layers_of(posed("two-robot")), 1.0)
+    assert seqopt.solve(posed("two-robot").but(goals="travel")).objective["travel"] > 0
+
+
+@pytest.mark.parametrize("schedule", SCHEDULES)
+def test_steps_over_a_level_are_those_of_the_plan(schedule):
+    """Steps without an open grip count, as in the table of the plan."""
+    problem = posed(schedule)
+    layers = layers_of(problem)
+    free = seqopt.solve(layers, "overlap_dp")
+    known = of_table(free.responses(), "T_max")
+    apart = np.unique(np.round(known, 3))
+    for k in (0, len(apart) // 2, len(apart) - 2):
+        level = float(0.5 * (apart[k] + apart[k + 1]))  # far from any value
+        budget = steps_over(layers, "T_max", level, np.inf)
+        assert budget.spent(free.choice) == (known > level).sum()
+        capped = replace(layers, budgets=(replace(budget, bound=budget.spent(free.choice) - 1),))
+        for name in ("labels", "overlap_mip"):
+            with suppress(InfeasibleError):
+                plan = seqopt.solve(capped, name)
+                over = of_table(plan.responses(), "T_max") > level
+                assert budget.spent(plan.choice) == over.sum() <= capped.budgets[0].bound
+
+
+@pytest.mark.parametrize("schedule", SCHEDULES)
+def test_steps_are_counted_alike(schedule):
+    problem = posed(schedule)
+    count = len(problem.schedule.steps)
+    assert len(seqopt.solve(problem, "overlap_dp").steps) == count
+    for name in exact(On.STATES):
+        plan = seqopt.solve(problem.but(goals="steps"), name)
+        assert plan.objective["steps"] == len(plan.steps) == count
+
+
+@pytest.mark.slow
+def test_the_reference_loop_has_one_number():
+    """57.538 without the two steps in which no grip is open, 57.941 with them."""
+    words = ("arch25", "three-robot", "worst-ratio-published")
+    layers = seqopt.optimize(*words, formulation="overlap_dp").certificate.objective
+    states = seqopt.optimize(*words, aim="sum").objective["sum"]
+    assert layers == pytest.approx(states, rel=1e-9) == pytest.approx(57.940757, rel=1e-6)
