@@ -295,7 +295,7 @@ WORST_OVER_METHODS = WorstRatio("worst-ratio", tuple((name, None) for name in SC
 
 
 def _counts_every_step(criterion: Criterion) -> bool:
-    """Return whether a criterion is defined in every step, so that sums are over all of them.
+    """Return whether a criterion is defined in every step: sums and worst values are over these.
 
     Ranks are among the candidates of open grips, and in other steps no robot takes its grip.
     """
@@ -310,8 +310,8 @@ StepFunction = Callable[[Mapping[str, Floats], int], Floats]
 class StepCost:
     """What a step costs is a function of its responses.
 
-    The function is called once for every open step, with the responses of all choices at once, so
-    it is written with NumPy. A robot that does not grip has force zero. What it returns for choices
+    The function is called once for every step, with the responses of all choices at once, so it is
+    written with NumPy. A robot that does not grip has force zero. What it returns for choices
     that are impossible is passed over.
 
     Parameters
@@ -322,8 +322,8 @@ class StepCost:
         Those that the function takes, as `seqopt.problem.criteria` names them; ``F_each`` stands
         for the forces of all robots, one by one.
     function : callable
-        Of responses by name, each (C,) or (C, D), N, N m or m, and of the bricks placed when the
-        move is made; returns costs of the same shape, finite or, for what is not allowed, infinite.
+        Of responses by name, each (C,) or (C, D), N, N m or m, and of the bricks that stand in the
+        step; returns costs of the same shape, finite or, for what is not allowed, infinite.
     least : float, optional
         What a step costs at least, from zero: a lazy search needs it to rule pairs out.
 

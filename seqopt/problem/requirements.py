@@ -215,7 +215,7 @@ class Criterion(Protocol):
         responses : mapping of str to (C,) or (C, D) float
             SI units; NaN where a choice is impossible, all NaN where a robot does not grip.
         bricks : int
-            Bricks placed at the move that decides the step: the later one of two.
+            Bricks that stand in the step; of ranks, at the move that decides it: the later of two.
         choices : int
             How many candidates that move has.
 

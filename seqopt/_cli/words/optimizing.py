@@ -9,7 +9,7 @@ from seqopt.sequence.three_robots import SCHEDULES
 BUDGET = {
     "--budget BUDGET ...": "cap on a total over the build, with the formulations labels, "
     "lagrangian, overlap_mip and overlap_lp: travel=0.8 (of what the optimum without budgets "
-    "travels), travel=3.5m, steps_over:F_largest=250:10 (at most 10 open steps over 250 N), "
+    "travels), travel=3.5m, steps_over:F_largest=250:10 (at most 10 steps over 250 N), "
     "robot_use:rob1=100:5 (at most 5 in which rob1 carries over 100 N); with --aim or --schedule "
     "free: steps=N, regrips=N, travel=3.5m, makespan=600s or sum(RESPONSE)=VALUE"
 }
