@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 
 from seqopt.arrays import Floats
 from seqopt.errors import SolverError
-from seqopt.plan.calling.formulation import Watch
+from seqopt.graph.formulation import Watch
 from seqopt.problem.problem import RobustAim
 
 STEPS = 400  # weights that are tried at most

@@ -16,7 +16,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import InfeasibleError, SolverError
-from seqopt.plan.calling.formulation import Watch
+from seqopt.graph.formulation import Watch
 
 GAPS = {"mip_rel_gap": 1e-9, "mip_abs_gap": 1e-9}  # of integer programs
 HIGHS_ENDS = {"kOptimal": cp.OPTIMAL, "kInfeasible": cp.INFEASIBLE}

@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 import cvxpy as cp
 import numpy as np
 
+from formulations.layers.priced_paths import stopped
 from formulations.solvers import minimize_whole
 from seqopt.arrays import Floats, Terse
+from seqopt.graph.formulation import End, Formulation, FormulationKind, Watch
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection, Watch
-from seqopt.plan.calling.priced_paths import stopped
+from seqopt.graph.solution import Selection
 from seqopt.problem.problem import Aim
 
 

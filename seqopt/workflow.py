@@ -12,9 +12,9 @@ from seqopt.arms.reach import find_postures
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError
+from seqopt.graph.formulation import On, find_formulation
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.plan.calling.formulation import On, find_formulation
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import in_layers, pose, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS

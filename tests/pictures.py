@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.text import Text
 
-from seqopt.plan.calling.formulation import formulations
+from seqopt.graph.formulation import formulations
 from seqopt.report._style import SMALL, WIDTH
 
 CODE = re.compile(r"\w+_(N|Nm|1e-3mm|Pa|pct|s|us|MB)\b")  # columns of tables

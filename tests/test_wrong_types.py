@@ -15,8 +15,8 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SeqoptError
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.plan.calling._guard import require_fit
-from seqopt.plan.judge.certificate import judge
+from seqopt.judge.certificate import judge
+from seqopt.plan._guard import require_fit
 from seqopt.problem.criteria import RankSum, WeightedSum, WorstRatio
 from seqopt.scene.parts import Anywhere, Robot
 from tests.builders import six_bricks

@@ -10,7 +10,7 @@ import pandas as pd
 from experiments.harness.results import markdown, stored, two
 from experiments.instances.parts.tables import instance_tables
 from experiments.placement.parts.speed_points import speed_tables
-from seqopt.plan.calling.formulation import On, formulations
+from seqopt.graph.formulation import On, formulations
 
 INSTANCES = ("instance_library", "instance_contest", "instance_large")
 UNNEEDED = "not needed without budgets"

@@ -26,9 +26,9 @@ from seqopt.engines._auto import AutoEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.formulation import Formulation, On, formulations
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.plan.calling.formulation import Formulation, On, formulations
-from seqopt.plan.judge.certificate import least
+from seqopt.judge.certificate import least
 from seqopt.problem.problem import Aim
 from seqopt.sequence.three_robots import three_robot_loop
 

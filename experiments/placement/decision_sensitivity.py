@@ -35,9 +35,9 @@ from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import drawn
 from seqopt import Scene, Schedule, build_network, load_scene, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.formulation import find_formulation
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import move_costs, rank_of
-from seqopt.plan.calling.formulation import find_formulation
 from seqopt.problem.requirements import Criterion, SceneFacts
 from seqopt.report._style import dress, looks, styled
 from seqopt.report.text import in_words

@@ -57,9 +57,9 @@ from experiments.placement.parts.formulation_charts import contest_chart, shape_
 from formulations.solvers import anatomy, minimize_whole
 from seqopt import Network, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.formulation import On, Watch, find_formulation, formulations, trace_rows
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.plan.calling.formulation import On, Watch, find_formulation, formulations, trace_rows
-from seqopt.plan.judge.certificate import least
+from seqopt.judge.certificate import least
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion
 from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO

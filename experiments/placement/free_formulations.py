@@ -33,17 +33,16 @@ from experiments.harness.runs import scene_named
 from seqopt import CRITERIA, FreeRules, Plan, build_network, pose, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import TimeUpError
-from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.calling.formulation import (
+from seqopt.graph.formulation import (
     End,
     Formulation,
     FormulationKind,
     On,
-    Selection,
     Watch,
     find_formulation,
     formulations,
 )
+from seqopt.graph.solution import Selection, StatePath
 from seqopt.plan.solving import graph_of
 from seqopt.problem.problem import Aim
 

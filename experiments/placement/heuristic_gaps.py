@@ -22,7 +22,7 @@ from experiments.harness.results import stored
 from seqopt import CRITERIA, Network, build_network, pose, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import StepError
-from seqopt.plan.calling.formulation import FormulationKind, On, formulations
+from seqopt.graph.formulation import FormulationKind, On, formulations
 from seqopt.scene.arch import ArchShape, arch_scene
 
 COMPARED = ("equations-2-3", "weighted", "worst-ratio")

@@ -34,9 +34,9 @@ from experiments.harness.results import drawn, stored
 from experiments.harness.scenes import half_circle
 from formulations.scenarios.scenario_program import _solve_program
 from seqopt import Plan, Scene, build_network, load_scene, make_engine, scenarios, solve
+from seqopt.graph.formulation import Watch
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.scenarios import Choice, ScenarioLayers, in_scenarios
-from seqopt.plan.calling.formulation import Watch
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.plan.search.in_order import least_quantile, solve_in_order
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar

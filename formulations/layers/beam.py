@@ -19,10 +19,11 @@ from functools import partial
 
 import numpy as np
 
+from formulations.layers.priced_paths import conditional, move_by_move, stopped
 from seqopt.errors import ProblemError
+from seqopt.graph.formulation import End, Formulation, FormulationKind, Watch
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection, Watch
-from seqopt.plan.calling.priced_paths import conditional, move_by_move, stopped
+from seqopt.graph.solution import Selection
 from seqopt.problem.problem import Aim
 
 

@@ -24,11 +24,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from formulations.layers.priced_paths import conditional, move_by_move, stopped
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
+from seqopt.graph.formulation import Formulation, FormulationKind, Reads, Watch
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, Reads, Selection, Watch
-from seqopt.plan.calling.priced_paths import conditional, move_by_move, stopped
+from seqopt.graph.solution import Selection
 from seqopt.problem.problem import Aim
 
 CHARGES = ("later", "earlier")

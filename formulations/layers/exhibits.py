@@ -46,11 +46,11 @@ import cvxpy as cp
 import numpy as np
 from scipy import sparse
 
+from formulations.layers.priced_paths import ACCURACY, LayeredFlow, layered_flow
 from formulations.whole_program import WholeProgram, integer_program
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
-from seqopt.plan.calling.priced_paths import ACCURACY, LayeredFlow, layered_flow
 from seqopt.problem.problem import Aim
 
 

@@ -31,11 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arrays import Bools, Floats, Ints
-from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection, Watch
-from seqopt.plan.calling.priced_paths import (
+from formulations.layers.priced_paths import (
     ROUNDING,
     Path,
     Priced,
@@ -44,6 +40,11 @@ from seqopt.plan.calling.priced_paths import (
     priced_paths,
     stopped,
 )
+from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph.formulation import End, Formulation, FormulationKind, Watch
+from seqopt.graph.layers.interface import PlacementProblem
+from seqopt.graph.solution import Selection
 from seqopt.problem.problem import Aim
 
 NARROW, WIDER = 256, 16  # labels kept at first, and how many times as many then

@@ -29,10 +29,11 @@ from itertools import permutations
 
 import numpy as np
 
+from formulations.layers.priced_paths import Path, PricedPaths, best_prices, priced_paths, stopped
 from seqopt.arrays import Floats
+from seqopt.graph.formulation import End, Formulation, FormulationKind, Watch
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection, Watch
-from seqopt.plan.calling.priced_paths import Path, PricedPaths, best_prices, priced_paths, stopped
+from seqopt.graph.solution import Selection
 from seqopt.problem.problem import Aim
 
 MIXED = 12  # choices that are followed by turns: those that cost least at the best prices

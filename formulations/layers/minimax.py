@@ -15,10 +15,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from formulations.layers.priced_paths import stopped
+from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection, Watch
-from seqopt.plan.calling.priced_paths import stopped
+from seqopt.graph.solution import Selection
 from seqopt.problem.problem import Aim
 
 

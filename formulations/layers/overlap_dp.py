@@ -18,8 +18,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection, Watch
+from seqopt.graph.solution import Selection
 from seqopt.problem.problem import Aim
 
 
@@ -31,7 +32,7 @@ def solve(problem: PlacementProblem, *, watch: Watch | None = None) -> Selection
     to_go = [costs.single[-1]]
     for single, shared in zip(costs.single[-2::-1], costs.shared[:0:-1], strict=True):
         if watch.over:
-            from seqopt.plan.calling.priced_paths import stopped  # noqa: PLC0415  # seldom needed
+            from formulations.layers.priced_paths import stopped  # noqa: PLC0415  # seldom needed
 
             return stopped(problem)
         to_go.insert(0, single + (shared + to_go[0]).min(axis=1))

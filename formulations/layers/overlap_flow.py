@@ -24,11 +24,12 @@ from __future__ import annotations
 import cvxpy as cp
 import numpy as np
 
+from formulations.layers.priced_paths import LayeredFlow, layered_flow, stopped
 from formulations.solvers import minimize
 from formulations.whole_program import WholeProgram, integer_program
+from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection, Watch
-from seqopt.plan.calling.priced_paths import LayeredFlow, layered_flow, stopped
+from seqopt.graph.solution import Selection
 from seqopt.problem.problem import Aim
 
 

@@ -22,12 +22,13 @@ import math
 
 import numpy as np
 
+from formulations.layers.priced_paths import conditional, stopped
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
+from seqopt.graph.formulation import Formulation, FormulationKind, Watch
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, Selection, Watch
-from seqopt.plan.calling.priced_paths import conditional, stopped
+from seqopt.graph.solution import Selection
 from seqopt.problem.problem import Aim
 
 MOST = 20_000_000  # combinations in one enumeration: 160 MB

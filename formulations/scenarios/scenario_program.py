@@ -20,11 +20,12 @@ from collections.abc import Sequence
 import cvxpy as cp
 import numpy as np
 
+from formulations.layers.priced_paths import layered_flow
 from formulations.solvers import minimize, minimize_whole
+from seqopt.graph.formulation import Watch
 from seqopt.graph.layers.costs import TINY, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.formulation import Selection, Watch
-from seqopt.plan.calling.priced_paths import layered_flow
+from seqopt.graph.solution import Selection
 
 
 def _solve_program(

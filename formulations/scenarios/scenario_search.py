@@ -32,8 +32,9 @@ import numpy as np
 from formulations._weights import CLOSE, Weighed, best_weights, provers
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
+from seqopt.graph.formulation import End, Formulation, FormulationKind, On, Watch
 from seqopt.graph.scenarios import Choice, ScenarioArcs, ScenarioLayers, largest_of, scenario_arcs
-from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, On, Selection, Watch
+from seqopt.graph.solution import Selection
 from seqopt.problem.problem import Aim
 
 WIDTH = 20_000  # beginnings that are kept after every move

@@ -16,6 +16,7 @@ from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
 from seqopt.graph._budgets import Within, within_budgets
 from seqopt.graph._explore import Explorer, Key, Visited
+from seqopt.graph.formulation import Watch, find_formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.orders import (
     MOST_PARTS,
@@ -26,10 +27,9 @@ from seqopt.graph.orders import (
     order_value,
 )
 from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
+from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import FreeStates, ScenarioSums, explore
 from seqopt.graph.states.states import States
-from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.calling.formulation import Watch, find_formulation
 from seqopt.plan.search._margin_search import best_margin, bisected, with_margin
 from seqopt.problem.problem import Goal, Measure
 from seqopt.work._workers import free_memory

@@ -20,9 +20,9 @@ import numpy as np
 
 from formulations._weights import CLOSE, Weighed, best_weights, provers
 from seqopt.arrays import Floats, Ints
+from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances
-from seqopt.plan.calling.formulation import Watch
 from seqopt.problem.problem import RobustAim
 
 LABELS = 50_000  # that are continued at most

@@ -25,12 +25,12 @@ from formulations.states._totals import least_total
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph._budgets import within_budgets
+from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.instances.instance import TAIL, Instance, _Target
 from seqopt.graph.orders import AllOrders, OrderSelection
+from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
-from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.problem.problem import WORST_TOTAL, RobustAim, cvar
 from seqopt.responses.resources import HERE, Resources
 from seqopt.work.progress import Tell

@@ -32,6 +32,7 @@ import numpy as np
 from formulations.states._search import StopError, best_order, exact_best, shortest, watched
 from seqopt.errors import NothingFoundError, ProblemError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
+from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.graph.orders import (
     AllOrders,
     OrderSelection,
@@ -43,7 +44,6 @@ from seqopt.graph.orders import (
     whole_bound,
 )
 from seqopt.graph.paths import keep_best, lexicographic, reached
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.responses.resources import HERE, Resources
 from seqopt.scene.scene import ORDERS, Order
 from seqopt.work._workers import hire, map_ordered

@@ -20,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 
 from seqopt.arrays import Bools, Floats
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
+from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.plan.front import FrontSelection, _FrontProblem
 from seqopt.work.progress import Tell
 

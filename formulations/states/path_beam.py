@@ -33,12 +33,12 @@ from formulations.states._search import (
 from formulations.states.on_graph import Choice
 from seqopt.errors import ProblemError
 from seqopt.graph._explore import Explorer
+from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.graph.paths import lexicographic
+from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import FreeStates
 from seqopt.graph.states.states import States
-from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.responses.resources import HERE, Resources
 from seqopt.work.progress import Tell
 

@@ -39,9 +39,9 @@ import numpy as np
 from formulations.states._totals import path_of
 from formulations.states.on_graph import Choice, on_graph
 from seqopt.arrays import Floats
+from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import tied
-from seqopt.plan.calling.formulation import Watch
 
 _Values = tuple[float, ...]
 

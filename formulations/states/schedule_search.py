@@ -64,12 +64,12 @@ from formulations.states.on_graph import _path_of_instance
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph._budgets import is_beyond
 from seqopt.graph._explore import Explorer
+from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.graph.instances.instance import Instance
 from seqopt.graph.paths import distances, lexicographic, strictly_below, tied
+from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import FreeStates, floors_of_goals
 from seqopt.graph.states.states import States
-from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.problem.problem import Measure
 from seqopt.work.progress import Tell
 

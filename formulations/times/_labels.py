@@ -21,9 +21,9 @@ from scipy.optimize import linprog
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph._timed import HELD, NOW, TimedGraph
+from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import distances, fewest_moves
-from seqopt.plan.calling.formulation import Watch
 
 ROUNDS = 25  # of cutting planes
 CLOSED = 1e-7  # share of the bound to which prices are the best

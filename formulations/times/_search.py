@@ -27,12 +27,12 @@ from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph._timed import timed_graph
+from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.graph.instances.instance import PEAK, TIME, Instance
 from seqopt.graph.paths import tied
+from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import FreeStates, steps_of
 from seqopt.graph.states.states import States
-from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.problem.problem import Goal, Measure
 from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence._rule_space import FreeSpace

@@ -29,9 +29,9 @@ from seqopt.arrays import Bools
 from seqopt.errors import InfeasibleError, NothingFoundError
 from seqopt.graph._explore import Visited
 from seqopt.graph._timed import TimedGraph
+from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph, LabelProof
 from seqopt.graph.paths import distances, keep_best, reached, tied
-from seqopt.plan.calling.formulation import Watch
 from seqopt.problem.problem import Goal, Measure
 
 BEAMS = (100, 1000, 5000)  # widths of the searches for a first path

@@ -37,8 +37,8 @@ from formulations.times._stages import Asked, Chosen
 from seqopt.arrays import Ints
 from seqopt.errors import ExtraError, ProblemError
 from seqopt.graph._timed import HELD, NOW
+from seqopt.graph.formulation import FormulationKind
 from seqopt.graph.paths import distances
-from seqopt.plan.calling.formulation import FormulationKind
 
 FINEST = 1000  # parts of a second
 WORKERS = 8  # ways to search that take turns

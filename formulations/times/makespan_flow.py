@@ -25,7 +25,7 @@ from formulations.solvers import STOPS, minimize_rows
 from formulations.times._labels import useful
 from formulations.times._search import in_time
 from formulations.times._stages import Asked, Chosen
-from seqopt.plan.calling.formulation import FormulationKind
+from seqopt.graph.formulation import FormulationKind
 
 
 def _bounded(asked: Asked) -> Chosen:

@@ -35,7 +35,7 @@ import numpy as np
 from formulations.times._labels import Labels, LateError, Sweep
 from formulations.times._search import in_time
 from formulations.times._stages import ALMOST, Asked, Chosen
-from seqopt.plan.calling.formulation import FormulationKind
+from seqopt.graph.formulation import FormulationKind
 
 SHARES = (0.25, 0.5, 0.75, 1.0)  # of the gap that is left, up to which labels are set
 MOST = 40_000_000  # labels that are kept at once

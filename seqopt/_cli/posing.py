@@ -22,9 +22,9 @@ from seqopt._cli.words.props import parse_props
 from seqopt._cli.words.where import Place, _kept_place, asked_place, between
 from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
+from seqopt.graph.formulation import On, find_formulation
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.plan.calling.formulation import On, find_formulation
 from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.problem import (
     Orders,
@@ -108,7 +108,7 @@ def asked_problem(options: argparse.Namespace) -> Asked:
     if getattr(options, "bases", None) is not None:
         if options.schedule != FREE or options.order is not None or sought:
             raise ProblemError(f"--bases: it goes with --schedule {FREE} in the scene's own order")
-        from seqopt.plan._other.bases import without_arms  # noqa: PLC0415  # few ask for bases
+        from seqopt.plan._studies.bases import without_arms  # noqa: PLC0415  # few ask for bases
 
         scene = without_arms(scene)  # bases are chosen afterwards
     scene, begin, end = _asked_ends(options, scene)

@@ -13,7 +13,7 @@ from typing import Any
 from seqopt.contact.curing import Curing, _find_curing
 from seqopt.contact.mortar import MORTARS, Mortar, _mortar_name, find_mortar
 from seqopt.errors import ProblemError, SceneError, SeqoptError, StepError, did_you_mean
-from seqopt.plan.calling.formulation import Formulation, as_formulation
+from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.problem._limit_words import LARGEST, NAMES, number_word, split_word
 from seqopt.problem.criteria import Among, Ranked, RankSum
 from seqopt.problem.requirements import NEVER, Criterion

@@ -16,8 +16,7 @@ value and a lower bound, both computed again from the problem's data.
 ((4, 2, 3), 0.0)
 """
 
-from seqopt.plan.judge.certificate import Certificate
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import pose, solve
 
-__all__ = ["Certificate", "Plan", "pose", "solve"]
+__all__ = ["Plan", "pose", "solve"]

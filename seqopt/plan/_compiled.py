@@ -14,6 +14,7 @@ from seqopt.arrays import Bools, Ints
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph._timed import TimedGraph, timed_graph
+from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _by_goal, _Cap, _Target
 from seqopt.graph.layers.layers import Layers
@@ -22,7 +23,6 @@ from seqopt.graph.paths import distances, reached
 from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.graph.states._visits import FreeStates, ScenarioSums
 from seqopt.graph.states.states import States
-from seqopt.plan.calling.formulation import Formulation, as_formulation
 from seqopt.plan.solving import graph_of, natural, usual
 from seqopt.problem.problem import Aim, Measure, Problem, RobustAim
 from seqopt.sequence._robot_kinds import node_numbers

@@ -8,25 +8,25 @@ from dataclasses import replace
 import numpy as np
 
 from seqopt.errors import ProblemError, SolverError, StepError
-from seqopt.graph.layers.costs import Budget
-from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.graph.layers.layers import Layers, _require_carried, steps_over, travel
-from seqopt.graph.scenarios import ScenarioLayers, engine_for
-from seqopt.plan.calling._guard import readable, require_fit, require_proof, require_time, select
-from seqopt.plan.calling.formulation import (
+from seqopt.graph.formulation import (
     End,
     Formulation,
     On,
     Run,
-    Selection,
     Watch,
     find_formulation,
     formulations,
     timed,
 )
-from seqopt.plan.judge._posture_rules import check_postures
-from seqopt.plan.judge._shape_rules import check_shape
-from seqopt.plan.judge.certificate import Certificate, _require_anew, certify_partial, judge
+from seqopt.graph.layers.costs import Budget
+from seqopt.graph.layers.interface import PlacementProblem
+from seqopt.graph.layers.layers import Layers, _require_carried, steps_over, travel
+from seqopt.graph.scenarios import ScenarioLayers, engine_for
+from seqopt.graph.solution import Selection
+from seqopt.judge._posture_rules import check_postures
+from seqopt.judge._shape_rules import check_shape
+from seqopt.judge.certificate import Certificate, _require_anew, certify_partial, judge
+from seqopt.plan._guard import readable, require_fit, require_proof, require_time, select
 from seqopt.plan.plan import Plan
 from seqopt.problem.criteria import Among
 from seqopt.problem.problem import Aim, AskedBudget

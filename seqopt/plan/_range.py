@@ -13,10 +13,10 @@ from typing import Any, ClassVar, Protocol, TypeVar
 
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, SeqoptError, message_of
+from seqopt.graph.formulation import End
 from seqopt.graph.scenarios import ScenarioLayers, engine_for
+from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
-from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.calling.formulation import End
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIMIT_TOLERANCE

@@ -15,22 +15,7 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance
-from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.orders import AllOrders, OrderSelection
-from seqopt.graph.states._visits import barred, steps_in_hands
-from seqopt.graph.states.states import States
-from seqopt.plan._layers import PROOF, solve_layers
-from seqopt.plan._status import FoundOrder
-from seqopt.plan.calling._guard import (
-    StatePath,
-    called,
-    readable,
-    require_proof,
-    text,
-    with_numbers,
-)
-from seqopt.plan.calling.formulation import (
+from seqopt.graph.formulation import (
     Formulation,
     FormulationKind,
     On,
@@ -39,12 +24,21 @@ from seqopt.plan.calling.formulation import (
     find_formulation,
     formulations,
 )
-from seqopt.plan.judge._bare._claims import Claim, as_layers
-from seqopt.plan.judge._bare._judging import judge_instance
-from seqopt.plan.judge._infeasible import claimed, confirmed, without_order
-from seqopt.plan.judge._orders import finds_better_order
-from seqopt.plan.judge.certificate import TOLERANCE, Certificate
-from seqopt.plan.judge.schedules import judge_schedule
+from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance
+from seqopt.graph.layers.interface import CostProblem
+from seqopt.graph.orders import AllOrders, OrderSelection
+from seqopt.graph.solution import StatePath
+from seqopt.graph.states._visits import barred, steps_in_hands
+from seqopt.graph.states.states import States
+from seqopt.judge._arithmetic import judge_instance
+from seqopt.judge._claims import Claim, as_layers
+from seqopt.judge._orders import finds_better_order
+from seqopt.judge.certificate import TOLERANCE, Certificate
+from seqopt.judge.schedules import judge_schedule
+from seqopt.plan._guard import called, readable, require_proof, text, with_numbers
+from seqopt.plan._infeasible import claimed, confirmed, without_order
+from seqopt.plan._layers import PROOF, solve_layers
+from seqopt.plan._status import FoundOrder
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Aim
 from seqopt.responses.resources import HERE

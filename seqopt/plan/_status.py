@@ -8,8 +8,8 @@ from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from seqopt.arrays import Terse
-from seqopt.plan.calling.formulation import End
-from seqopt.plan.judge.certificate import TOLERANCE, _known_gap
+from seqopt.graph.formulation import End
+from seqopt.judge.certificate import TOLERANCE, _known_gap
 from seqopt.problem._arms import faults_in_words
 from seqopt.responses._tolerance import is_tolerance
 from seqopt.responses.quantities import length_text

@@ -12,7 +12,7 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.ranking import move_costs, rank_of, split_gap, under_both
-from seqopt.plan.calling.formulation import Selection
+from seqopt.graph.solution import Selection
 from seqopt.plan.search._window_search import WindowSearch
 from seqopt.problem.problem import Aim
 from seqopt.responses._choices import StepChoices

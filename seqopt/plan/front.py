@@ -15,19 +15,19 @@ from seqopt.arrays import Floats, FrozenValue, Ints, Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError, did_you_mean
 from seqopt.graph._explore import Explorer, Key, Visited
+from seqopt.graph.formulation import Formulation, On, as_formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.orders import MOST_PARTS, AllOrders, OrderStates
 from seqopt.graph.paths import distances, fewest_moves, keep_best, reached
 from seqopt.graph.states._visits import barred, explore, steps_of, steps_with, with_held
 from seqopt.graph.states.states import States
+from seqopt.judge._orders import finds_better_order
+from seqopt.judge.schedules import plan_values
+from seqopt.plan._guard import called, readable, text
+from seqopt.plan._infeasible import confirmed, without_order
 from seqopt.plan._layers import PROOF
 from seqopt.plan._range import best_front, leaves
 from seqopt.plan._rounding import _rounded_up, _rounding_steps
-from seqopt.plan.calling._guard import called, readable, text
-from seqopt.plan.calling.formulation import Formulation, On, as_formulation
-from seqopt.plan.judge._infeasible import confirmed, without_order
-from seqopt.plan.judge._orders import finds_better_order
-from seqopt.plan.judge.schedules import plan_values
 from seqopt.plan.solving import graph_of, states_of
 from seqopt.problem.problem import Measure, Problem
 from seqopt.responses._range import Moved

@@ -18,8 +18,8 @@ from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.scenarios import Choice, ScenarioCosts, ScenarioLayers, in_scenarios
 from seqopt.graph.states.states import over_scenarios
+from seqopt.judge.schedules import plan_values
 from seqopt.plan._layers import best_choice
-from seqopt.plan.judge.schedules import plan_values
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import WORST_PEAK, Aim
 from seqopt.scene.scenarios import Scenarios

@@ -15,23 +15,16 @@ from seqopt.engines._kinds import OpeningEngine
 from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError
+from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Reads
 from seqopt.graph.instances.instance import Instance
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.scenarios import ScenarioLayers
+from seqopt.graph.solution import Selection, StatePath
 from seqopt.graph.states.states import States
+from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.plan._status import ENDS, FoundOrder, KeptPostures, Status, bare_summary
 from seqopt.plan.build import ShownBuild
-from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.calling.formulation import (
-    End,
-    Finding,
-    Formulation,
-    FormulationKind,
-    Reads,
-    Selection,
-)
-from seqopt.plan.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.problem.problem import Aim, Problem, judged_by
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Excess, _said_limits, overloads
 from seqopt.problem.standing import Standing
@@ -436,7 +429,7 @@ class Plan(ShownBuild):
         `seqopt.stability.steps.stability_table`.
         """
         if mortar is None and isinstance(self.graph, States):
-            from seqopt.plan.judge._standing_proof import certified  # noqa: PLC0415  # of states
+            from seqopt.judge._standing_proof import certified  # noqa: PLC0415  # of states
 
             return stability_table(self.steps, certified(self.graph, self.steps))
         return super().stability("dry" if mortar is None else mortar)

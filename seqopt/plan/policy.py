@@ -21,8 +21,8 @@ from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.paths import _to_go
 from seqopt.graph.states._visits import barred, explore
 from seqopt.graph.states.states import States
-from seqopt.plan.judge._infeasible import confirmed
-from seqopt.plan.judge._policy import check_policy
+from seqopt.judge._policy import check_policy
+from seqopt.plan._infeasible import confirmed
 from seqopt.plan.solving import states_of
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LINEAR_RANGE

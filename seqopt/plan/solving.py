@@ -18,6 +18,7 @@ from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import recipe_of
 from seqopt.errors import NothingFoundError, ProblemError, TimeUpError
+from seqopt.graph.formulation import Formulation, On, Run, as_formulation
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.scenarios import ScenarioLayers, engine_for, in_scenarios
@@ -25,7 +26,6 @@ from seqopt.graph.states.states import States, build_states, over_scenarios, wit
 from seqopt.plan._layers import solve_layers, with_budgets
 from seqopt.plan._range import best_within
 from seqopt.plan._status import KeptPostures
-from seqopt.plan.calling.formulation import Formulation, On, Run, as_formulation
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import (
     WORST_PEAK,

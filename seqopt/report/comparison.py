@@ -13,14 +13,14 @@ from seqopt._files import csv_text
 from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.errors import MechanismError, ProblemError, SeqoptError, StepError
+from seqopt.graph.formulation import Formulation, On, find_formulation, formulations
 from seqopt.graph.layers.costs import TINY
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import rank_choice, under_both
+from seqopt.graph.solution import StatePath
+from seqopt.judge.certificate import least_sum
 from seqopt.plan._layers import on_the_way
 from seqopt.plan._range import keeping
-from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.calling.formulation import Formulation, On, find_formulation, formulations
-from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import pose, solve
 from seqopt.problem._arms import arm_faults

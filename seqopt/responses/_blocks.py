@@ -10,7 +10,7 @@ In a folder of answers every block is a file of its own, written whole: a checks
 follows, the numbers, then what the engine counted. No more is read than an answer to the block can
 be, and a file is believed only if it is whole and its block's own: whatever is damaged is computed
 again. Against somebody who writes false numbers with their checksum there is
-`seqopt.plan.judge.certificate`.
+`seqopt.judge.certificate`.
 """
 
 from __future__ import annotations

@@ -17,8 +17,8 @@ import seqopt
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, StepError
+from seqopt.graph.formulation import FormulationKind, On, find_formulation, formulation_names
 from seqopt.graph.states.states import build_states
-from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation, formulation_names
 from seqopt.problem.problem import parse_robust
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Limit
 from seqopt.sequence.rules import FreeRules, with_robots

@@ -14,13 +14,14 @@ from hypothesis import strategies as st
 from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.graph.formulation import End
 from seqopt.graph.layers._partial_costs import PartialCosts, least_possible
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.solution import Selection
+from seqopt.judge.certificate import certify_partial
 from seqopt.network.build import build_network
-from seqopt.plan.calling.formulation import End, Selection
-from seqopt.plan.judge.certificate import certify_partial
 from seqopt.plan.search._window_search import search_windows
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import Among, Ranked, StepCost

@@ -12,9 +12,9 @@ import pytest
 
 import seqopt
 from seqopt.errors import InfeasibleError, SolverError, StepError
+from seqopt.graph.formulation import FormulationKind, On, find_formulation, formulation_names
+from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._status import Status
-from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation, formulation_names
-from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.problem.problem import Orders
 from seqopt.problem.requirements import Limit
 from seqopt.scene.parts import Robot

@@ -10,9 +10,9 @@ from hypothesis import given
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SolverError, TimeUpError
+from seqopt.graph.formulation import Watch
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
-from seqopt.plan.calling.formulation import Watch
 from seqopt.plan.search._window_search import search_windows
 from seqopt.plan.solving import solve
 from seqopt.problem.requirements import Limit

@@ -13,7 +13,7 @@ from seqopt.arms._permits import permits, reach_table, reachable, within_reach
 from seqopt.arms._reached import Site, reached_alone
 from seqopt.arms._tables import _compute_table, _stored_table
 from seqopt.errors import InfeasibleError, SceneError, StepError
-from seqopt.plan.judge._posture_rules import PostureRules, check_postures
+from seqopt.judge._posture_rules import PostureRules, check_postures
 from seqopt.scene.scene import in_order
 from seqopt.sequence._postures import plan_postures
 from seqopt.sequence._rule_space import StateRows

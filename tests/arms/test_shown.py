@@ -20,7 +20,7 @@ from seqopt._cli.outputs import _task_files
 from seqopt._files import csv_text
 from seqopt.arms._model import ArmModel, idle_arm
 from seqopt.errors import ExtraError, ProblemError, SceneError
-from seqopt.plan._other.bases import without_arms
+from seqopt.plan._studies.bases import without_arms
 from seqopt.report._film import Film
 from seqopt.report._pictures import VIEW, steps_picture
 from seqopt.report._robots import _known_arms

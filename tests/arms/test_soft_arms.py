@@ -16,7 +16,7 @@ from seqopt.arms._model import ArmModel
 from seqopt.arms._permits import permits
 from seqopt.engines.registry import make_engine
 from seqopt.errors import GripError, StepError
-from seqopt.plan.judge._posture_rules import check_postures
+from seqopt.judge._posture_rules import check_postures
 from seqopt.plan.solving import layers_of
 from seqopt.problem.criteria import WorstRatio
 from seqopt.report.softness import held_softly

@@ -10,7 +10,7 @@ import pytest
 
 from seqopt._cli.commands.completion import words
 from seqopt._cli.main import main
-from seqopt.plan.calling.formulation import formulation_names
+from seqopt.graph.formulation import formulation_names
 
 ASK = {
     "bash": """

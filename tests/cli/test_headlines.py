@@ -10,8 +10,8 @@ import pytest
 
 import seqopt
 from seqopt.errors import InfeasibleError
-from seqopt.plan._other.fewest_props import fewest_props
-from seqopt.plan.judge.certificate import TOLERANCE, Certificate, _known_gap
+from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
+from seqopt.plan._studies.fewest_props import fewest_props
 from seqopt.report.text import _headline
 from seqopt.responses.quantities import _payload_text, _rounded_up
 from seqopt.scene._props import Prop

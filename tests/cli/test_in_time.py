@@ -16,9 +16,9 @@ from seqopt._cli.arguments import parser
 from seqopt._cli.commands import analyze, optimize, pareto, replan
 from seqopt._cli.main import main
 from seqopt.errors import TimeUpError
+from seqopt.graph.formulation import End
 from seqopt.plan import _layers, _states
-from seqopt.plan._other.fewest_props import fewest_props
-from seqopt.plan.calling.formulation import End
+from seqopt.plan._studies.fewest_props import fewest_props
 from seqopt.plan.front import find_front
 from seqopt.plan.plan import Status
 from seqopt.sequence.schedule_file import read_plan

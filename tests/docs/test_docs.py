@@ -12,7 +12,7 @@ import pytest
 
 from experiments.harness.results import RESULTS, markdown, stored, two
 from seqopt._cli.arguments import COMMANDS
-from seqopt.plan.calling.formulation import On, exhibits, formulations
+from seqopt.graph.formulation import On, exhibits, formulations
 from tests.browser import PLAIN, browsed, browses
 from tests.builders import ROOT
 from tests.docs.extensions import stated

@@ -43,7 +43,7 @@ from experiments.placement.speed_accuracy import (
     specs,
     summarize,
 )
-from seqopt.plan.calling.formulation import On, formulations
+from seqopt.graph.formulation import On, formulations
 from tests.builders import ROOT
 
 STAGES = ["assemble", "respond", "rank", "compile", "solve", "verify"]

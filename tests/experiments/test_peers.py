@@ -15,9 +15,9 @@ from experiments.peers.parts.loops import LOOPS, kept, loop
 from experiments.peers.parts.workload import PATHS, Case, by_linprog, by_networkx, workload
 from experiments.peers.peers import difference
 from seqopt.engines.interface import Want, grip_columns
+from seqopt.graph.formulation import find_formulation
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.formulation import find_formulation
 
 STATES = [(4, (1, 5, 7)), (17, (1, 20, 33)), (17, (1, 20, 21)), (25, (4, 47)), (25, (12, 13, 46))]
 

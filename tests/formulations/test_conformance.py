@@ -13,11 +13,7 @@ from hypothesis import strategies as st
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.layers.layers import candidate_layers, steps_over, travel
-from seqopt.network.build import build_network
-from seqopt.plan.calling.formulation import (
+from seqopt.graph.formulation import (
     End,
     FormulationKind,
     On,
@@ -25,6 +21,10 @@ from seqopt.plan.calling.formulation import (
     find_formulation,
     formulations,
 )
+from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.layers.interface import CostProblem
+from seqopt.graph.layers.layers import candidate_layers, steps_over, travel
+from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
@@ -174,7 +174,7 @@ def test_an_answer_stopped_early_is_allowed_and_its_bound_holds(name, problem, l
     best = brute_force(problem, formulation.aim)
     told = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("seqopt.plan.calling.formulation.time", Clock())
+        patch.setattr("seqopt.graph.formulation.time", Clock())
         plan, wrongly_refused = None, False
         try:
             plan = solve(problem, formulation, time_limit=float(limit), progress=told.append)

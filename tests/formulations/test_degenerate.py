@@ -9,18 +9,13 @@ import numpy as np
 import pytest
 
 from formulations import solvers
+from formulations.layers.priced_paths import LayeredFlow
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.graph.formulation import Formulation, FormulationKind, On, formulations
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.formulation import (
-    Formulation,
-    FormulationKind,
-    On,
-    Selection,
-    formulations,
-)
-from seqopt.plan.calling.priced_paths import LayeredFlow
-from seqopt.plan.judge.certificate import certify
+from seqopt.graph.solution import Selection
+from seqopt.judge.certificate import certify
 from seqopt.plan.solving import solve
 from seqopt.problem.problem import Aim
 from tests.quality.degenerate import MALFORMED, judge, outcomes

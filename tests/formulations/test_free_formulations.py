@@ -15,18 +15,12 @@ from formulations.states._totals import least_total
 from formulations.states.on_graph import Choice, on_graph
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
+from seqopt.graph.formulation import FormulationKind, On, Watch, find_formulation, formulation_names
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import fewest_moves, lexicographic
 from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import build_states
 from seqopt.network.build import build_network
-from seqopt.plan.calling.formulation import (
-    FormulationKind,
-    On,
-    Watch,
-    find_formulation,
-    formulation_names,
-)
 from seqopt.plan.solving import solve
 from seqopt.problem.problem import WORST_TOTAL, cvar
 from seqopt.problem.requirements import Limit

@@ -15,10 +15,10 @@ import seqopt
 from formulations.states._search import exact_best, narrow
 from seqopt.errors import InfeasibleError, NothingFoundError, SolverError
 from seqopt.graph._explore import Explorer
+from seqopt.graph.formulation import FormulationKind, find_formulation
 from seqopt.graph.layers.layers import travel
 from seqopt.graph.states._visits import FreeStates
 from seqopt.graph.states.states import build_states, within
-from seqopt.plan.calling.formulation import FormulationKind, find_formulation
 from seqopt.plan.solving import layers_of, states_of
 from seqopt.sequence.rules import FreeRules
 from tests.brute_force import ONES

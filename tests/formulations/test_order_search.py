@@ -16,12 +16,12 @@ import seqopt
 from formulations.states.order_search import FORMULATION
 from seqopt.contact.mortar import find_mortar
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
+from seqopt.graph.formulation import FormulationKind, On, find_formulation, formulation_names
 from seqopt.graph.orders import AllOrders, OrderSelection, trying, whole_bound
 from seqopt.graph.states.states import build_states, over_scenarios, within
+from seqopt.judge._orders import finds_better_order
 from seqopt.plan._states import _proven
 from seqopt.plan._status import Status
-from seqopt.plan.calling.formulation import FormulationKind, On, find_formulation, formulation_names
-from seqopt.plan.judge._orders import finds_better_order
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import StepCost, WorstRatio
 from seqopt.problem.problem import WORST_TOTAL, cvar

@@ -14,10 +14,10 @@ import formulations.layers.beam
 import formulations.layers.rank_search
 from formulations.solvers import anatomy, minimize, minimize_whole
 from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph.formulation import End, FormulationKind, Reads, Watch
+from seqopt.graph.formulation import formulations as registered
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.formulation import End, FormulationKind, Reads, Watch
-from seqopt.plan.calling.formulation import formulations as registered
 from seqopt.problem.problem import Aim
 from tests.strategies import problems
 

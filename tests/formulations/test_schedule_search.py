@@ -22,9 +22,9 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError,
 from seqopt.graph.paths import fewest_moves, keep_best, reached
 from seqopt.graph.states._visits import explore, steps_with, with_held
 from seqopt.graph.states.states import build_states
+from seqopt.judge.schedules import judge_schedule, plan_values
 from seqopt.network.build import build_network
 from seqopt.plan.front import _StateFront, find_front, pick, upper_bounds
-from seqopt.plan.judge.schedules import judge_schedule, plan_values
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.sequence.rules import FreeRules, with_robots
@@ -349,7 +349,7 @@ def test_a_time_limit_holds_while_it_is_asked_what_helps(monkeypatch, limit, sai
     """What is known by then is said."""
     engine = ComplianceEngine(build_network(small_arch(5)))
     problem = build_states(engine, FreeRules(), ONES, "steps", [Limit("F_largest", 1.0)])
-    monkeypatch.setattr("seqopt.plan.judge._infeasible.time", Clock())
+    monkeypatch.setattr("seqopt.plan._infeasible.time", Clock())
     with pytest.raises(InfeasibleError, match=said):
         seqopt.solve(problem, "schedule_search", time_limit=limit)
 

@@ -16,8 +16,8 @@ from seqopt.contact.mortar import DRY, find_mortar
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, StepError
 from seqopt.graph.states.states import build_states, within
+from seqopt.judge.schedules import judge_schedule
 from seqopt.network.build import build_network
-from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY

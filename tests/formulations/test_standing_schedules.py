@@ -19,10 +19,10 @@ from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SceneError, SolverError
 from seqopt.graph.states.states import build_states
+from seqopt.judge.schedules import judge_schedule
 from seqopt.network.build import build_network
+from seqopt.plan._infeasible import worst_least
 from seqopt.plan.front import _StateFront, find_front
-from seqopt.plan.judge._infeasible import worst_least
-from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.problem.standing import NARROW, Standing, StandingSets, _without_implied, slack

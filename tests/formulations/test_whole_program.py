@@ -16,11 +16,11 @@ from formulations.layers.exhibits import (
     below,
 )
 from formulations.layers.overlap_flow import OVERLAP_MIP
+from formulations.layers.priced_paths import ACCURACY
 from seqopt.errors import InfeasibleError
+from seqopt.graph.formulation import End, Watch, exhibits
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.formulation import End, Watch, exhibits
-from seqopt.plan.calling.priced_paths import ACCURACY
 
 PROGRAMS = {OVERLAP_MIP.name: OVERLAP_MIP, **exhibits()}
 

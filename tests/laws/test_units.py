@@ -10,9 +10,9 @@ import pytest
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.formulation import find_formulation
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.build import build_network
-from seqopt.plan.calling.formulation import find_formulation
 from seqopt.plan.solving import solve
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import cantilever

@@ -16,9 +16,9 @@ from seqopt.graph import Explorer
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.states._visits import FreeStates, barred, explore
 from seqopt.graph.states.states import build_states
+from seqopt.judge._proof import Proof
 from seqopt.network.build import build_network
 from seqopt.plan.front import _OrderFront, _StateFront, find_front
-from seqopt.plan.judge._proof import Proof
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
 from seqopt.scene.scene_file import load_scene

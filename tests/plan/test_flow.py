@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from formulations.layers.priced_paths import ACCURACY, layered_flow
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.priced_paths import ACCURACY, layered_flow
-from seqopt.plan.judge.certificate import TOLERANCE
+from seqopt.judge.certificate import TOLERANCE
 
 INF = np.inf
 

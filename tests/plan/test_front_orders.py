@@ -11,8 +11,8 @@ import pytest
 import seqopt
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph import orders
+from seqopt.graph.formulation import find_formulation
 from seqopt.plan import front as fronts
-from seqopt.plan.calling.formulation import find_formulation
 from seqopt.plan.front import FrontSelection, find_front
 from seqopt.plan.solving import graph_of
 from seqopt.responses.table import analyze

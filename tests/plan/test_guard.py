@@ -15,8 +15,8 @@ from formulations.states.pareto_zones import FORMULATION as FRONT
 from formulations.states.schedule_search import FORMULATION as PLAN
 from seqopt.errors import InfeasibleError, SolverError, StepError
 from seqopt.graph.orders import AllOrders, OrderSelection
+from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import build_states
-from seqopt.plan.calling._guard import StatePath
 from seqopt.plan.front import FrontSelection, _StateFront, find_front
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio

@@ -12,12 +12,12 @@ import pytest
 import seqopt
 from seqopt.engines._kinds import linear_limit
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError, TimeUpError
-from seqopt.plan._other.fewest_props import fewest_props
+from seqopt.judge._shape_rules import check_shape
+from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._range import NONE_KEEPS, UNKNOWN, keeping
 from seqopt.plan._status import Status
+from seqopt.plan._studies.fewest_props import fewest_props
 from seqopt.plan.front import find_front
-from seqopt.plan.judge._shape_rules import check_shape
-from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.plan.policy import Policy, find_policy
 from seqopt.plan.solving import states_of
 from seqopt.problem._limit_words import parse_limits

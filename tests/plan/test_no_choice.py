@@ -18,17 +18,13 @@ from seqopt.errors import (
     ProblemError,
     SolverError,
 )
+from seqopt.graph import formulation as registry
+from seqopt.graph.formulation import FormulationKind, find_formulation, formulations
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers
+from seqopt.graph.solution import Selection
 from seqopt.network.build import build_network
-from seqopt.plan.calling import formulation as registry
-from seqopt.plan.calling.formulation import (
-    FormulationKind,
-    Selection,
-    find_formulation,
-    formulations,
-)
 from seqopt.plan.solving import solve
 from seqopt.responses import _blocks as batches
 from seqopt.scene.arch import ArchShape, arch_scene
@@ -169,7 +165,7 @@ def test_that_budgets_conflict_is_proven(bounds, kind, error, said):
 )
 def test_a_heuristic_only_says_that_it_found_none(monkeypatch, kind, error, said):
     """Where the judge gives up, as here with no partial choice kept, an exact one claims it."""
-    monkeypatch.setattr("seqopt.plan.judge._budget_proof.MOST", 0)
+    monkeypatch.setattr("seqopt.judge._budget_proof.MOST", 0)
     costs = LayeredCosts((np.ones(2),) * 2, (np.zeros((1, 2)), np.zeros((2, 2))))
     both = [(np.array([0.5, 2.0])[::turn],) * 2 for turn in (1, -1)]
     budgets = tuple(Budget(f"b{k}", b, costs.shared, 2.5) for k, b in enumerate(both))

@@ -12,7 +12,7 @@ from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers, travel
-from seqopt.plan.judge.certificate import certify
+from seqopt.judge.certificate import certify
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Excess, Limit, overloads, payload_limits
 
@@ -89,7 +89,7 @@ def test_a_formulation_that_changes_what_it_is_judged_by_is_refused(cheat):
 def test_costs_that_change_while_they_are_judged_are_seen(monkeypatch):
     problem = small()
     selection = seqopt.formulations()["overlap_dp"].solve(problem)
-    monkeypatch.setattr("seqopt.plan.judge.certificate.least", lambda *_: 99.0)
+    monkeypatch.setattr("seqopt.judge.certificate.least", lambda *_: 99.0)
     with pytest.raises(SolverError, match="lies above that of the choice"):
         certify(problem, selection, Aim.SUM)
 
@@ -105,8 +105,8 @@ def test_an_optimum_within_budgets_is_proven_or_claimed(engine25, monkeypatch):
     plan = seqopt.solve(tight, "overlap_mip")
     assert plan.certificate.gap <= 1e-6
     assert plan.summary()["status"] == "optimal"
-    monkeypatch.setattr("seqopt.plan.judge._budget_proof.MOST", 1)
-    monkeypatch.setattr("seqopt.plan.judge._budget_proof.CLIMBS", 2)
+    monkeypatch.setattr("seqopt.judge._budget_proof.MOST", 1)
+    monkeypatch.setattr("seqopt.judge._budget_proof.CLIMBS", 2)
     plan = seqopt.solve(tight, "overlap_mip")
     assert plan.certificate.gap > 1e-6 >= plan.certificate.claimed_gap
     assert plan.summary()["status"] == "claimed optimal"

@@ -9,7 +9,7 @@ import pytest
 
 import seqopt
 from seqopt.errors import FileError, InfeasibleError, ProblemError, SolverError, StepError
-from seqopt.plan.judge._policy import check_policy
+from seqopt.judge._policy import check_policy
 from seqopt.plan.policy import Policy, find_policy
 from seqopt.plan.solving import states_of
 from seqopt.problem.requirements import Limit

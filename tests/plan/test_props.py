@@ -12,10 +12,10 @@ import pytest
 import seqopt
 from seqopt import Prop
 from seqopt.errors import InfeasibleError, SolverError, StepError
-from seqopt.plan._other.fewest_props import fewest_props
-from seqopt.plan.judge._posture_rules import check_props, props_that_hold
-from seqopt.plan.judge._proof import Proof
-from seqopt.plan.judge.schedules import judge_schedule
+from seqopt.judge._posture_rules import check_props, props_that_hold
+from seqopt.judge._proof import Proof
+from seqopt.judge.schedules import judge_schedule
+from seqopt.plan._studies.fewest_props import fewest_props
 from seqopt.plan.solving import states_of
 from seqopt.responses.quantities import PROP_EXCESS
 from seqopt.sequence._rule_check import check_free

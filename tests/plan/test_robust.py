@@ -16,6 +16,7 @@ from formulations.scenarios.scenario_program import _solve_program
 from formulations.scenarios.scenario_search import _close_gap, best_weights
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.graph.formulation import Watch
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.scenarios import (
@@ -25,7 +26,7 @@ from seqopt.graph.scenarios import (
     largest_of,
     scenario_arcs,
 )
-from seqopt.plan.calling.formulation import Selection, Watch
+from seqopt.graph.solution import Selection
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.plan.solving import graph_of, layers_of
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar, parse_robust

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from seqopt.errors import ProblemError
+from seqopt.graph.formulation import Finding, Watch, find_formulation
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.plan.calling.formulation import Finding, Watch, find_formulation
 from seqopt.plan.solving import solve
 
 

@@ -33,10 +33,10 @@ import numpy as np
 import pandas as pd
 
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.graph.formulation import Formulation, FormulationKind, On, formulations
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling._guard import require_fit
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, formulations
-from seqopt.plan.judge.certificate import judge as certified
+from seqopt.judge.certificate import judge as certified
+from seqopt.plan._guard import require_fit
 from tests.quality.degenerate_cases import CASES, Case, Size, enumerated
 
 FULL, SMALL = Size(5, 4, 7), Size(3, 3, 6)

@@ -46,7 +46,7 @@ TRIAL = "seqopt.engines.rigid.compliance"
 OPERATOR = "seqopt.engines.rigid._operator"
 GROWTH = "seqopt.engines.rigid._growth"
 GRIPS = "seqopt.engines.rigid._grip_equations"
-COSTS, CERTIFICATE = "seqopt.graph.layers.costs", "seqopt.plan.judge.certificate"
+COSTS, CERTIFICATE = "seqopt.graph.layers.costs", "seqopt.judge.certificate"
 RANKS = "seqopt.problem.criteria"
 LENGTHS = "both have a length: costs that have not are refused when they are made"
 EQUIVALENT = (
@@ -54,7 +54,7 @@ EQUIVALENT = (
         Equivalent(module, line, "strict=True", "strict=False", why)
         for module, line, why in (
             ("formulations.*", "zip(", LENGTHS),
-            ("seqopt.plan.calling.priced_paths", "zip(", LENGTHS),
+            ("formulations.layers.priced_paths", "zip(", LENGTHS),
             (COSTS, "enumerate(zip(", LENGTHS),
             (COSTS, "zip(self.single[-2::-1]", LENGTHS),
             (CERTIFICATE, "shared in zip(", LENGTHS),
@@ -105,7 +105,7 @@ EQUIVALENT = (
         CERTIFICATE, "low, high", "- 1", "* 1", "the largest of all costs is never looked at"
     ),
     Equivalent(
-        "seqopt.plan.calling.priced_paths",
+        "formulations.layers.priced_paths",
         "known and",
         "== 1",
         "<= 1",

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from experiments.harness.scenes import running_bond
+from seqopt.graph.formulation import formulation_names
 from seqopt.network.build import build_network
-from seqopt.plan.calling.formulation import formulation_names
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import dump_scene

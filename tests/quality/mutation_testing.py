@@ -53,20 +53,20 @@ RIGID = (
 CHOSEN = ("formulations/test_programs", "formulations/test_degenerate")
 STANDING = ("formulations/test_equilibrium", "validation/test_limit_analysis")
 PROOFS = {
-    "seqopt.plan.judge._budget_proof": ("plan/test_proofs", "plan/test_budget_proof"),
-    "seqopt.plan.judge.certificate": (
-        *("plan/test_certificate", "plan/test_values", "plan/test_proofs"),
+    "seqopt.judge._budget_proof": ("judge/test_proofs", "judge/test_budget_proof"),
+    "seqopt.judge.certificate": (
+        *("judge/test_certificate", "plan/test_values", "judge/test_proofs"),
         "agreement/test_pair_search",
     ),
-    "seqopt.plan.judge._infeasible": ("plan/test_budget_proof", "plan/test_no_choice"),
-    "seqopt.graph.duality": ("graph/test_graph", "plan/test_free_proof"),
-    "seqopt.plan.judge._proof": (
-        *("plan/test_proofs", "plan/test_free_proof", "plan/test_free_judge"),
+    "seqopt.plan._infeasible": ("judge/test_budget_proof", "plan/test_no_choice"),
+    "seqopt.graph.duality": ("graph/test_graph", "judge/test_free_proof"),
+    "seqopt.judge._proof": (
+        *("judge/test_proofs", "judge/test_free_proof", "judge/test_free_judge"),
     ),
-    "seqopt.plan.judge._rule_moves": ("plan/test_free_proof", "plan/test_proofs"),
+    "seqopt.judge._rule_moves": ("judge/test_free_proof", "judge/test_proofs"),
     "seqopt.graph.orders": ("formulations/test_order_search",),
-    "seqopt.plan.judge._orders": ("plan/test_proofs", "formulations/test_order_search"),
-    "seqopt.graph.layers._partial_costs": ("plan/test_proofs", "agreement/test_pair_search"),
+    "seqopt.judge._orders": ("judge/test_proofs", "formulations/test_order_search"),
+    "seqopt.graph.layers._partial_costs": ("judge/test_proofs", "agreement/test_pair_search"),
 }  # what says that nothing is better, or that there is nothing
 MODULES = {
     "seqopt.engines.rigid.compliance": (
@@ -84,7 +84,7 @@ MODULES = {
         *("problem/test_criteria", "problem/test_own_criterion", "problem/test_scales"),
         "graph/test_layers",
     ),
-    "seqopt.plan.calling.priced_paths": ("plan/test_flow", "plan/test_values", *CHOSEN),
+    "formulations.layers.priced_paths": ("plan/test_flow", "plan/test_values", *CHOSEN),
     "formulations.layers.beam": CHOSEN,
     "formulations.layers.cascade": CHOSEN,
     "formulations.contact.limit_analysis": STANDING,

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from seqopt.engines.registry import make_engine
-from seqopt.plan.calling.formulation import On, formulations
+from seqopt.graph.formulation import On, formulations
 from seqopt.report.comparison import LARGEST, compare
 from seqopt.study.published import CRITERIA, EQUATIONS
 from tests.builders import small_arch

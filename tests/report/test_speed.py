@@ -14,7 +14,7 @@ import seqopt
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, TimeUpError
-from seqopt.plan.calling.formulation import On, formulations
+from seqopt.graph.formulation import On, formulations
 from seqopt.plan.solving import layers_of
 from seqopt.problem.problem import Aim
 from seqopt.report._speed._chart import PALE, speed_chart

@@ -9,10 +9,10 @@ import pytest
 
 import seqopt
 from seqopt.errors import InfeasibleError, StepError
-from seqopt.plan.calling.formulation import On, formulations
+from seqopt.graph.formulation import On, formulations
+from seqopt.judge._proof import Proof
+from seqopt.judge.schedules import judge_schedule
 from seqopt.plan.front import find_front
-from seqopt.plan.judge._proof import Proof
-from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.plan.solving import states_of
 from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.scene.arm import Arm

@@ -14,9 +14,9 @@ from seqopt.errors import ProblemError, SolverError, StepError
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import build_states
+from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._status import Status
 from seqopt.plan.front import find_front
-from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.plan.policy import find_policy
 from seqopt.responses import analyze_staged
 from seqopt.sequence._rule_check import RuleBook, check_free

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from seqopt.graph.formulation import formulations
 from seqopt.graph.layers.ranking import rank_choice
-from seqopt.plan.calling.formulation import formulations
 from seqopt.study.published import published_choice, published_plan
 
 

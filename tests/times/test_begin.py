@@ -9,9 +9,9 @@ import pytest
 
 import seqopt
 from seqopt.errors import ProblemError, SceneError, SolverError
+from seqopt.judge._mortar_check import check_cured
+from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._status import Status
-from seqopt.plan.judge._mortar_check import check_cured
-from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.problem.standing import Standing
 from seqopt.sequence._timing import step_times
 from seqopt.sequence.rules import FreeRules

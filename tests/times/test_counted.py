@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 import seqopt
 from seqopt.errors import InfeasibleError
 from seqopt.graph._counted import least_by_counts
+from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._status import Status
-from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.sequence._timing import step_times
 from seqopt.sequence.rules import FreeRules, with_robots
 from tests.brute_force import ONES

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 import seqopt
 from seqopt.contact.curing import Curing, _find_curing
 from seqopt.errors import InfeasibleError, ProblemError, SceneError, SolverError, StepError
+from seqopt.judge._mortar_check import check_cured
+from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._status import Status
-from seqopt.plan.judge._mortar_check import check_cured
-from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.problem.standing import Standing
 from seqopt.sequence.rules import FreeRules, with_robots
 from seqopt.stability._aging.builds import CuringBuilds, JointsInTime

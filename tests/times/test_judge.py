@@ -10,10 +10,10 @@ import pytest
 import seqopt
 from formulations.times._search import in_time
 from seqopt.errors import SolverError
+from seqopt.graph.formulation import Formulation, FormulationKind, On, find_formulation
 from seqopt.graph.graph import LabelProof
+from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._status import Status
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, find_formulation
-from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.sequence.rules import FreeRules, with_robots
 from tests.brute_force import ONES
 from tests.times.builders import RULES, WORDS, engine_of

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import seqopt
 from seqopt.errors import SceneError, StepError
+from seqopt.judge._time_proof import makespan
 from seqopt.plan._times import busy_table, reassign, times_table
-from seqopt.plan.judge._time_proof import makespan
 from seqopt.scene import Durations
 from seqopt.sequence._timing import step_times
 from tests.commands import command as run

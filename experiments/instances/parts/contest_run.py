@@ -17,11 +17,11 @@ from experiments.instances.parts.library import instance
 from formulations.solvers import _solve_file
 from seqopt import judge_instance, save_instance, solve
 from seqopt.errors import SeqoptError
+from seqopt.graph.formulation import find_formulation
 from seqopt.graph.instances.instance import Instance
 from seqopt.graph.paths import fewest_moves, reached
+from seqopt.graph.solution import StatePath
 from seqopt.plan._states import _claims, able
-from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.calling.formulation import find_formulation
 
 OUTSIDE = ("HiGHS", "CP-SAT", "linopy")
 MOST_ARCS = 20_000  # of what outside solvers are given

@@ -13,10 +13,10 @@ from seqopt import Network, three_robot_loop
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Fields, Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.formulation import find_formulation
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.plan.calling.formulation import find_formulation
 from seqopt.study.published import EQUATIONS
 
 SETTINGS = ("reactions", "criterion", "all fields")

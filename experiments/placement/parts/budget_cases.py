@@ -20,10 +20,11 @@ from experiments.harness.runs import scene_named
 from seqopt import CRITERIA, build_network, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, SeqoptError
+from seqopt.graph.formulation import Formulation, Watch, find_formulation
 from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.layers import Layers, candidate_layers, steps_over, travel
-from seqopt.plan.calling.formulation import Formulation, Selection, Watch, find_formulation
-from seqopt.plan.judge.certificate import judge
+from seqopt.graph.solution import Selection
+from seqopt.judge.certificate import judge
 
 COUNTED = ("F_largest", "M_sup")
 COMPARED = ("equations-2-3", "weighted")

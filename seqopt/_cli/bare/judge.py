@@ -12,8 +12,8 @@ from seqopt._cli.screens import question
 from seqopt.errors import SolverError
 from seqopt.graph.instances._files import read_instance
 from seqopt.graph.instances.instance import Instance
-from seqopt.plan.judge._bare._judging import judge_instance
-from seqopt.plan.judge.certificate import TOLERANCE, Certificate, _known_gap
+from seqopt.judge._arithmetic import judge_instance
+from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 
 DESCRIPTION = (
     "Check a path through an instance, and bounds on all others, with arithmetic alone. No scene "

@@ -47,8 +47,8 @@ from seqopt._showing import PAGE
 from seqopt.arms.reach import find_postures
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import provenance
+from seqopt.graph.formulation import FormulationKind, formulations
 from seqopt.network.build import build_network
-from seqopt.plan.calling.formulation import FormulationKind, formulations
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.requirements import Criterion
 from seqopt.report._pages import comparison_page

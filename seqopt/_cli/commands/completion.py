@@ -17,7 +17,7 @@ import shtab
 from seqopt._cli.answer import Answer
 from seqopt._cli.arguments import COMMANDS, parser
 from seqopt._cli.values import RULES
-from seqopt.plan.calling.formulation import formulation_names
+from seqopt.graph.formulation import formulation_names
 from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.scene.scene import ORDERS
 from seqopt.scene.scene_file import KINDS, builtin_scenes

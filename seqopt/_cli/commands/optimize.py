@@ -86,10 +86,10 @@ from seqopt._cli.words.optimizing import (
 from seqopt._files import csv_text
 from seqopt._showing import PAGE
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, TimeUpError
+from seqopt.graph.formulation import End, Formulation, On, Run, as_formulation, trace_rows
 from seqopt.graph.states.states import States
+from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan._softer import _payload_advice
-from seqopt.plan.calling.formulation import End, Formulation, On, Run, as_formulation, trace_rows
-from seqopt.plan.judge.certificate import TOLERANCE
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _solve_run, usual
 from seqopt.problem._arms import faults_in_words
@@ -105,8 +105,8 @@ from seqopt.work._clock import Clock
 from seqopt.work.progress import within
 
 if TYPE_CHECKING:
-    from seqopt.plan._other.bases import FoundBases
-    from seqopt.plan._other.fewest_props import FoundProps
+    from seqopt.plan._studies.bases import FoundBases
+    from seqopt.plan._studies.fewest_props import FoundProps
     from seqopt.plan.out_of_sample import Trial
 
 DESCRIPTION = (
@@ -348,7 +348,7 @@ def _props(
     """Return the best plan of the fewest props."""
     if options.no_proof:
         raise ProblemError("--no-proof: props are compared by proven plans; leave it out")
-    from seqopt.plan._other.fewest_props import fewest_props  # noqa: PLC0415  # few ask for it
+    from seqopt.plan._studies.fewest_props import fewest_props  # noqa: PLC0415  # few ask for it
 
     assert asked.fewest is not None
     return fewest_props(asked.problem, asked.fewest, choose, options.tell)
@@ -361,7 +361,7 @@ def _bases(
     if options.no_proof:
         raise ProblemError("--no-proof: bases are compared by proven plans; leave it out")
     from seqopt._cli.words.bases import asked_places  # noqa: PLC0415  # few ask for it
-    from seqopt.plan._other.bases import choose_bases  # noqa: PLC0415
+    from seqopt.plan._studies.bases import choose_bases  # noqa: PLC0415
 
     scene = in_seconds(options, asked_scene(options))
     places = asked_places(scene, options.bases)

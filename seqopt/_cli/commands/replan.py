@@ -37,7 +37,7 @@ from seqopt._cli.words.optimizing import AIM, TIME
 from seqopt._cli.words.where import Place
 from seqopt._files import parse_json, read_text
 from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepError
-from seqopt.plan._other.replan import compared, without
+from seqopt.plan._studies.replan import compared, without
 from seqopt.plan.plan import Plan
 from seqopt.responses._tolerance import is_tolerance, value_text
 from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, length_text

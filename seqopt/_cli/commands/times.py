@@ -44,10 +44,10 @@ from seqopt._files import csv_text
 from seqopt.contact.curing import _find_curing
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError, SceneError, StepError
+from seqopt.judge._mortar_check import check_cured
 from seqopt.network.build import build_network
 from seqopt.plan._times import SHARE, aged_table, busy_table
 from seqopt.plan.build import GivenSequence
-from seqopt.plan.judge._mortar_check import check_cured
 from seqopt.problem.standing import Standing
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene

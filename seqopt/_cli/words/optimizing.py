@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from seqopt.plan.calling.formulation import formulation_names
+from seqopt.graph.formulation import formulation_names
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.three_robots import SCHEDULES
 

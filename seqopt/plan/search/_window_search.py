@@ -34,12 +34,13 @@ from seqopt.errors import (
     ProblemError,
     TimeUpError,
 )
+from seqopt.graph.formulation import End, Formulation, FormulationKind, Watch
 from seqopt.graph.layers._partial_costs import PartialCosts, floor_of
 from seqopt.graph.layers.costs import Joined
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import Layers, _pairs_as_moves, _possible_after, window
-from seqopt.plan.calling._guard import select
-from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, Selection, Watch
+from seqopt.graph.solution import Selection
+from seqopt.plan._guard import select
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.responses._choices import StepChoices

@@ -21,7 +21,7 @@ from seqopt.graph.layers.costs import TINY, Joined, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.ranking import _on_a_least_path
-from seqopt.plan.judge.certificate import least_sum
+from seqopt.judge.certificate import least_sum
 from seqopt.problem.problem import Aim
 from seqopt.scene._checks import short
 

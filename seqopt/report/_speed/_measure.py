@@ -21,11 +21,11 @@ from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of
 from seqopt.errors import ProblemError, SeqoptError, SolverError, TimeUpError
+from seqopt.graph.formulation import End, Formulation, FormulationKind, On, formulations
 from seqopt.graph.layers.costs import TINY
+from seqopt.judge.certificate import least_sum
+from seqopt.judge.schedules import plan_values
 from seqopt.plan._layers import on_the_way
-from seqopt.plan.calling.formulation import End, Formulation, FormulationKind, On, formulations
-from seqopt.plan.judge.certificate import least_sum
-from seqopt.plan.judge.schedules import plan_values
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import layers_of, natural, solve, states_of, usual
 from seqopt.problem.problem import Aim, Problem

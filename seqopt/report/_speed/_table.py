@@ -13,7 +13,7 @@ import pandas as pd
 
 from seqopt._showing import display
 from seqopt.arrays import Bools
-from seqopt.plan.calling.formulation import On
+from seqopt.graph.formulation import On
 from seqopt.plan.solving import USUAL
 
 if TYPE_CHECKING:

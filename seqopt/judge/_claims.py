@@ -4,7 +4,7 @@ A claim is about one goal, those before it being at their values. A sum is prove
 no arc violates, a peak by a cut that no cheaper arc leaves. What is capped, and sums before, may be
 priced: a unit of each costs its price in addition, and all that may be taken is paid back. A tail
 needs the weights of its columns as well, a time the shares of the time of all and of robots. Its
-proof is that of `seqopt.plan.judge._time_proof`, with the instance's own acts.
+proof is that of `seqopt.judge._time_proof`, with the instance's own acts.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from seqopt.graph.instances.instance import PEAK, SUM, TAIL, Instance, _Target
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.paths import TIED, tied
-from seqopt.plan.judge._budget_proof import least_within
-from seqopt.plan.judge._time_proof import Closed, Limits, Team, TimedMoves, limit_below
+from seqopt.judge._budget_proof import least_within
+from seqopt.judge._time_proof import Closed, Limits, Team, TimedMoves, limit_below
 
 Labels = tuple[Ints, Floats]  # nodes (N,), and values (N, 1 + c + q)
 

@@ -18,16 +18,16 @@ import pandas as pd
 
 from seqopt.errors import SolverError, StepError
 from seqopt.graph._counted import least_by_counts
+from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
-from seqopt.plan.calling._guard import StatePath
-from seqopt.plan.judge._mortar_check import check_cured
-from seqopt.plan.judge._posture_rules import check_postures, check_props
-from seqopt.plan.judge._proof import BELOW, Hint, Proof
-from seqopt.plan.judge._shape_rules import check_shape
-from seqopt.plan.judge._standing_proof import proven_margins, require_margin
-from seqopt.plan.judge._time_proof import makespan, step_ends
-from seqopt.plan.judge._timed_goals import Claim
-from seqopt.plan.judge.certificate import Certificate
+from seqopt.judge._mortar_check import check_cured
+from seqopt.judge._posture_rules import check_postures, check_props
+from seqopt.judge._proof import BELOW, Hint, Proof
+from seqopt.judge._shape_rules import check_shape
+from seqopt.judge._standing_proof import proven_margins, require_margin
+from seqopt.judge._time_proof import makespan, step_ends
+from seqopt.judge._timed_goals import Claim
+from seqopt.judge.certificate import Certificate
 from seqopt.problem.problem import LARGEST, Goal, Measure
 from seqopt.problem.standing import _size, slack
 from seqopt.responses._props import EXCESS_COLUMN

@@ -6,16 +6,13 @@ import inspect
 import math
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from enum import Enum
 from importlib.metadata import EntryPoint
 from typing import Any
 
-import numpy as np
-
-from seqopt.arrays import FrozenValue
 from seqopt.errors import PluginWarning, ProblemError, did_you_mean, message_of, plugins
 from seqopt.problem.problem import Aim
 from seqopt.work._clock import Clock
@@ -192,27 +189,6 @@ class End(Enum):
     INTERRUPTED = "interrupted"  # by whoever asked for an end; its choice and bound stand
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Selection(FrozenValue):
-    """A candidate per move, and what the formulation claims about it.
-
-    ``choice``: index of the chosen node among each move's candidates, from 0; ``objective``:
-    claimed value, in the unit of the criterion; ``bound``: claimed lower bound, budgets included;
-    minus infinity if none; ``prices``: dual value of each budget: the rate at which one more unit
-    would lower the bound; ``compile_seconds``: part of the time to solve that went into writing the
-    program down for a solver, s; ``end``: whether it ended early; ``trace``: what it knew at which
-    time: choices and bounds.
-    """
-
-    choice: tuple[int, ...]
-    objective: float
-    bound: float = -np.inf
-    prices: Mapping[str, float] = field(default_factory=dict)
-    compile_seconds: float = 0.0
-    end: End = End.DONE
-    trace: tuple[Finding, ...] = field(default=(), compare=False)
-
-
 @dataclass(frozen=True, repr=False)
 class Formulation:
     """A way to solve the problem.
@@ -228,7 +204,7 @@ class Formulation:
         where a problem has its goals.
     solve : callable
         Takes the graph and named options, returns what is chosen: of layers a `Selection`, of
-        states a `seqopt.plan.calling._guard.StatePath`.
+        states a `seqopt.graph.solution.StatePath`.
     reads : Reads
         Which steps it looks at with its default options.
     takes_budgets : bool

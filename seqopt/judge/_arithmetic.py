@@ -15,15 +15,8 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError, SolverError
 from seqopt.graph._timed import HELD, NOW, TimedGraph
 from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _Target, _target_sums
-from seqopt.plan.judge._bare._claims import (
-    ABOVE,
-    Claim,
-    first_stage,
-    next_stage,
-    proven,
-    within_caps,
-)
-from seqopt.plan.judge.certificate import TOLERANCE, Certificate
+from seqopt.judge._claims import ABOVE, Claim, first_stage, next_stage, proven, within_caps
+from seqopt.judge.certificate import TOLERANCE, Certificate
 from seqopt.scene._checks import as_float, short
 
 WHAT = ("nodes", "arcs", "acts")

@@ -17,6 +17,7 @@ from scipy import sparse
 
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError, TimeUpError
+from seqopt.graph.formulation import End, Watch
 from seqopt.graph.layers.costs import (
     TINY,
     Budget,
@@ -26,9 +27,9 @@ from seqopt.graph.layers.costs import (
     _where_allowed,
 )
 from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.plan.calling.formulation import End, Selection, Watch
-from seqopt.plan.judge._budget_proof import too_small
-from seqopt.plan.judge.certificate import TOLERANCE, least_sum
+from seqopt.graph.solution import Selection
+from seqopt.judge._budget_proof import too_small
+from seqopt.judge.certificate import TOLERANCE, least_sum
 from seqopt.problem.problem import Aim
 
 ACCURACY = 1e-7  # how far a reported optimum may lie above the true one, relative to the larger of

@@ -14,8 +14,8 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import SolverError
 from seqopt.graph.graph import Graph
 from seqopt.graph.states.states import States
-from seqopt.plan.judge._proof import Asked, Passable, _Levels, _rows
-from seqopt.plan.judge.certificate import TOLERANCE
+from seqopt.judge._proof import Asked, Passable, _Levels, _rows
+from seqopt.judge.certificate import TOLERANCE
 
 WRONG = "the policy is not what it says: {}"
 

@@ -21,10 +21,10 @@ from seqopt.graph.graph import Graph
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.paths import distances
 from seqopt.graph.states.states import States
+from seqopt.judge._answers import ask
+from seqopt.judge._proof import BELOW, Asked, Passable, Tables
+from seqopt.judge._rule_moves import Follows, RuleTables
 from seqopt.network.build import build_network
-from seqopt.plan.judge._answers import ask
-from seqopt.plan.judge._proof import BELOW, Asked, Passable, Tables
-from seqopt.plan.judge._rule_moves import Follows, RuleTables
 from seqopt.problem.problem import Measure
 from seqopt.problem.standing import slack
 from seqopt.scene.scene import Order, in_order

@@ -12,13 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from seqopt.errors import InfeasibleError, SolverError
+from seqopt.graph.formulation import End, FormulationKind, On, formulations
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import steps_over, travel
-from seqopt.plan.calling.formulation import End, FormulationKind, On, formulations
-from seqopt.plan.judge import _budget_proof as budget_proof
-from seqopt.plan.judge._budget_proof import least_within
-from seqopt.plan.judge._infeasible import smallest_conflict
+from seqopt.judge import _budget_proof as budget_proof
+from seqopt.judge._budget_proof import least_within
+from seqopt.plan._infeasible import smallest_conflict
 from seqopt.plan.solving import solve
 from tests.strategies import budgeted
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from seqopt.errors import SeqoptError, StepError
 from seqopt.graph.states.states import States
-from seqopt.plan.judge._posture_rules import check_postures
-from seqopt.plan.judge.schedules import plan_values
+from seqopt.judge._posture_rules import check_postures
+from seqopt.judge.schedules import plan_values
 from seqopt.plan.plan import Plan
 from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.responses.table import analyze

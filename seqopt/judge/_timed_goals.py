@@ -14,9 +14,9 @@ from seqopt.graph.duality import cut, potentials
 from seqopt.graph.graph import Graph, LabelProof
 from seqopt.graph.paths import tied
 from seqopt.graph.states.states import States
-from seqopt.plan.judge._mortar_floors import CuredRows
-from seqopt.plan.judge._rule_moves import RuleTables, ScheduleTables
-from seqopt.plan.judge._time_proof import Closed, Limits, Team, TimedMoves, kept_below, limit_below
+from seqopt.judge._mortar_floors import CuredRows
+from seqopt.judge._rule_moves import RuleTables, ScheduleTables
+from seqopt.judge._time_proof import Closed, Limits, Team, TimedMoves, kept_below, limit_below
 from seqopt.problem.problem import Measure
 from seqopt.sequence._timing import require_durations
 from seqopt.sequence.schedule import Schedule

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.judge._posture_rules import PostureRules
 from seqopt.network.network import Network
-from seqopt.plan.judge._posture_rules import PostureRules
 from seqopt.scene.scene import Scene
 from seqopt.sequence._rule_check import RuleBook, unbearable
 from seqopt.sequence.rules import Ending, Newest

@@ -20,7 +20,7 @@ from seqopt.errors import SolverError
 from seqopt.graph.duality import _to_go
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import TIED
-from seqopt.plan.judge._mortar_floors import CuredRows
+from seqopt.judge._mortar_floors import CuredRows
 from seqopt.scene.scene import Scene
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, StepKind

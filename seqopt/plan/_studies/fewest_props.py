@@ -18,9 +18,9 @@ import pandas as pd
 
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError
-from seqopt.plan._other.bases import Tried
+from seqopt.judge._proof import Proof
 from seqopt.plan._range import best_of_several
-from seqopt.plan.judge._proof import Proof
+from seqopt.plan._studies.bases import Tried
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _moved, states_of
 from seqopt.problem.problem import Measure, Problem

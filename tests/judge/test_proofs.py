@@ -18,14 +18,14 @@ from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.orders import AllOrders, OrderStates
 from seqopt.graph.paths import keep_best, least_peak
+from seqopt.graph.solution import Selection
 from seqopt.graph.states._visits import explore, floors_of_goals
 from seqopt.graph.states.states import build_states
-from seqopt.plan.calling.formulation import Selection
-from seqopt.plan.judge import _budget_proof as budget_proof
-from seqopt.plan.judge._budget_proof import least_within
-from seqopt.plan.judge._orders import finds_better_order
-from seqopt.plan.judge._proof import Passable, Proof
-from seqopt.plan.judge.certificate import TOLERANCE, certify_partial
+from seqopt.judge import _budget_proof as budget_proof
+from seqopt.judge._budget_proof import least_within
+from seqopt.judge._orders import finds_better_order
+from seqopt.judge._proof import Passable, Proof
+from seqopt.judge.certificate import TOLERANCE, certify_partial
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Aim

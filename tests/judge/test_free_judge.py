@@ -10,11 +10,11 @@ import pytest
 import seqopt
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError, SeqoptError, SolverError, StepError
+from seqopt.graph.formulation import Formulation, FormulationKind, On, find_formulation
 from seqopt.graph.states.states import build_states, within
+from seqopt.judge.schedules import judge_schedule
 from seqopt.network.build import build_network
-from seqopt.plan.calling.formulation import Formulation, FormulationKind, On, find_formulation
 from seqopt.plan.front import FrontSelection, _StateFront, find_front
-from seqopt.plan.judge.schedules import judge_schedule
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.requirements import Limit
@@ -48,7 +48,7 @@ def test_a_plan_that_is_not_the_best_is_seen(aim):
     other = solve(posed("M_sup" if aim != "minmax" else "steps,T_max", rules), "schedule_search")
     problem = posed(aim, rules)
     best = solve(problem, "schedule_search").certificate.values[0]
-    from seqopt.plan.judge.schedules import plan_values  # noqa: PLC0415
+    from seqopt.judge.schedules import plan_values  # noqa: PLC0415
 
     value = plan_values(problem, other.steps)[0]
     claimed = replace(other.selection, objective=(value,), bound=(value,))

@@ -10,17 +10,12 @@ import pytest
 from hypothesis import given
 
 from seqopt.errors import SolverError
+from seqopt.graph.formulation import Formulation, FormulationKind, On, formulations
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import travel
-from seqopt.plan.calling.formulation import (
-    Formulation,
-    FormulationKind,
-    On,
-    Selection,
-    formulations,
-)
-from seqopt.plan.judge.certificate import TOLERANCE, certify, judge, least_peak, least_sum
+from seqopt.graph.solution import Selection
+from seqopt.judge.certificate import TOLERANCE, certify, judge, least_peak, least_sum
 from seqopt.plan.solving import solve
 from seqopt.problem.problem import Aim
 from tests.strategies import problems
@@ -193,7 +188,7 @@ def test_how_far_a_budget_may_be_exceeded():
 def test_a_least_value_above_the_value_of_the_choice(monkeypatch, share, good):
     """Within the tolerance it is rounding, and the gap is zero."""
     found = -2.0 + share * TOLERANCE * 4.0
-    monkeypatch.setattr("seqopt.plan.judge.certificate.least", lambda *_: found)
+    monkeypatch.setattr("seqopt.judge.certificate.least", lambda *_: found)
     if good:
         assert certify(signed(), Selection(BEST, -2.0), Aim.SUM).gap == 0
     else:
@@ -216,9 +211,9 @@ def test_what_is_off_by_the_tolerance_itself_is_kept(monkeypatch, sign):
     high = Selection((0, 0), 0.0, bound=TOLERANCE)
     formulation = replace(ALL["overlap_dp"], solve=lambda problem: None)
     assert judge(level(), replace(high, bound=-1.0), formulation).gap == TOLERANCE
-    monkeypatch.setattr("seqopt.plan.judge.certificate.least", lambda *_: 0.0)
+    monkeypatch.setattr("seqopt.judge.certificate.least", lambda *_: 0.0)
     certify(level(), high, Aim.SUM)
-    monkeypatch.setattr("seqopt.plan.judge.certificate.least", lambda *_: TOLERANCE)
+    monkeypatch.setattr("seqopt.judge.certificate.least", lambda *_: TOLERANCE)
     certify(level(), high, Aim.SUM)
 
 

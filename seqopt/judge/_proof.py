@@ -28,11 +28,11 @@ from seqopt.graph.paths import (
 )
 from seqopt.graph.states._visits import move_amounts
 from seqopt.graph.states.states import States
-from seqopt.plan.judge._answers import alike, ask, near, screens
-from seqopt.plan.judge._mortar_floors import cured_rows
-from seqopt.plan.judge._rule_moves import Follows, RuleTables, ScheduleTables
-from seqopt.plan.judge._standing_proof import StandingProof
-from seqopt.plan.judge._timed_goals import Claim, GoalProofs, TimedStates
+from seqopt.judge._answers import alike, ask, near, screens
+from seqopt.judge._mortar_floors import cured_rows
+from seqopt.judge._rule_moves import Follows, RuleTables, ScheduleTables
+from seqopt.judge._standing_proof import StandingProof
+from seqopt.judge._timed_goals import Claim, GoalProofs, TimedStates
 from seqopt.problem.problem import Measure
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses._grip_sets import KnownRows

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError
 from seqopt.graph.states.states import build_states
+from seqopt.judge._proof import Proof
+from seqopt.judge._rule_moves import RuleTables
 from seqopt.network.build import build_network
-from seqopt.plan.judge._proof import Proof
-from seqopt.plan.judge._rule_moves import RuleTables
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
 from seqopt.sequence._rule_check import RuleBook

@@ -24,10 +24,10 @@ from seqopt.graph.paths import distances, least_peak, tied
 from seqopt.graph.scenarios import engine_for
 from seqopt.graph.states._visits import barred, explore
 from seqopt.graph.states.states import States
+from seqopt.judge._budget_proof import is_kept, least_within, too_small
+from seqopt.judge._proof import Proof
+from seqopt.judge.certificate import least_sum
 from seqopt.plan._softer import HARD, _ground_moves, _softer, _whole_load
-from seqopt.plan.judge._budget_proof import is_kept, least_within, too_small
-from seqopt.plan.judge._proof import Proof
-from seqopt.plan.judge.certificate import least_sum
 from seqopt.plan.search._margin_search import WORST, StandingLook, bisected, with_margin
 from seqopt.problem.problem import LARGEST, STATE_RESPONSES, Goal, Measure
 from seqopt.problem.standing import Standing

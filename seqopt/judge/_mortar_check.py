@@ -11,8 +11,8 @@ from seqopt.contact.assembly import Assembly
 from seqopt.contact.curing import Curing
 from seqopt.contact.faces import Contacts, step_assembly
 from seqopt.errors import SolverError
+from seqopt.judge._time_proof import step_ends
 from seqopt.network.network import Network
-from seqopt.plan.judge._time_proof import step_ends
 from seqopt.problem.standing import Standing
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, StepKind

@@ -11,18 +11,13 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import FileError, SolverError
+from seqopt.graph.formulation import End, Formulation, FormulationKind, as_formulation
 from seqopt.graph.layers.costs import TINY, LayeredCosts, _array_by_array
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.scenarios import ScenarioLayers
+from seqopt.graph.solution import Selection
 from seqopt.network.network import Network
-from seqopt.plan.calling.formulation import (
-    End,
-    Formulation,
-    FormulationKind,
-    Selection,
-    as_formulation,
-)
 from seqopt.problem.problem import Aim
 from seqopt.responses._blocks import pack
 from seqopt.responses._choices import Evaluation
@@ -178,7 +173,7 @@ def certify(problem: PlacementProblem, selection: Selection, aim: Aim) -> Certif
     if not selection.bound <= highest + TOLERANCE * scale:  # NaN is no bound
         raise SolverError(f"the claimed bound {selection.bound:.9g} exceeds {highest:.9g}")
     if problem.budgets and aim is Aim.SUM:
-        from seqopt.plan.judge._budget_proof import least_within  # noqa: PLC0415  # few have any
+        from seqopt.judge._budget_proof import least_within  # noqa: PLC0415  # few have any
 
         bound = max(bound, least_within(problem, value, selection.prices, scale))
     gap, claimed = (max(0.0, value - b) / scale for b in (bound, max(bound, selection.bound)))

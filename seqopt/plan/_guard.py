@@ -10,7 +10,7 @@ import hashlib
 import operator
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cached_property, partial
 from numbers import Real
@@ -19,22 +19,15 @@ from typing import Any, TypeVar
 import numpy as np
 
 from seqopt._interrupts import answered
-from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, SolverError, message_of
+from seqopt.graph.formulation import WATCH, End, Formulation, Watch, as_formulation, formulations
 from seqopt.graph.graph import LabelProof
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.scenarios import ScenarioLayers, largest_of
-from seqopt.plan.calling.formulation import (
-    WATCH,
-    End,
-    Formulation,
-    Selection,
-    Watch,
-    as_formulation,
-    formulations,
-)
-from seqopt.plan.judge.certificate import least_sum
+from seqopt.graph.solution import Selection, StatePath
+from seqopt.judge.certificate import least_sum
 from seqopt.problem.problem import Aim
 from seqopt.scene._checks import LARGEST_NUMBER, short
 
@@ -152,38 +145,6 @@ def _shadowing(value: object) -> list[str]:
 
 
 CLOSE = 1e-6  # over a value: how far a bound may be above it by rounding
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class StatePath(FrozenValue):
-    """A free schedule, and what its formulation claims of it.
-
-    ``states``: after every step: how many bricks stand, then the node that each robot holds, as a
-    place in build order from 1; robots of one kind stand together, 0 for one that is free;
-    ``objective``: claimed value of every goal; ``bound``: claimed lower bound of every goal, those
-    before it being at their values; ``visited`` (tuple of (n, c) int): states that a better plan
-    could pass, by brick count, if the formulation knows them: the proof looks at these together,
-    and depends on them in nothing but its time; ``prices``: by goal, what a unit of every budget
-    and of every sum before it is worth: they prove the bounds where there are budgets; ``stopped``:
-    why the search ended before all was proven: ``time``, ``memory`` or ``interrupt``; empty if it
-    did not; ``grips``: where it counts who of a kind acts, after every step the place that each
-    robot of the scene holds, 0 for none; ``proofs``: of the makespan and the goals after it, of all
-    goals where there are budgets; ``starts``, ``ends``: where mortar cures, when steps start, s,
-    and the last one ends; ``motions``: by which labels there are a proof: states fall in them, (b,
-    6) in m and rad.
-    """
-
-    states: tuple[tuple[int, ...], ...]
-    objective: tuple[float, ...]
-    bound: tuple[float, ...]
-    visited: tuple[Ints, ...] = field(default=(), repr=False)
-    prices: tuple[tuple[float, ...], ...] = ()
-    stopped: str = ""
-    grips: tuple[tuple[int, ...], ...] = ()
-    proofs: tuple[LabelProof, ...] = field(default=(), repr=False)
-    starts: tuple[float, ...] = ()
-    ends: float = 0.0
-    motions: tuple[Floats, ...] = field(default=(), repr=False)
 
 
 def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
@@ -346,7 +307,7 @@ def _infeasible_confirmed(problem: PlacementProblem, formulation: Formulation) -
         if not np.isfinite(least_sum(costs)):
             costs.continuable()  # names the move
         if problem.budgets:
-            from seqopt.plan.judge._infeasible import refusal  # noqa: PLC0415  # seldom needed
+            from seqopt.plan._infeasible import refusal  # noqa: PLC0415  # seldom needed
 
             raise refusal(problem, formulation.name, exact=formulation.looks_at_all) from None
         raise SolverError(

@@ -22,8 +22,8 @@ from seqopt.arms._permits import permits, within_reach
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Terse, Vector
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SceneError, TimeUpError
+from seqopt.graph.formulation import End
 from seqopt.plan._range import best_of_several
-from seqopt.plan.calling.formulation import End
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _moved
 from seqopt.problem.problem import Problem

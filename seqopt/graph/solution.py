@@ -1,0 +1,65 @@
+"""What formulations return: a choice of candidates, or a path of states; claimed, not proven."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.graph.formulation import End, Finding
+from seqopt.graph.graph import LabelProof
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Selection(FrozenValue):
+    """A candidate per move, and what the formulation claims about it.
+
+    ``choice``: index of the chosen node among each move's candidates, from 0; ``objective``:
+    claimed value, in the unit of the criterion; ``bound``: claimed lower bound, budgets included;
+    minus infinity if none; ``prices``: dual value of each budget: the rate at which one more unit
+    would lower the bound; ``compile_seconds``: part of the time to solve that went into writing the
+    program down for a solver, s; ``end``: whether it ended early; ``trace``: what it knew at which
+    time: choices and bounds.
+    """
+
+    choice: tuple[int, ...]
+    objective: float
+    bound: float = -np.inf
+    prices: Mapping[str, float] = field(default_factory=dict)
+    compile_seconds: float = 0.0
+    end: End = End.DONE
+    trace: tuple[Finding, ...] = field(default=(), compare=False)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StatePath(FrozenValue):
+    """A free schedule, and what its formulation claims of it.
+
+    ``states``: after every step: how many bricks stand, then the node that each robot holds, as a
+    place in build order from 1; robots of one kind stand together, 0 for one that is free;
+    ``objective``: claimed value of every goal; ``bound``: claimed lower bound of every goal, those
+    before it being at their values; ``visited`` (tuple of (n, c) int): states that a better plan
+    could pass, by brick count, if the formulation knows them: the proof looks at these together,
+    and depends on them in nothing but its time; ``prices``: by goal, what a unit of every budget
+    and of every sum before it is worth: they prove the bounds where there are budgets; ``stopped``:
+    why the search ended before all was proven: ``time``, ``memory`` or ``interrupt``; empty if it
+    did not; ``grips``: where it counts who of a kind acts, after every step the place that each
+    robot of the scene holds, 0 for none; ``proofs``: of the makespan and the goals after it, of all
+    goals where there are budgets; ``starts``, ``ends``: where mortar cures, when steps start, s,
+    and the last one ends; ``motions``: by which labels there are a proof: states fall in them, (b,
+    6) in m and rad.
+    """
+
+    states: tuple[tuple[int, ...], ...]
+    objective: tuple[float, ...]
+    bound: tuple[float, ...]
+    visited: tuple[Ints, ...] = field(default=(), repr=False)
+    prices: tuple[tuple[float, ...], ...] = ()
+    stopped: str = ""
+    grips: tuple[tuple[int, ...], ...] = ()
+    proofs: tuple[LabelProof, ...] = field(default=(), repr=False)
+    starts: tuple[float, ...] = ()
+    ends: float = 0.0
+    motions: tuple[Floats, ...] = field(default=(), repr=False)

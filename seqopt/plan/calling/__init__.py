@@ -1,1 +1,0 @@
-"""How formulations are found and called, and what several of them are written with."""
