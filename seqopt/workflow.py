@@ -10,7 +10,7 @@ from typing import Any
 
 from seqopt.arms.reach import find_postures
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import USUAL, make_engine
+from seqopt.engines.registry import DEFAULT, make_engine
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import On, find_formulation
 from seqopt.network.build import build_network
@@ -47,7 +47,7 @@ class Defaults:
 
     criterion: Criterion
     aim: str = ""
-    engine: str = USUAL
+    engine: str = DEFAULT
 
 
 DEFAULTS = {FREE: Defaults(WORST_OVER_METHODS, "minmax"), "any other": Defaults(EQUATIONS)}
@@ -59,7 +59,7 @@ def optimize(
     schedule: Schedule | Path | str | None = None,
     criterion: Criterion | str | None = None,
     formulation: str | None = None,
-    engine: str = USUAL,
+    engine: str = DEFAULT,
     *,
     limits: Sequence[Limit | str] | str = (),
     **options: Any,
@@ -77,7 +77,7 @@ def optimize(
     formulation : str, optional
         A name in `seqopt.formulations`; here and above, `DEFAULTS` say what is taken otherwise.
     engine : str
-        A name in `seqopt.engines.registry.ENGINES`; ``"auto"`` uses the simplest sufficient model.
+        A name in `seqopt.engines.registry.ENGINES`; ``"auto"`` uses the simplest level (`pose`).
     limits : sequence of Limit or str
         Bounds that no step may exceed: ``"payload"``, ``"F_largest=300"``, ``"linear_range=any"``.
     **options

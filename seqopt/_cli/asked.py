@@ -13,9 +13,9 @@ from seqopt._cli.words.given import given_scene, given_steps
 from seqopt._cli.words.props import parse_props
 from seqopt.arms.reach import find_postures
 from seqopt.contact.mortar import Mortar
-from seqopt.engines._kinds import ChoosingEngine
+from seqopt.engines._kinds import ChoosingEngine, Level
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import LIMITED, make_engine
+from seqopt.engines.registry import DEFAULT, LIMITED, _chooser_of, make_engine, simplest
 from seqopt.errors import ExtraError, ProblemError, SceneError, StepError
 from seqopt.network.network import Network
 from seqopt.plan.build import ShownBuild
@@ -80,9 +80,11 @@ def in_seconds(options: argparse.Namespace, scene: Scene) -> Scene:
 
 
 def asked_engine(options: argparse.Namespace, network: Network) -> Engine:
-    """Return the engine that a command is asked for."""
+    """Return the engine that a command is asked for; where none is named, that of the scene."""
     mortar = None if options.mortar is None else mortar_word(options.mortar, "--mortar")
     of_verdicts = options.engine not in LIMITED and not getattr(options, "no_stability", True)
+    if options.engine is None:
+        return simplest(make_engine(DEFAULT, network, None if of_verdicts else mortar))
     try:
         return make_engine(options.engine, network, None if of_verdicts else mortar)
     except SceneError as error:
@@ -114,13 +116,21 @@ def posture_trouble(options: argparse.Namespace, scene: Scene) -> str:
     return ""
 
 
-def level_notes(engine: Engine) -> tuple[str, ...]:
-    """Return which levels an engine that picks them took, and why."""
+def level_notes(options: argparse.Namespace, engine: Engine) -> tuple[str, ...]:
+    """Return which levels an engine that picks them took, and why.
+
+    Where none is named, only that of joints that open: which other one was enough is said of steps.
+    """
+    named = options.engine is not None
+    if (chooser := _chooser_of(engine)) is not None:
+        choice = chooser.choice
+        return (f"engine: {choice.level.value}: {choice.reason}",) if named else ()
     if not isinstance(engine, ChoosingEngine):
         return ()
     said = [
         f"engine: {choice.level.value} for {sets} grip sets: {choice.reason}"
         for choice, sets in engine.tally.items()
+        if named or choice.level is Level.DISCRETE
     ]
     return (*said, *([f"engine: {engine.unchecked}"] if engine.unchecked else []))
 

@@ -137,11 +137,10 @@ def engine_options(command: argparse.ArgumentParser) -> Takes:
     takes.add_argument(
         "--engine",
         choices=tuple(ENGINES),
-        default=Defaults.engine,
-        help="what computes responses (default: %(default)s): compliance: exactly rigid bricks, "
-        "fast; planar: the same with three unknowns per brick, where all lies in a plane; frame: "
-        "stiff bars, a slow independent check; discrete: joints that open and slip; auto: the "
-        "cheapest of planar, compliance and discrete that is enough",
+        help=f"what computes responses (default: {Defaults.engine}): compliance: exactly rigid "
+        "bricks, fast; planar: the same with three unknowns per brick, where all lies in a plane; "
+        "frame: stiff bars, a slow independent check; discrete: joints that open and slip; auto: "
+        "the cheapest of planar, compliance and discrete that is enough",
     )
     takes.add_argument(
         "--mortar",

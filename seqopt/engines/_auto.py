@@ -4,6 +4,9 @@ There are three levels, and the cheapest whose condition a grip set meets is use
 everything lies in one plane; exactly rigid bricks, if joints stay within their elastic limits; and
 discrete elements otherwise. Where their condition holds, the first two give the same answer as the
 next level, to rounding.
+
+Who chooses among many grip sets takes one of the first two for all of them (`find_level`), and asks
+of what was chosen alone whether joints stay within their elastic limits.
 """
 
 from __future__ import annotations
@@ -18,9 +21,8 @@ from seqopt.arrays import Bools, Floats
 from seqopt.contact._elastic_limits import ElasticLimits, find_elastic_limits
 from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines._hands import read_hands
-from seqopt.engines._kinds import ChoosingEngine, Level, LevelChoice
+from seqopt.engines._kinds import ChoosingEngine, Level, LevelChoice, OpeningEngine
 from seqopt.engines._planar import _leaves_plane, find_plane, off_plane
-from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import (
     Fields,
     NamedEngine,
@@ -37,7 +39,28 @@ from seqopt.scene.scene import Scene
 
 _IN_PLANE = LevelChoice(Level.PLANAR, "bricks, springs, gravity, loads and grips lie in one plane")
 _OFF_PLANE = LevelChoice(Level.RIGID, "a grip lies outside the plane of the bricks")
+_GIVING = LevelChoice(Level.RIGID, "grips give way out of the plane of the bricks")
 _BEYOND = LevelChoice(Level.DISCRETE, "a joint would leave its elastic limits")
+
+
+def find_level(network: Network) -> LevelChoice:
+    """Return the cheapest level of joints that never fail which answers every grip set."""
+    plane = find_plane(network)
+    if isinstance(plane, str):
+        return LevelChoice(Level.RIGID, plane)
+    if off_plane(network, plane).any():
+        return _OFF_PLANE
+    kinds = network.scene.grip_kinds
+    if kinds.rigid:
+        return _IN_PLANE
+    columns = np.arange(2 * len(network.inner))[:, None]
+    nodes = np.array([network.node_name[i] for i in network.inner.ravel()], dtype=np.int64)
+    for holder in [*{kind: i for i, kind in enumerate(kinds.of_robot)}.values()]:
+        grips = kinds.numbers(nodes, [holder] * len(nodes))[:, None]
+        hands = None if kinds.arms.any() else read_hands(network, columns, grips, None)
+        if hands is None or _leaves_plane(plane, hands, columns).any():
+            return _GIVING
+    return _IN_PLANE
 
 
 class _RigidBricks(NamedEngine):
@@ -99,18 +122,42 @@ def _of(moved: ArrayLike | None, which: Bools) -> Floats | None:
 class AutoEngine(ChoosingEngine):
     """Computes every grip set at the cheapest level whose condition it meets."""
 
-    rigid: _RigidBricks
-
     def __init__(self, network: Network | Scene, mortar: Mortar = EPOXY) -> None:
         super().__init__(network)
-        self.rigid = _RigidBricks(self.network)
-        self._discrete = DiscreteEngine(self.network, mortar)
-        self.limits: ElasticLimits | None = None
-        self.tally, self.unchecked = Counter[LevelChoice](), ""
+        self.mortar, self.tally = mortar, Counter[LevelChoice]()
+
+    @cached_property
+    def choice(self) -> LevelChoice:  # type: ignore[override]
+        """The level that alone answers all grip sets of a problem, and why."""
+        return find_level(self.network)
+
+    @cached_property
+    def rigid(self) -> _RigidBricks:  # type: ignore[override]
+        """Bricks on springs that never break."""
+        return _RigidBricks(self.network)
+
+    @cached_property
+    def _discrete(self) -> OpeningEngine:
+        from seqopt.engines.discrete.engine import DiscreteEngine  # noqa: PLC0415  # few sets ask
+
+        return DiscreteEngine(self.network, self.mortar)
+
+    @cached_property
+    def _limits(self) -> tuple[ElasticLimits | None, str]:
         try:
-            self.limits = find_elastic_limits(self.network, mortar)
+            return find_elastic_limits(self.network, self.mortar), ""
         except SceneError as error:
-            self.unchecked = f"elastic limits are not checked: {error}"
+            return None, f"elastic limits are not checked: {error}"
+
+    @property
+    def limits(self) -> ElasticLimits | None:
+        """Elastic limits of joints, where they are known."""
+        return self._limits[0]
+
+    @property
+    def unchecked(self) -> str:
+        """Why they are not known; empty if they are."""
+        return self._limits[1]
 
     def solve(
         self,

@@ -8,16 +8,17 @@ needed. This is exact, not an approximation. Motions out of the plane are not co
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.engines._hands import Hands, read_hands
+from seqopt.engines._hands import Hands
 from seqopt.engines._kinds import FlatEngine
-from seqopt.engines.interface import Basis, Fields, Want, grip_columns
+from seqopt.engines.interface import Basis
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError, SceneError
+from seqopt.network.build import network_of
 from seqopt.network.network import GROUND, Network
 from seqopt.scene.scene import Scene
 from seqopt.scene.shape import plane_axes
@@ -166,7 +167,7 @@ def _spring(network: Network, index: int) -> str:
 _ELSE = "use the compliance engine"
 
 
-class PlanarEngine(FlatEngine):
+class PlanarEngine(FlatEngine, ComplianceEngine):
     """Computes any batch of grip sets on any partial structure of a planar scene.
 
     Raises `SceneError` if bricks, springs, gravity, loads or movements of the ground leave the
@@ -174,28 +175,27 @@ class PlanarEngine(FlatEngine):
     """
 
     def __init__(self, network: Network | Scene) -> None:
-        super().__init__(network)
-        plane = find_plane(self.network)
+        found = network_of(network)
+        plane = find_plane(found)
         if isinstance(plane, str):
             raise SceneError(f"{plane}; {_ELSE}")
-        self._plane, self._away = plane, off_plane(self.network, plane)
-        self._engine = ComplianceEngine(self.network, plane.basis)
+        ComplianceEngine.__init__(self, found, plane.basis)
+        away = off_plane(found, plane)
+        self._plane, self._away = plane, away if away.any() else None
 
-    def solve(
-        self,
-        bricks: int,
-        grips: ArrayLike,
-        want: Want = Want.RESPONSES,
-        moved: ArrayLike | None = None,
-    ) -> Fields:
-        """Return the fields of a partial structure for grip sets (S, r)."""
-        columns = grip_columns(self.network, bricks, grips)
-        hands = read_hands(self.network, columns, grips, moved)
+    @cached_property
+    def in_space(self) -> ComplianceEngine:  # type: ignore[override]
+        """The same bricks and joints, free to leave the plane."""
+        return ComplianceEngine(self.network)
+
+    def _require_known(self, columns: Ints, hands: Hands | None) -> None:
+        """Raise `GripError` if a grip lies outside the plane, or moves or gives way out of it."""
         if hands is not None and _leaves_plane(self._plane, hands, columns).any():
             raise GripError(f"a grip is moved, or gives way, out of the scene's plane; {_ELSE}")
+        if self._away is None:
+            return
         away = self._away[columns]
         if away.any():
-            node = np.asarray(grips).ravel()[away.argmax()]
+            inner = self.network.inner.ravel()[columns.ravel()[away.argmax()]]
             far = f"{1e3 * away.max():.3g} mm outside the scene's plane"
-            raise GripError(f"grip on node {node}: it lies {far}; {_ELSE}")
-        return self._engine.solve(bricks, grips, want, moved)
+            raise GripError(f"grip on node {self.network.node_name[inner]}: it lies {far}; {_ELSE}")

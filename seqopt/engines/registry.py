@@ -10,7 +10,7 @@ import json
 import platform
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache, cached_property, partial
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
@@ -39,15 +39,30 @@ _WITHOUT_EFFECT = ("name", "provenance", "robots")  # of a scene, on answers to 
 class Recipe:
     """An engine's name, scene and options, as `seqopt.engines.registry.make_engine` takes them.
 
-    ``options``: values whose representation says all of them.
+    ``options``: values whose representation says all of them; ``simplest``: whether of `simplest`.
     """
 
     engine: str
     scene: Scene
     options: Mapping[str, object] = field(default_factory=dict)
+    simplest: bool = False
 
     def __reduce__(self) -> tuple[object, ...]:
-        return Recipe, (self.engine, self.scene, dict(self.options))
+        return Recipe, (self.engine, self.scene, dict(self.options), self.simplest)
+
+    def make(self, network: Network | Scene | None = None) -> Engine:
+        """Return the engine, or one with the same settings of another scene or network."""
+        made = make_engine(self.engine, self.scene if network is None else network, **self.options)  # type: ignore[arg-type]
+        return simplest(made) if self.simplest else made
+
+    @cached_property
+    def name(self) -> str:
+        """The name of what answers grip sets."""
+        if not self.simplest:
+            return self.engine
+        from seqopt.engines._auto import find_level  # noqa: PLC0415  # slow to import
+
+        return find_level(self.network).level.value
 
     @cached_property
     def network(self) -> Network:
@@ -70,7 +85,8 @@ class Recipe:
             give = (self.scene.grip_kinds.of_robot, held.robots, held.compliance(self.scene))
             scene["arms"] = [np.asarray(each).tobytes().hex() for each in give]
         built = json.dumps(scene, sort_keys=True)
-        parts = (self.engine, repr(sorted(self.options.items())), built, _arithmetic())
+        options = {} if self.simplest else self.options  # joints that never fail need none
+        parts = (self.name, repr(sorted(options.items())), built, _arithmetic())
         return hashlib.sha256("\0".join(parts).encode()).hexdigest()
 
 
@@ -101,19 +117,22 @@ def recipe_of(engine: object) -> Recipe | None:
 
 
 def _loaded(name: str, network: Network | Scene, **options: Any) -> Engine:
-    """Return an engine that few problems take."""
-    from seqopt.engines._auto import AutoEngine  # noqa: PLC0415  # slow to import, as the others
-    from seqopt.engines._planar import PlanarEngine  # noqa: PLC0415
-    from seqopt.engines.discrete.engine import DiscreteEngine  # noqa: PLC0415
-    from seqopt.engines.frame import FrameEngine  # noqa: PLC0415
+    """Return an engine whose module waits until it is asked for: it loads much, or is rare."""
+    if name == "auto":
+        from seqopt.engines._auto import AutoEngine  # noqa: PLC0415
 
-    kinds: dict[str, Callable[..., Engine]] = {
-        "auto": AutoEngine,
-        "planar": PlanarEngine,
-        "frame": FrameEngine,
-        "discrete": DiscreteEngine,
-    }
-    return kinds[name](network, **options)
+        return AutoEngine(network, **options)
+    if name == "planar":
+        from seqopt.engines._planar import PlanarEngine  # noqa: PLC0415
+
+        return PlanarEngine(network, **options)
+    if name == "frame":
+        from seqopt.engines.frame import FrameEngine  # noqa: PLC0415
+
+        return FrameEngine(network, **options)
+    from seqopt.engines.discrete.engine import DiscreteEngine  # noqa: PLC0415
+
+    return DiscreteEngine(network, **options)
 
 
 ENGINES: dict[str, Callable[..., Engine]] = {
@@ -123,7 +142,8 @@ ENGINES: dict[str, Callable[..., Engine]] = {
     "frame": partial(_loaded, "frame"),
     "discrete": partial(_loaded, "discrete"),
 }
-USUAL = "compliance"  # the engine where none is asked for
+USUAL = "compliance"  # the engine of what is only drawn, or compared with itself
+DEFAULT = "auto"  # the engine where none is asked for
 LIMITED = ("auto", "discrete")  # engines whose joints hold what mortar does
 
 
@@ -172,19 +192,44 @@ def make_engine(name: str, network: Network | Scene, mortar: Mortar | str | None
     return engine
 
 
+def simplest(engine: Engine) -> Engine:
+    """Return what alone answers all grip sets of a problem: of `auto` the level of its scene.
+
+    Planar where nothing leaves one plane, else exactly rigid bricks; whether that was enough is to
+    be asked of the steps that are chosen. Any other engine is returned as it is.
+    """
+    if not isinstance(engine, ChoosingEngine):
+        return engine
+    found, recipe = make_engine(engine.choice.level.value, engine.network), recipe_of(engine)
+    vars(found)["chooser"] = engine
+    if recipe is not None:
+        vars(found)["recipe"] = replace(recipe, simplest=True)
+    return found
+
+
+def _chooser_of(engine: Engine) -> ChoosingEngine | None:
+    """Return the engine that chooses for every grip set, of which this one is `simplest`."""
+    found = getattr(engine, "chooser", None)
+    return found if isinstance(found, ChoosingEngine) else None
+
+
 def provenance(engine: Engine) -> dict[str, object]:
     """Return what a summary says of the engine, after it computed, and of packages.
 
     ``engine``: its ``name``, the ``reason`` for it, the ``mortar`` if one was given, and of an
-    automatic one the ``levels`` that it took, for how many grip ``sets``, and why each.
+    automatic one the ``level`` that it took for all grip sets, or the ``levels`` for how many
+    ``sets``, and why each.
     """
     recipe = recipe_of(engine)
     said: dict[str, object] = {"name": type(engine).__name__, "reason": "given as an object"}
     if recipe is not None:
-        why = "the default" if recipe.engine == USUAL else "asked for by name"
+        why = "the default" if recipe.engine == DEFAULT else "asked for by name"
         said = {"name": recipe.engine, "reason": why}
         said |= {name: asdict(value) for name, value in recipe.options.items()}  # type: ignore[call-overload]
-    if isinstance(engine, ChoosingEngine):
+    if (chooser := _chooser_of(engine)) is not None:
+        choice = chooser.choice
+        said["level"] = {"engine": choice.level.value, "reason": choice.reason}
+    elif isinstance(engine, ChoosingEngine):
         said["levels"] = [
             {"engine": choice.level.value, "sets": sets, "reason": choice.reason}
             for choice, sets in engine.tally.items()

@@ -14,7 +14,7 @@ from seqopt._showing import Shown
 from seqopt.arms._held import can_hold
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import make_engine, recipe_of
+from seqopt.engines.registry import recipe_of
 from seqopt.errors import ProblemError
 from seqopt.graph._explore import Moves
 from seqopt.graph.paths import keep_best
@@ -144,7 +144,7 @@ def _anew(engine: Engine, order: Order) -> Engine:
     """Return an engine of the same kind for the same scene in another order."""
     recipe, network = recipe_of(engine), build_network(engine.network.scene, order)
     assert recipe is not None
-    return make_engine(recipe.engine, network, **recipe.options)  # type: ignore[arg-type]
+    return recipe.make(network)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

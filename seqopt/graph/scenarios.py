@@ -15,7 +15,7 @@ from seqopt._showing import Shown
 from seqopt.arms._held import hold_alike
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import Recipe, make_engine, recipe_of
+from seqopt.engines.registry import Recipe, recipe_of
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError
 from seqopt.graph.layers.costs import (
     Budget,
@@ -48,16 +48,12 @@ def _recipe_for(engine: Engine, scene: Scene) -> Recipe:
             f"engine {type(engine).__name__}: scenarios need engines of their own; take "
             "one of seqopt.make_engine"
         )
-    return Recipe(recipe.engine, hold_alike(engine.network.scene, scene), recipe.options)
+    return replace(recipe, scene=hold_alike(engine.network.scene, scene))
 
 
 def engine_for(engine: Engine, scene: Scene) -> Engine:
     """Return an engine of the same kind and settings for another scene."""
-    return _made(_recipe_for(engine, scene))
-
-
-def _made(recipe: Recipe) -> Engine:
-    return make_engine(recipe.engine, recipe.scene, **recipe.options)  # type: ignore[arg-type]
+    return _recipe_for(engine, scene).make()
 
 
 def require_alike(nominal: Scene, scene: Scene, number: int) -> None:
@@ -113,7 +109,7 @@ class _ScenarioTask:
 
     def problem(self) -> Layers:
         """Return the placement problem of this scenario."""
-        evaluation = Evaluation(_made(self.recipe), self.schedule, self.asked, self.resources)
+        evaluation = Evaluation(self.recipe.make(), self.schedule, self.asked, self.resources)
         return Layers(self.asked.criterion, self.asked.limits, evaluation)
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from seqopt.contact.mortar import Mortar
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import recipe_of
+from seqopt.engines.registry import recipe_of, simplest
 from seqopt.errors import NothingFoundError, ProblemError, TimeUpError
 from seqopt.graph.formulation import Formulation, On, Run, as_formulation
 from seqopt.graph.layers.interface import PlacementProblem
@@ -171,7 +171,7 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     Parameters
     ----------
     engine, moves, criterion : Engine, Schedule or FreeRules, Criterion
-        What has the scene, what can be chosen, and what a step costs.
+        What has the scene, what can be chosen, what a step costs; of ``auto`` its simplest level.
     goals : sequence of Goal or str, optional
         As ``"minmax,steps"``, over states; by default the sum of the costs of open grips or the
         largest, as the formulation minimizes, and of rules the worst step.
@@ -200,7 +200,7 @@ def pose(  # noqa: PLR0913  # every question is a word of its own
     asked = {"goals": goals, "limits": limits, "budgets": budgets, "stands": stands}
     worlds = {"scenarios": scenarios, "over": over, "orders": orders}
     more = {"also": also, "resources": resources}
-    return _scaled(Problem.asked(engine, moves, criterion, **asked, **worlds, **more))
+    return _scaled(Problem.asked(simplest(engine), moves, criterion, **asked, **worlds, **more))
 
 
 def _scaled(problem: Problem) -> Problem:

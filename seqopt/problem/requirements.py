@@ -15,7 +15,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, Terse
 from seqopt.engines._kinds import linear_limit
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import make_engine, recipe_of
+from seqopt.engines.registry import recipe_of
 from seqopt.errors import MechanismError, ProblemError, StepError
 from seqopt.network.network import Network
 from seqopt.responses._props import EXCESS_COLUMN
@@ -162,7 +162,7 @@ def _bare(engine: Engine) -> Engine:
     recipe, scene = recipe_of(engine), engine.network.scene
     if recipe is None or not scene.props:
         return engine
-    return make_engine(recipe.engine, scene.with_props(), **recipe.options)  # type: ignore[arg-type]
+    return recipe.make(scene.with_props())
 
 
 ChoiceResponses = Mapping[str, Floats]

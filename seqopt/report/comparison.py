@@ -12,6 +12,7 @@ import pandas as pd
 from seqopt._files import csv_text
 from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
+from seqopt.engines.registry import simplest
 from seqopt.errors import MechanismError, ProblemError, SeqoptError, StepError
 from seqopt.graph.formulation import Formulation, On, find_formulation, formulations
 from seqopt.graph.layers.costs import TINY
@@ -155,6 +156,7 @@ def compare(
     -------
     Comparison
     """
+    engine = simplest(engine)
     scene, (tables, notes, refused) = engine.network.scene, _method_tables(engine, robots)
     maxima = pd.DataFrame({name: _quantities(scene, t) for name, t in tables.items()})
     printed = printed_maxima().set_axis(maxima.index) if PUBLISHED in tables else None

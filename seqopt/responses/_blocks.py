@@ -36,7 +36,7 @@ from seqopt._files import HIDDEN, make_folder, require_folder, write_bytes
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines._kinds import Level, LevelChoice
 from seqopt.engines.interface import Engine, Want
-from seqopt.engines.registry import Recipe, make_engine, recipe_of
+from seqopt.engines.registry import Recipe, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import FileError, MemoryShortError, SceneError
 from seqopt.responses._arms import for_arms
@@ -151,7 +151,7 @@ class Shipment:
         """Return the engine, newly made."""
         found: Recipe | Engine = pickle.loads(self.content)  # our own, from `pack`
         if isinstance(found, Recipe):
-            return make_engine(found.engine, found.scene, **found.options)  # type: ignore[arg-type]
+            return found.make()
         return found
 
 

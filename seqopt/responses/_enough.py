@@ -9,6 +9,7 @@ from itertools import chain
 import numpy as np
 
 from seqopt.arrays import Terse
+from seqopt.contact.mortar import _mortar_name, _with_mortar
 from seqopt.engines._kinds import ChoosingEngine, FlatEngine, OpeningEngine
 from seqopt.engines.registry import recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -63,7 +64,7 @@ def what_was_enough(
     known = not (staged or np.isnan(below))
     step = f"step {number}{f' of {build}' if len(builds) > 1 else ''}" if known else ""
     return Enough(
-        type(engine).__name__ if recipe is None else recipe.engine,
+        type(engine).__name__ if recipe is None else recipe.name,
         _others(within, below if known else np.nan, f"{joint} in {step}"),
         joint if known else "",
         step,
@@ -87,11 +88,13 @@ def _others(within: LinearRange, below: float, where: str) -> str:
         return f"{said}what discrete elements would change is not known: {why}"
     if below >= 0:
         close = f"{where} comes closest to its elastic limits, {below / 1e6:.3g} MPa below them"
-        own = "" if isinstance(engine, ChoosingEngine) else " with epoxy"  # whose limits they are
+        own = f" {_with_mortar(_mortar_name(within.mortar))}"  # whose limits they are
+        own = "" if isinstance(engine, ChoosingEngine) else own
         return f"{said}discrete elements{own} would change nothing in these steps: {close}"
     if isinstance(engine, ChoosingEngine):
         return "discrete elements were taken where joints open, elsewhere they change nothing"
-    return f"{said}what discrete elements would change is not known: {where} leaves its limits"
+    asks = f"{where} leaves its limits; the engine discrete says it"
+    return f"{said}what discrete elements would change is not known: {asks}"
 
 
 def _left_out(

@@ -17,7 +17,7 @@ import pandas as pd
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._kinds import ChoosingEngine, FlatEngine, OpeningEngine
 from seqopt.engines.interface import Engine, Want, grip_columns, select_sets
-from seqopt.engines.registry import make_engine, recipe_of
+from seqopt.engines.registry import USUAL, Recipe, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import ProblemError
 from seqopt.network.network import Network
@@ -137,12 +137,13 @@ class _Tensions(_Group):
 
 def _linear(engine: Engine) -> Engine:
     """Return the engine whose answers are linear in misplacements: of joints that never fail."""
-    if isinstance(engine, FlatEngine | OpeningEngine):
-        flat = isinstance(engine, FlatEngine)
-        why = "has two directions" if flat else "is not linear in where grips are"
+    if isinstance(engine, OpeningEngine):
         raise ProblemError(
-            f"tolerance: a {type(engine).__name__} {why}; take the engine compliance or auto"
+            f"tolerance: a {type(engine).__name__} is not linear in where grips are; take the "
+            "engine compliance or auto"
         )
+    if isinstance(engine, FlatEngine):  # grips may be off in any direction
+        return engine.in_space
     return engine.rigid if isinstance(engine, ChoosingEngine) else engine
 
 
@@ -245,7 +246,8 @@ def held_in_steps(scene: Scene, steps: Sequence[Step]) -> list[_Held]:
 
 def is_linear(engine: Engine) -> bool:
     """Return whether an engine is known to be linear in where grips are, in all directions."""
-    return isinstance(engine, ChoosingEngine) or type(engine) is ComplianceEngine
+    known = isinstance(engine, ChoosingEngine | FlatEngine)
+    return known or type(engine) is ComplianceEngine
 
 
 def is_tied(engine: Engine, steps: Sequence[_Held]) -> bool:
@@ -304,12 +306,11 @@ def stiffness_for(engine: Engine, steps: Sequence[Step], distance: float) -> flo
     It is found by bisection: stiffer grips are not all tried. Infinite where rigid ones may be,
     None where no stiffness from `_SOFTEST` on may.
     """
-    recipe, scene = recipe_of(engine), engine.network.scene
-    name = "compliance" if recipe is None else recipe.engine
+    recipe, scene = recipe_of(engine) or Recipe(USUAL, engine.network.scene), engine.network.scene
 
     def enough(stiffness: float | None) -> bool:
         soft = scene.with_grips(stiffness)
-        found = each_tolerance(make_engine(name, soft), held_in_steps(soft, steps))
+        found = each_tolerance(recipe.make(soft), held_in_steps(soft, steps))
         return bool(found.min(initial=np.inf) >= distance)
 
     if enough(None):

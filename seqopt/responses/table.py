@@ -19,10 +19,11 @@ import numpy as np
 import pandas as pd
 
 from seqopt.arrays import Floats, Ints
-from seqopt.contact._elastic_limits import find_elastic_limits
-from seqopt.contact.mortar import EPOXY
+from seqopt.contact._elastic_limits import _STRESS_MARGIN, find_elastic_limits
+from seqopt.contact.mortar import EPOXY, _mortar_name
 from seqopt.engines._kinds import ChoosingEngine, OpeningEngine, linear_limit
 from seqopt.engines.interface import Engine, Fields, Want, _empty_site, select_sets
+from seqopt.engines.registry import _chooser_of
 from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.network import Network
 from seqopt.responses._props import prop_cells
@@ -45,10 +46,6 @@ from seqopt.sequence.steps import Grips, Step, StepKind, require_steps
 _MEASURED = Want.BRICKS | Want.JOINTS | Want.SCREEN  # limits are no sharper than six digits
 _TURN = 0.1  # rad; sine and angle differ by 0.2 %, cosine and one by 0.5 %
 _STRAIN = 0.1  # of a joint, over its thickness; true strain differs by 5 %
-_STRESSED = (
-    f"{{:.3g}} MPa beyond what epoxy holds, {EPOXY.tensile_strength / 1e6:g} MPa in tension, "
-    f"{EPOXY.cohesion / 1e6:g} MPa and friction in shear"
-)
 _Columns: TypeAlias = "Mapping[str, Sequence[Any]] | pd.DataFrame"
 """A table of `analyze`, or its columns by name: where no table is needed, pandas takes long."""
 _Key = tuple[int, tuple[int, ...]]  # bricks that stand, and what is held
@@ -59,7 +56,7 @@ FAR_OFF = "displacement"
 REMEDY = (
     "Do not rely on numbers outside the linear range. Check sizes, densities and stiffnesses of "
     "the scene; make joints stiffer, let robots hold more or other nodes, or set a limit on D_max. "
-    "Where only stress is too large, the engine auto lets joints open and break."
+    "Where only stress is too large, the engine discrete lets joints open and break."
 )
 
 
@@ -78,8 +75,8 @@ class Departure:
 class LinearRange:
     """Finds the steps of builds in which an engine's results leave the linear range.
 
-    ``engine``: which one; ``unchecked``: why stresses in joints are not checked, if they should be:
-    in a line, or none.
+    ``engine``: which one; ``mortar``: whose elastic limits count; ``unchecked``: why stresses in
+    joints are not checked, if they should be: in a line, or none.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -90,10 +87,12 @@ class LinearRange:
         thickness = engine.network.springs.thickness
         self._thickness = np.where(np.isnan(thickness) | self._breaks, np.inf, thickness)
         self.unchecked: tuple[str, ...] = ()
-        self._limits = engine.limits if isinstance(engine, ChoosingEngine) else None
+        chooser = engine if isinstance(engine, ChoosingEngine) else _chooser_of(engine)
+        self.mortar = EPOXY if chooser is None else chooser.mortar
+        self._limits = None if chooser is None else chooser.limits
         try:
-            if not self._breaks:
-                self._limits = find_elastic_limits(engine.network, EPOXY)
+            if self._limits is None and not self._breaks:
+                self._limits = find_elastic_limits(engine.network, self.mortar)
         except SceneError as error:
             self.unchecked = (f"stresses in joints are not checked: {error}",)
 
@@ -129,13 +128,32 @@ class LinearRange:
             (FAR_OFF, moved, far, lambda most: length_text(most) + within),
             ("rotation", turned, _TURN, f"{{:.3g}} rad, more than {_TURN:g} rad".format),
             ("deformation of a joint", strained, _STRAIN, deformed),
-            ("stress in a joint", stressed, 0.0, lambda most: _STRESSED.format(most / 1e6)),
+            ("stress in a joint", stressed, 0.0, self._stressed),
         )
         return tuple(
             Departure(what, say(float(values[over].max())), tuple(steps[over].tolist()))
             for what, values, most, say in found
             if (over := ~(values <= most)).any()  # what is not a number is not within
         )
+
+    def _stressed(self, most: float) -> str:
+        """Return by how much stress is beyond the elastic limits of joints, Pa, in words."""
+        mortar = self.mortar
+        return (
+            f"{most / 1e6:.3g} MPa beyond what {_mortar_name(mortar)} holds, "
+            f"{mortar.tensile_strength / 1e6:g} MPa in tension, {mortar.cohesion / 1e6:g} MPa and "
+            "friction in shear"
+        )
+
+    def keeps_limits(self, steps: Sequence[Step]) -> bool:
+        """Return whether joints stay within their elastic limits in all steps, where these are."""
+        if self._limits is None or isinstance(self._engine, OpeningEngine):
+            return True
+        scene = self._network.scene
+        keys = [(step.bricks, scene.grip_numbers(step.grips, step.bricks)) for step in steps]
+        self._ask(keys)
+        margin = _STRESS_MARGIN * self._limits.assembly.stress_scale
+        return all(self._known[key][2] <= margin for key in keys)
 
     def seen(self, step: Step, fields: Fields) -> Fields:
         """Return the fields of a step, all of them, and remember what it is asked of them."""
@@ -203,12 +221,16 @@ class LinearRange:
         for key in keys:
             if key not in self._known:
                 alike[key[0], len(key[1])][key] = None
+        asked, found = list[_Key](), list[Fields]()
         for (bricks, count), new in sorted(alike.items()):  # in order: engines grow with the build
-            found = np.array([[0.0, 0.0, -np.inf, 0.0]])
             if bricks:
                 sets = np.array([held for _, held in new], dtype=np.int64).reshape(len(new), count)
-                found = self._of(self._engine.solve(bricks, sets, _MEASURED))
-            self._known.update(zip(new, found, strict=True))
+                found.append(self._engine.solve(bricks, sets, _MEASURED))
+                asked += new
+            else:
+                self._known |= dict.fromkeys(new, np.array([0.0, 0.0, -np.inf, 0.0]))
+        if asked:
+            self._known.update(zip(asked, self._of(*found), strict=True))
 
     @cached_property
     def _lever(self) -> Floats:
@@ -217,19 +239,20 @@ class LinearRange:
         assembly = self._limits.assembly
         return lengths(assembly.corner - self._network.springs.position[assembly.contact])
 
-    def _of(self, fields: Fields) -> Floats:
+    def _of(self, *parts: Fields) -> Floats:
         """Return rotation, rad, strain, stress beyond elastic limits, Pa, and in which joint.
 
-        A row for every grip set, (S, 4).
+        A row for every grip set of some fields, the last with the most bricks, (S, 4).
         """
-        springs, bricks = self._network.springs, fields.brick_twist.shape[1]
+        springs, bricks = self._network.springs, parts[-1].brick_twist.shape[1]
         acting = max(1, int(np.searchsorted(springs.since, bricks, side="right")))
-        joints = fields.joint_wrench[:, :acting]  # others bear nothing
+        joints = _stacked([fields.joint_wrench[:, :acting] for fields in parts])  # else they bear
+        twist = _stacked([fields.brick_twist for fields in parts])  # nothing
         wrench = joints.reshape(*joints.shape[:2], 2, 3) @ springs.axes[:acting].transpose(0, 2, 1)
         stiffness = springs.stiffness[:acting].reshape(-1, 2, 3)
         given = np.divide(wrench, stiffness, out=np.zeros_like(wrench), where=stiffness > 0)
         shift, turn = lengths(given).transpose(2, 0, 1)
-        turned = np.hstack([turn, lengths(fields.brick_twist[..., 3:])]).max(axis=1)
+        turned = np.hstack([turn, lengths(twist[..., 3:])]).max(axis=1)
         if self._limits is None:
             strain, none = shift / self._thickness[:acting], np.zeros(len(turned))
             return np.column_stack([turned, strain.max(axis=1), none - np.inf, none])
@@ -240,6 +263,18 @@ class LinearRange:
         most = excess.max(axis=1, keepdims=True)
         first = np.isclose(excess, most, rtol=1e-9, atol=0.0).argmax(axis=1)  # of those that tie
         return np.column_stack([turned, strain.max(axis=1), most[:, 0], first])
+
+
+def _stacked(parts: Sequence[Floats]) -> Floats:
+    """Return arrays (S, n, 6) one after the other, zero where one has less than the last."""
+    if len(parts) == 1:
+        return parts[0]
+    out = np.zeros((sum(map(len, parts)), *parts[-1].shape[1:]))
+    first = 0
+    for part in parts:
+        out[first : first + len(part), : part.shape[1]] = part
+        first += len(part)
+    return out
 
 
 def builds_in_words(departures: Mapping[str, Sequence[Departure]]) -> tuple[str, ...]:

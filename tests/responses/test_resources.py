@@ -155,7 +155,7 @@ def test_an_engine_is_made_once_for_a_worker(small_blocks, loop25, monkeypatch):
     engine = make_engine("compliance", loop25.scene)
     send = worker_for(engine, elsewhere=True)
     monkeypatch.setattr(
-        "seqopt.responses._blocks.make_engine",
+        "seqopt.engines.registry.make_engine",
         lambda *given, **named: made.append(given) or make_engine(*given, **named),
     )
     with ThreadPoolExecutor(1) as executor:

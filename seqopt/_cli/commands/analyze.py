@@ -45,7 +45,7 @@ from seqopt.contact.mortar import EPOXY, Mortar
 from seqopt.engines._kinds import ChoosingEngine, Level, OpeningEngine
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.interface import Engine, Fields, Want
-from seqopt.engines.registry import provenance, recipe_of
+from seqopt.engines.registry import USUAL, provenance, recipe_of
 from seqopt.errors import MechanismError, SceneError, SeqoptError, SolverError
 from seqopt.network.build import build_network
 from seqopt.problem._limit_words import length_word
@@ -153,7 +153,12 @@ def run(options: argparse.Namespace) -> Answer:
     facts = {"scene": scene_facts(scene), "units": UNITS, "steps": whole, **provenance(engine)}
     answer = Answer(
         facts={**facts, "enough": None if enough is None else enough.facts()},
-        notes=(*off, *_notes(within, steps, table, enough), *_not_done(clock)),
+        notes=(
+            *off,
+            *level_notes(options, engine),
+            *_notes(within, steps, table, enough),
+            *_not_done(clock),
+        ),
         failures=(*failures, *([INTERRUPTED] if clock.interrupted else ())),
         status=Status.INTERRUPTED if clock.interrupted else status,
         **said,
@@ -175,7 +180,6 @@ def _notes(
 ) -> Iterator[str]:
     """Yield what is worth knowing of steps beside their responses."""
     scene = within.engine.network.scene
-    yield from level_notes(within.engine)
     yield from within.unchecked
     yield from () if enough is None else enough.lines
     yield from (f"payload exceeded: {excess}" for excess in overloads(scene, table))
@@ -309,7 +313,7 @@ def _step_answers(
 
     if options.staged is None:
         return ((step, answer(step)) for step in each)
-    if options.engine != "compliance":
+    if options.engine not in (None, USUAL):
         raise SceneError(
             f"--engine {options.engine}: --staged goes with exactly rigid bricks alone; "
             "give --engine compliance"

@@ -46,7 +46,7 @@ from seqopt._cli.values import _parse_grip_range, asked_criterion, parse_robots,
 from seqopt._showing import PAGE
 from seqopt.arms.reach import find_postures
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import provenance
+from seqopt.engines.registry import provenance, simplest
 from seqopt.graph.formulation import FormulationKind, formulations
 from seqopt.network.build import build_network
 from seqopt.problem.criteria import RankSum
@@ -175,7 +175,7 @@ def answered(
         headings=(*headings, SPEED, SOFTLY, TURNS),
         written=written,
         notes=(
-            *level_notes(engine),
+            *level_notes(options, simplest(engine)),
             *result.enough.lines,
             *refused(prover),
             *(() if grips else (HOW_SOFT,)),

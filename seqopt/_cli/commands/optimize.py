@@ -89,6 +89,7 @@ from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, Time
 from seqopt.graph.formulation import End, Formulation, On, Run, as_formulation, trace_rows
 from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE
+from seqopt.plan._levels import at_sufficient_level
 from seqopt.plan._softer import _payload_advice
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _solve_run, usual
@@ -275,6 +276,7 @@ def find(options: argparse.Namespace) -> Found:
     props = None if asked.fewest is None else _props(options, asked, choose)
     outer = bases or props
     plan = choose(asked.problem) if outer is None else outer.plan
+    plan = at_sufficient_level(plan, choose, clock)
     prover = asked_prover(options, plan.engine.network)
     whole = _from_empty(asked.whole, plan, choose)
     return Found(asked, plan, assemble, prover, bases, whole, props, clock)
@@ -413,6 +415,7 @@ def _answer(options: argparse.Namespace, found: Found, written: tuple[Any, ...])
         text="\n".join([*lines, *(f"payload exceeded: {excess}" for excess in over), *enough]),
         written=written,
         notes=(
+            *level_notes(options, plan.engine),
             *_posed_notes(found.asked.problem),
             *rule_notes(found.asked.problem.moves, scene),
             *(() if plan.arms is None else (f"arms: {plan.arms}",)),
@@ -493,11 +496,11 @@ def _search(plan: Plan) -> str:
 
 
 def _posed_notes(problem: Problem) -> tuple[str, ...]:
-    """Return which levels the engine took, and whether scales are not those of fixed methods."""
-    said, name = level_notes(problem.engine), problem.criterion.name
+    """Return whether scales are not those of fixed methods."""
+    name = problem.criterion.name
     if not name.endswith(OWN):
-        return said
-    return (*said, f"criterion: {name}: no fixed method builds this scene to take scales from")
+        return ()
+    return (f"criterion: {name}: no fixed method builds this scene to take scales from",)
 
 
 def _proof(plan: Plan) -> str:

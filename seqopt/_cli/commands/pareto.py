@@ -185,7 +185,7 @@ def answered(options: argparse.Namespace, problem: Problem, front: Front) -> Ans
         text=f"{shown}{said}; {written_to(options.out, page=DETAILS not in clock.left_out)}",
         written=written,
         notes=(
-            *level_notes(free.engine),
+            *level_notes(options, free.engine),
             *rule_notes(free.rules, scene),
             *refused(next(iter(provers.values()))),
             *missing,

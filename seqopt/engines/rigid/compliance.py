@@ -219,8 +219,12 @@ class ComplianceEngine(NamedEngine):
         """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self._network, bricks, grips)
         hands = read_hands(self._network, columns, grips, moved)
+        self._require_known(columns, hands)
         found = self._found(bricks, columns, hands, want)
         return require_finite(found, bricks, grips)
+
+    def _require_known(self, columns: Ints, hands: Hands | None) -> None:
+        """Raise `GripError` where a grip set is none that the directions of bricks can answer."""
 
     def _found(self, bricks: int, columns: Ints, hands: Hands | None, want: Want) -> Fields:
         """Return what is wanted of grip sets, corrected where the operator is not enough."""
@@ -257,6 +261,7 @@ class ComplianceEngine(NamedEngine):
         """
         columns, numbers = grip_columns(self._network, bricks, grips), np.asarray(grips)
         hands = read_hands(self._network, columns, numbers, None)
+        self._require_known(columns, hands)
         if not compiled or hands is not None or not can_compile():
             fields = self._found(bricks, columns, hands, want)
             return extremes_in(require_finite(fields, bricks, numbers), want)

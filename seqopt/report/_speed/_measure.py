@@ -19,7 +19,7 @@ import pandas as pd
 from seqopt._interrupts import ending
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
-from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of
+from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of, simplest
 from seqopt.errors import ProblemError, SeqoptError, SolverError, TimeUpError
 from seqopt.graph.formulation import End, Formulation, FormulationKind, On, formulations
 from seqopt.graph.layers.costs import TINY
@@ -149,9 +149,10 @@ class _Stage:
         found = recipe_of(self.problem.engine)
         if found is None:  # an object of one's own
             return self.problem.but()
-        options = found.options if self.name in LIMITED or self.name == found.engine else {}
+        options = found.options if self.name in LIMITED or self.name == found.name else {}
         network = self.problem.engine.network
-        return self.problem.but(engine=make_engine(self.name, network, options.get("mortar")))  # type: ignore[arg-type]
+        made = make_engine(self.name, network, options.get("mortar"))  # type: ignore[arg-type]
+        return self.problem.but(engine=simplest(made))
 
     def least(self, call: Callable[[], Found]) -> tuple[float, Found]:
         """Return the least time that a call takes, and what it returns; `TimeoutError` if late."""
@@ -244,7 +245,7 @@ def speed_accuracy(
     """
     ways, reference = _ways(problem), Reference(problem)
     recipe = recipe_of(problem.engine)
-    name = type(problem.engine).__name__ if recipe is None else recipe.engine
+    name = type(problem.engine).__name__ if recipe is None else recipe.name
     try:
         with timer.within(seconds):
             reference.prepare()

@@ -1,0 +1,139 @@
+"""Of the automatic engine one level answers all choices; the plan says whether it was enough."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+import seqopt
+from seqopt._cli.main import main
+from seqopt.contact.mortar import bond_mortar
+from seqopt.engines._auto import AutoEngine, find_level
+from seqopt.engines._kinds import FlatEngine, Level
+from seqopt.engines.interface import Want
+from seqopt.engines.registry import _chooser_of, make_engine, provenance, recipe_of, simplest
+from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.graph.scenarios import engine_for
+from seqopt.responses._blocks import pack
+from seqopt.responses.table import OUTSIDE, LinearRange
+from seqopt.scene.scene_file import load_scene, save_scene
+from tests.builders import about_vertical, moved, small_arch
+
+WALL, ARCH = load_scene("wall:columns=3,courses=2"), small_arch(5)
+WEAK = bond_mortar(3e4)  # some joints of the small arch would leave its limits
+
+
+@pytest.mark.parametrize("schedule", [None, "free"])
+@pytest.mark.parametrize(("scene", "level"), [(WALL, Level.PLANAR), (ARCH, Level.RIGID)])
+def test_it_chooses_as_rigid_bricks_do_and_asks_no_joint(scene, level, schedule, monkeypatch):
+    wanted, real = set(), ComplianceEngine._found
+
+    def noted(self, bricks, columns, hands, want):
+        wanted.add(want)
+        return real(self, bricks, columns, hands, want)
+
+    monkeypatch.setattr(ComplianceEngine, "_found", noted)
+    monkeypatch.setattr(AutoEngine, "solve", lambda *_: pytest.fail("set by set"))
+    plan = seqopt.optimize(scene, schedule)
+    assert not any(want & (Want.JOINTS | Want.BRICKS) for want in wanted)
+    assert isinstance(plan.engine, FlatEngine) == (level is Level.PLANAR)
+    other = seqopt.optimize(scene, schedule, engine="compliance")
+    assert plan.objective == pytest.approx(other.objective, rel=1e-9)
+    assert [step.grips for step in plan.steps] == [step.grips for step in other.steps]
+    said = plan.summary()["engine"]
+    assert (said["name"], said["reason"]) == ("auto", "the default")
+    assert said["level"]["engine"] == level.value
+    assert plan.enough.engine == level.value
+
+
+def test_without_a_name_python_and_the_command_line_take_it(capsys, tmp_path):
+    save_scene(WALL, path := tmp_path / "wall.json")
+    assert main(["optimize", str(path)]) == 0
+    said = capsys.readouterr()
+    assert "enough: planar; compliance would change nothing" in said.err
+    assert "engine: " not in said.err
+    assert main(["optimize", str(path), "--engine", "auto"]) == 0
+    assert "engine: planar: bricks, springs, gravity" in capsys.readouterr().err
+
+
+def test_each_grip_set_by_itself_is_answered_as_before():
+    engine = make_engine("auto", ARCH, WEAK)
+    engine.solve(2, [[3], [2]], Want.EDGES)
+    assert sum(engine.tally.values()) == 2
+    level = simplest(engine)
+    assert (_chooser_of(level), simplest(level)) == (engine, level)
+    assert "levels" in provenance(engine)["engine"]
+    assert provenance(level)["engine"]["mortar"]["tensile_strength"] == 3e4
+
+
+def test_it_chooses_anew_where_it_is_made_anew():
+    level = simplest(make_engine("auto", WALL))
+    x, y, z = WALL.bricks[-1].position
+    bent = replace(
+        WALL, bricks=(*WALL.bricks[:-1], replace(WALL.bricks[-1], position=(x, y + 0.001, z)))
+    )
+    assert find_level(seqopt.build_network(bent)).level is Level.RIGID
+    assert type(engine_for(level, bent)) is ComplianceEngine
+    assert isinstance(pack(level).unpack(), FlatEngine)
+    planar, rigid = (recipe_of(make_engine(name, WALL)).key for name in ("planar", "compliance"))
+    assert recipe_of(level).key == planar != rigid
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "angle", "level"),
+    [
+        ((1e6, 1e6, 1e6), 0.5, Level.PLANAR),
+        ((1e6, 1e5, 1e6), 0.0, Level.PLANAR),
+        ((1e6, 1e5, 1e6), 0.5, Level.RIGID),  # axes of robots are those of the site
+    ],
+)
+def test_grips_that_give_way_out_of_the_plane_are_answered_in_space(stiffness, angle, level):
+    turn = about_vertical(angle)
+    scene = moved(WALL, lambda point: turn @ point)
+    scene = scene.with_robots(*(replace(r, stiffness=stiffness) for r in scene.robots))
+    assert find_level(seqopt.build_network(scene)).level is level
+    found = seqopt.optimize(scene).objective
+    assert found == pytest.approx(seqopt.optimize(scene, engine="compliance").objective, rel=1e-9)
+
+
+def test_a_plan_that_leaves_elastic_limits_says_so_first_and_what_to_do():
+    plan = seqopt.optimize(ARCH, engine="auto", mortar=WEAK)
+    assert plan.result.startswith(f"{OUTSIDE}: ")
+    (left,) = plan.departures
+    assert "MPa beyond what bond=30000 holds, 0.03 MPa in tension" in left.said
+    assert "the engine discrete says it" in plan.enough.others
+    assert not LinearRange(plan.engine).keeps_limits(plan.steps)
+    kept = seqopt.optimize(ARCH)
+    assert LinearRange(kept.engine).keeps_limits(kept.steps)
+    assert not kept.departures
+
+
+@pytest.mark.parametrize(
+    ("bond", "opens"), [("bond=3e4", True), ("bond=1e5", False), ("dry", None)]
+)
+def test_the_command_solves_again_by_joints_that_open_if_that_is_little(
+    capsys, tmp_path, bond, opens, monkeypatch
+):
+    save_scene(ARCH, path := tmp_path / "arch.json")
+    asked = [
+        "optimize",
+        str(path),
+        "--engine",
+        "auto",
+        "--mortar",
+        bond,
+        "--no-stability",
+        "--json",
+    ]
+    assert main(asked) == 0
+    found = json.loads(capsys.readouterr().out)
+    engine = found["summary"]["engine"]
+    levels = {level["engine"] for level in engine.get("levels", ())}
+    assert ("discrete" in levels) == (opens is True)
+    assert bool(found["outside_linear_range"]) == (opens is None)  # dry, it does not come to rest
+    if opens:
+        monkeypatch.setattr("seqopt.plan._levels.MOST", 0)
+        assert main(asked) == 0
+        assert json.loads(capsys.readouterr().out)["outside_linear_range"]
