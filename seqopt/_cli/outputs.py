@@ -138,7 +138,7 @@ def _picked_files(
         **_bare_files(plan, table, report),
         **{f"tasks.{kind}": text for kind, text in tasks.items()},
         **_time_files(plan),
-        PAGE: plan_page(plan, prover, table=table),
+        PAGE: plan_page(plan, prover, table=table, tasks=tasks),
     }
 
 

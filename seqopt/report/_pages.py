@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pandas as pd
 
-from seqopt._files import csv_text
 from seqopt._showing import Page, display
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
@@ -25,10 +24,20 @@ from seqopt.report._speed._table import SpeedTable
 from seqopt.report.comparison import CLOSED, Comparison, fixed_methods, largest, shown_table
 from seqopt.report.page import Build, Scatter, _Drawn, _grips_off, report_page
 from seqopt.report.text import _worst_along, in_words
-from seqopt.responses.table import OUTSIDE, REMEDY, Departure, LinearRange, analyze, builds_in_words
+from seqopt.responses.table import (
+    OUTSIDE,
+    REMEDY,
+    Departure,
+    LinearRange,
+    _Key,
+    _steps_in_table,
+    analyze,
+    builds_in_words,
+)
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE
-from seqopt.sequence.schedule_file import parse_plan, read_plan
+from seqopt.sequence.schedule_file import read_plan
+from seqopt.sequence.steps import Step
 from seqopt.stability._builds import SHOWN, BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
 
@@ -61,12 +70,17 @@ def _builds(
     for name, table in tables.items():
         over = len(payloads) == 1 and overloads(scene, table)
         bounds = {"F_largest": max(payloads)} if over else {}
-        steps = parse_plan(scene, csv_text(table), name)
+        steps = _steps_in_table(scene, table)
         stands = verdicts.get(name, ())
         left, arms = departures.get(name, ()), _known_arms(scene, steps)
         faults = arm_faults(scene, steps) if arms else ()
         out.append(Build(name, steps, table, stands, bounds, left, arms=arms, faults=faults))
     return out
+
+
+def _steps_of(scene: Scene, tables: Tables) -> dict[str, list[Step]]:
+    """Return the steps of builds by their tables."""
+    return {name: _steps_in_table(scene, table) for name, table in tables.items()}
 
 
 def _outside(builds: Sequence[Build]) -> str:
@@ -137,11 +151,13 @@ def plan_page(
     *,
     table: pd.DataFrame | None = None,
     others: Tables | None = None,
+    tasks: Mapping[str, str] | None = None,
 ) -> str:
     """Return the page of a plan, beside others and, where the scene is small, fixed methods.
 
     ``prover`` says which steps stand: by default dry, and with epoxy, where the scene is small;
-    ``table``: the responses of the plan, where they are known.
+    ``table``, ``tasks``: the responses of the plan, and what robots do, as of `Build`, where they
+    are known.
     """
     engine, name = plan.engine, plan.title
     scene = engine.network.scene
@@ -150,14 +166,16 @@ def plan_page(
     if small:
         tables |= {key: each for key, each in fixed_methods(engine).items() if key not in tables}
     prover = prover or BuildProver(engine.network, SHOWN if small else {})
-    verdicts = prover.of_tables(tables)
+    verdicts = prover.of_builds(_steps_of(scene, tables))
     left = plan._within.of_builds(tables)  # knows the plan's own steps
     first, *rest = _builds(scene, tables, left, verdicts)
-    first = replace(first, along=_along(plan, first.table))
-    sentence = first.sentence(scene, _grips_off(engine, first))
+    first = replace(first, along=_along(plan, first.table), tasks=tasks or {})
+    offs = plan._within.offs
+    sentence = first.sentence(scene, _grips_off(engine, first, offs))
     found = f"Found by: {in_words(name)} ({plan.result})."
     builds = [first, *rest]
-    return report_page(engine, builds, sentence, [_worst_table(scene, builds)], found=found)
+    shown = [_worst_table(scene, builds)]
+    return report_page(engine, builds, sentence, shown, found=found, offs=offs)
 
 
 def _along(plan: ShownBuild, table: pd.DataFrame) -> Floats | None:
@@ -219,8 +237,9 @@ def folder_page(engine: Engine, folder: Path, prover: BuildProver) -> str:
     """Return the page of the plans in a folder that a command has written."""
     scene, builds = engine.network.scene, folder_builds(engine, folder, prover)
     if len(builds) == 1:
-        sentence = builds[0].sentence(scene, _grips_off(engine, builds[0]))
-        return report_page(engine, builds, sentence, [_worst_table(scene, builds)])
+        offs: dict[_Key, float] = {}
+        sentence = builds[0].sentence(scene, _grips_off(engine, builds[0], offs))
+        return report_page(engine, builds, sentence, [_worst_table(scene, builds)], offs=offs)
     sentence = f"{scene.name}, built in {len(builds)} ways, step by step"
     return _page(engine, builds, sentence, [_worst_table(scene, builds)])
 
@@ -236,7 +255,7 @@ def folder_builds(engine: Engine, folder: Path, prover: BuildProver) -> list[Bui
         )
     plans = {path.stem.removeprefix("steps_"): read_plan(scene, path) for path in paths}
     tables = {name: analyze(engine, steps) for name, steps in plans.items()}
-    found = prover.of_tables(tables)
+    found = prover.of_builds(plans)
     return _builds(scene, tables, LinearRange(engine).of_builds(tables), found)
 
 

@@ -35,7 +35,7 @@ from seqopt.responses._range import Moved
 from seqopt.responses._tolerance import COLUMN, is_tolerance
 from seqopt.responses.quantities import CHOSEN_BY, RESPONSES, robot_response
 from seqopt.responses.resources import Resources
-from seqopt.responses.table import Departure, LinearRange, analyze, force_column
+from seqopt.responses.table import Departure, LinearRange, _steps_in_table, analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FREE, FreeRules, Newest, Payload
 from seqopt.sequence.schedule import Schedule
@@ -174,7 +174,8 @@ def compare(
     if free is not None:
         tables[FREE], rows[FREE] = free.responses(), _free_row(free)
     notes += _add_largest(scene, rows, tables)
-    verdicts = (prover or BuildProver(engine.network, progress=progress)).of_tables(tables)
+    prover = prover or BuildProver(engine.network, progress=progress)
+    verdicts = prover.of_builds({name: _steps_in_table(scene, t) for name, t in tables.items()})
     table = _table(rows, left := (within := LinearRange(engine)).of_builds(tables), verdicts)
     notes += [f"In the paper: {text}" for text in IRREGULARITIES if printed is not None]
     found = (maxima, printed, table, tables, loop, tuple(notes), refusal, left)

@@ -15,7 +15,8 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from html import escape
 from importlib import resources
-from itertools import cycle
+from itertools import compress, cycle
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -24,7 +25,7 @@ from numpy.typing import ArrayLike
 from seqopt._files import csv_text
 from seqopt.arms._urdf import shape_notes
 from seqopt.arrays import Floats
-from seqopt.engines.interface import Engine, Want
+from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, _prop_faults, overloads
@@ -32,13 +33,21 @@ from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
 from seqopt.report.text import _deciding_step, _far_off, _in_a_sentence, _robot_words, in_words
 from seqopt.responses._tolerance import each_tolerance, held_in_steps, is_linear
 from seqopt.responses.quantities import _number_text
-from seqopt.responses.table import OUTSIDE, Departure, force_column, step_fields
+from seqopt.responses.table import (
+    OUTSIDE,
+    Departure,
+    _distinct,
+    _each_fields,
+    _Key,
+    force_column,
+    step_fields,
+)
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Order, Scene
 from seqopt.scene.shape import normal_of
 from seqopt.sequence.exports._tasks import _known_tasks, plan_tasks, tasks_csv, tasks_json
-from seqopt.sequence.steps import Step
+from seqopt.sequence.steps import Grips, Step
 from seqopt.stability._builds import WORDS, BuildVerdicts
 
 LARGEST = 32767
@@ -72,7 +81,8 @@ class Build:
     order; ``falls`` (steps, B, 6): how steps fall, with the first mortar; ``arms``: the joints of
     robots whose postures are known, points (k, 3), m, from the base to the tip of the tool, an
     entry a step, by the names of robots (of others a simple arm is drawn); ``faults``: in which
-    steps arms cannot be, in words; ``along``: values of the steps of which the largest decides.
+    steps arms cannot be, in words; ``along``: values of the steps of which the largest decides;
+    ``tasks``: what robots do, as CSV and JSON, where that is known.
     """
 
     name: str
@@ -86,6 +96,7 @@ class Build:
     arms: Arms = field(default_factory=dict)
     faults: Sequence[str] = ()
     along: Floats | None = None
+    tasks: Mapping[str, str] = field(default_factory=dict)
 
     def sentence(self, scene: Scene, off: Floats | None = None) -> str:
         """Return what it is, as one sentence; ``off``: how far grips may be off in steps, m."""
@@ -197,18 +208,31 @@ def _carried(network: Network) -> list[list[int]]:
     return out
 
 
-def _build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[str, object]:
+class _Asked(NamedTuple):
+    """What was asked of states of builds so far, by bricks and what is held; who holds.
+
+    ``offs``: how far grips may be off, m; ``fields``: of bricks, edges and ground ends.
+    """
+
+    offs: dict[_Key, float]
+    fields: dict[tuple[int, Grips], Fields]
+
+
+def _build_data(
+    engine: Engine, build: Build, known: _Asked | None = None, *, fields: bool = True
+) -> dict[str, object]:
     """Return the steps of a build as lists, ready for JSON.
 
     Rows of the table of responses are text; ``marks`` says what is wrong with each step; the packed
     fields ``twist``, ``edge``, ``push`` and ``turn`` (force and moment of every ground end) have
-    the ``scale`` of each step, or are None.
+    the ``scale`` of each step, or are None. ``known``: what was asked before.
     """
+    known = _Asked({}, {}) if known is None else known
     lines = [line.split(",") for line in csv_text(build.table).splitlines()]
-    scene, off = engine.network.scene, _grips_off(engine, build)
+    scene, off = engine.network.scene, _grips_off(engine, build, known.offs)
     own = scene.build_order
     found: dict[str, Floats | None] = {"fall": build.falls}
-    found |= _fields(engine, build) if fields else dict.fromkeys(FIELDS)
+    found |= _fields(engine, build, known.fields) if fields else dict.fromkeys(FIELDS)
     return {
         "name": build.name,
         "bounds": dict(build.bounds),
@@ -240,12 +264,27 @@ def _build_data(engine: Engine, build: Build, *, fields: bool = True) -> dict[st
     }
 
 
-def _grips_off(engine: Engine, build: Build) -> Floats | None:
-    """Return how far grips may be off in every step, m; None where that is not known."""
+def _grips_off(engine: Engine, build: Build, known: dict[_Key, float]) -> Floats | None:
+    """Return how far grips may be off in every step, m; None where that is not known.
+
+    ``known``: of states that were asked before; what is found is added.
+    """
     scene = engine.network.scene
     if not is_linear(engine) or len(scene.bricks) > _FEW or build.order:
         return None
-    return each_tolerance(engine, held_in_steps(scene, build.steps))
+    return each_tolerance(engine, held_in_steps(scene, build.steps), known)
+
+
+def _ask_all(
+    engine: Engine, builds: Sequence[Build], known: _Asked, shown: Sequence[Build]
+) -> None:
+    """Ask of all builds at once how far grips may be off, and of those with fields these."""
+    every = [step for build in builds if not build.order for step in build.steps]
+    if every:
+        _grips_off(engine, Build("", every, pd.DataFrame()), known.offs)
+    states = _distinct(build.steps for build in shown)
+    want = Want.EDGES | Want.BRICKS | Want.SUPPORT
+    known.fields.update(zip(states, _each_fields(engine, states.values(), want), strict=True))
 
 
 def _off_said(far: float) -> str:
@@ -276,7 +315,9 @@ def _stands(verdicts: Sequence[BuildVerdicts]) -> list[str]:
     return [" and ".join(said) for said in zip(*found, strict=True)]
 
 
-def _fields(engine: Engine, build: Build) -> dict[str, Floats]:
+def _fields(
+    engine: Engine, build: Build, known: Mapping[tuple[int, Grips], Fields]
+) -> dict[str, Floats]:
     """Return twists (steps, B, 6), edge forces (steps, E), and what ground ends exert."""
     network = engine.network
     count = len(build.steps)
@@ -284,7 +325,9 @@ def _fields(engine: Engine, build: Build) -> dict[str, Floats]:
     edge = np.zeros((count, len(network.edge_nodes)))
     support = np.zeros((count, len(network.springs.support), 6))
     for i, step in enumerate(build.steps):
-        found = step_fields(engine, step, Want.EDGES | Want.BRICKS | Want.SUPPORT)
+        found = known.get((step.bricks, step.grips)) or step_fields(
+            engine, step, Want.EDGES | Want.BRICKS | Want.SUPPORT
+        )
         twist[i, : step.bricks] = found.brick_twist[0]
         edge[i, : found.edge_force.shape[1]] = found.edge_force[0]
         support[i] = found.support[0]
@@ -313,11 +356,13 @@ def report_page(
     scatter: Scatter | None = None,
     *,
     found: str = "",
+    offs: dict[_Key, float] | None = None,
 ) -> str:
     """Return a page that shows builds of one scene, as HTML that needs nothing else.
 
     The first build is shown first; a row of a table whose first cell names a build shows it. Fields
     of some builds are left out, and the page says so, where there are more than `MOST` numbers.
+    ``offs``: how far grips may be off, m, of states that were asked before.
 
     Examples
     --------
@@ -329,7 +374,7 @@ def report_page(
     >>> len(report_page(engine, [build], "Two robots take turns.")) > 5e5
     True
     """
-    data = json.dumps(_data(engine, builds, scatter), separators=(",", ":"))
+    data = json.dumps(_data(engine, builds, scatter, offs), separators=(",", ":"))
     scene = engine.network.scene
     loading = f" Counted, and not drawn: {scene.loading}." if scene.loading else ""
     loading += "".join(f" Of {note}." for note in shape_notes(scene))
@@ -361,19 +406,27 @@ def _filled(**parts: str) -> str:
     return page
 
 
-def _data(engine: Engine, builds: Sequence[Build], scatter: Scatter | None) -> dict[str, object]:
+def _data(
+    engine: Engine,
+    builds: Sequence[Build],
+    scatter: Scatter | None,
+    offs: dict[_Key, float] | None = None,
+) -> dict[str, object]:
     """Return what the viewer reads, fields for as many builds as there is room for."""
     if not builds:
         raise ProblemError("a report of nothing; give at least one build")
     network = engine.network
     numbers = 6 * len(network.inner) + len(network.edge_nodes)  # of the fields of a step
     ends = np.cumsum([numbers * len(build.steps) for build in builds])
+    drawn = [bool(end <= MOST) and not b.order for b, end in zip(builds, ends, strict=True)]
+    known = _Asked({} if offs is None else offs, {})
+    _ask_all(engine, builds, known, [*compress(builds, drawn)])
     return {
         "structure": _structure_data(network),
         "builds": [
-            _build_data(engine, build, fields=bool(end <= MOST) and not build.order)
+            _build_data(engine, build, known, fields=fields)
             | {"tasks": _tasks(engine, build) if build is builds[0] and not build.order else None}
-            for build, end in zip(builds, ends, strict=True)
+            for build, fields in zip(builds, drawn, strict=True)
         ],
         "responses": RESPONSES,
         "scatter": None if scatter is None else scatter.data(),
@@ -388,7 +441,7 @@ def _tasks(engine: Engine, build: Build) -> dict[str, str]:
     """
     return {
         kind: b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode("ascii")
-        for kind, text in _task_texts(engine.network.scene, build.steps).items()
+        for kind, text in (build.tasks or _task_texts(engine.network.scene, build.steps)).items()
     }
 
 

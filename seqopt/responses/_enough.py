@@ -134,7 +134,7 @@ def _off(within: LinearRange, builds: Mapping[str, _Columns]) -> str:
     every = [*chain.from_iterable(held.values())]
     if is_tied(within.engine, every):  # then none may be off, and the rest need not be asked
         return ""
-    found = each_tolerance(within.engine, every)
+    found = each_tolerance(within.engine, every, within.offs)
     at = int(found.argmin())
     if not 0 < found[at] < np.inf:
         return ""

@@ -23,7 +23,7 @@ from seqopt.errors import ProblemError
 from seqopt.network.network import Network
 from seqopt.responses._worst_direction import proven_rates, worst_misplacement, worst_rates
 from seqopt.responses.quantities import NO_TOLERANCE, TOLERANCE, length_text
-from seqopt.responses.table import _Columns, _grips_of, _Held
+from seqopt.responses.table import _Columns, _grips_of, _Held, _Key
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 
@@ -256,23 +256,23 @@ def is_tied(engine: Engine, steps: Sequence[_Held]) -> bool:
     return any(bool(_tied(engine, bricks, np.array([held]))[0]) for bricks, held in several)
 
 
-def each_tolerance(engine: Engine, steps: Sequence[_Held]) -> Floats:
+def each_tolerance(
+    engine: Engine, steps: Sequence[_Held], known: dict[_Key, float] | None = None
+) -> Floats:
     """Return how far grips may be off in every step, m.
 
-    All steps with as many grips are asked at once, equal ones once.
+    All steps with as many grips are asked at once, equal ones once. ``known``: by bricks and what
+    is held; what is found is added.
     """
-    asked: dict[tuple[int, int, tuple[int, ...]], list[int]] = {}
-    for place, (_, bricks, held) in enumerate(steps):
-        asked.setdefault((len(held), bricks, held), []).append(place)
-    out = np.full(len(steps), np.inf)
-    for count, same in groupby(sorted(asked), key=itemgetter(0)):
+    known = {} if known is None else known
+    new = {(len(held), bricks, held) for _, bricks, held in steps if (bricks, held) not in known}
+    for count, same in groupby(sorted(new), key=itemgetter(0)):
         mine = [*same]
         found = _misfits_of(engine, mine) if count else np.zeros(len(mine))
-        for key, misfit in zip(mine, found.tolist(), strict=True):
-            out[asked[key]] = (
-                np.inf if misfit == 0 else 0.0 if misfit >= NO_TOLERANCE else 1 / misfit
-            )
-    return out
+        for (_, bricks, held), misfit in zip(mine, found.tolist(), strict=True):
+            off = np.inf if misfit == 0 else 0.0 if misfit >= NO_TOLERANCE else 1 / misfit
+            known[bricks, held] = off
+    return np.array([known[bricks, held] for _, bricks, held in steps], dtype=float)
 
 
 def _misfits_of(engine: Engine, keys: Sequence[tuple[int, int, tuple[int, ...]]]) -> Floats:

@@ -76,7 +76,8 @@ class LinearRange:
     """Finds the steps of builds in which an engine's results leave the linear range.
 
     ``engine``: which one; ``mortar``: whose elastic limits count; ``unchecked``: why stresses in
-    joints are not checked, if they should be: in a line, or none.
+    joints are not checked, if they should be: in a line, or none; ``offs``: how far grips may be
+    off, m, of states of which that was asked.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -84,6 +85,7 @@ class LinearRange:
         self._breaks = isinstance(engine, ChoosingEngine | OpeningEngine)
         self._engine = engine.rigid if isinstance(engine, ChoosingEngine) else engine
         self._known: dict[_Key, Floats] = {}
+        self.offs: dict[_Key, float] = {}
         thickness = engine.network.springs.thickness
         self._thickness = np.where(np.isnan(thickness) | self._breaks, np.inf, thickness)
         self.unchecked: tuple[str, ...] = ()

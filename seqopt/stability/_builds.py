@@ -10,15 +10,12 @@ from itertools import chain, groupby
 from operator import attrgetter
 
 import numpy as np
-import pandas as pd
 
-from seqopt._files import csv_text
 from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.mortar import DRY, EPOXY, Mortar, _is_as_strong, _with_mortar
 from seqopt.errors import SceneError
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.steps import Grips, Step
 from seqopt.stability._ahead import SharedVerdicts, quick_verdicts
 from seqopt.stability._screens import OPEN, STANDS, Screen
@@ -121,16 +118,10 @@ class BuildProver:
         """Whether it is asked of any mortar what stands."""
         return bool(self._mortars)
 
-    def of_tables(self, tables: Mapping[str, pd.DataFrame]) -> dict[str, tuple[BuildVerdicts, ...]]:
-        """Return the verdicts of builds by their tables of responses, one for every mortar."""
-        scene = self._network.scene
-        builds = {name: parse_plan(scene, csv_text(table), name) for name, table in tables.items()}
-        return self.of_builds(builds)
-
     def of_builds(
         self, builds: Mapping[str, Sequence[Step]]
     ) -> dict[str, tuple[BuildVerdicts, ...]]:
-        """Return the same by their steps."""
+        """Return the verdicts of builds by their steps, one for every mortar."""
         return {
             build: tuple(self._of_build(steps, name) for name in self._mortars)
             for build, steps in builds.items()

@@ -193,7 +193,7 @@ def test_a_step_that_falls_with_the_own_mortar_is_marked(flat, builds):
     engine, steps = seqopt.make_engine("compliance", flat), builds["cantilever"]
     table = analyze(engine, steps)
     for mortars, marked in (({"dry": SHOWN["dry"]}, True), (SHOWN, False), ({}, False)):
-        stands = BuildProver(flat, mortars).of_tables({"a": table}).get("a", ())
+        stands = BuildProver(flat, mortars).of_builds({"a": steps}).get("a", ())
         data = _build_data(engine, Build("a", steps, table, stands), fields=False)
         assert ("falls dry" in data["marks"][3]) == marked
         assert len(data["stands"]) == len(steps) * bool(mortars)

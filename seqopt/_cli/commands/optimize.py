@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -290,12 +290,15 @@ def answered(options: argparse.Namespace, found: Found) -> Answer:
         tables = partial(_plan_files, found.plan, choices=choices)
         made = found.clock.spare("its tables", tables, made)
     _ = found.verdicts, found.trial
-    return _answer(options, found, write_outputs(options, lambda: _files(options, found) | made))
+    return _answer(options, found, write_outputs(options, lambda: _files(options, found, made)))
 
 
-def _files(options: argparse.Namespace, found: Found) -> dict[str, bytes | str]:
-    """Return the files of a plan by name, its tables and tasks aside; at least what it is alone."""
+def _files(
+    options: argparse.Namespace, found: Found, tables: Mapping[str, bytes | str]
+) -> dict[str, bytes | str]:
+    """Return the files of a plan by name, with its tables and tasks; at least what it is alone."""
     plan, outer, made = found.plan, found.bases or found.props, dict[str, bytes | str]()
+    tasks = {kind: str(tables[f"tasks.{kind}"]) for kind in ("csv", "json") if tables}
     asked: dict[str, Callable[[], str | bytes]] = {}
     if getattr(options, "policy", False):
         from seqopt.plan.policy import FILE, find_policy  # noqa: PLC0415  # few ask for one
@@ -304,7 +307,7 @@ def _files(options: argparse.Namespace, found: Found) -> dict[str, bytes | str]:
     if found.analyzed:
         from seqopt.report._pages import plan_page  # noqa: PLC0415  # only where files are written
 
-        asked[PAGE] = lambda: plan_page(plan, found.prover)
+        asked[PAGE] = lambda: plan_page(plan, found.prover, tasks=tasks)
     for name, make in asked.items():
         content = found.clock.spare(name, make, None)
         made |= {} if content is None else {name: content}
@@ -316,7 +319,7 @@ def _files(options: argparse.Namespace, found: Found) -> dict[str, bytes | str]:
     if rows := trace_rows(plan.trace):
         made["trace.csv"] = csv_text(pd.DataFrame(rows))
     table = plan.responses() if found.analyzed else _steps_table(plan)
-    return {**_bare_files(plan, table, found.report), **made}
+    return {**_bare_files(plan, table, found.report), **made, **tables}
 
 
 def _from_empty(whole: Problem | None, plan: Plan, choose: Callable[[Problem], Plan]) -> str:

@@ -8,10 +8,15 @@
 'step,type,bricks,placed,rob1_node,rob1_b'
 """
 
+from typing import TYPE_CHECKING
+
+from seqopt._later import later
 from seqopt.sequence.exports._grip_frames import hold
 from seqopt.sequence.exports._tables import BlockState, step_states
 from seqopt.sequence.exports._tasks import Action, Task, plan_tasks
-from seqopt.sequence.exports.formats import EXPORTS, LOST, export_plan, read_folder
+
+if TYPE_CHECKING:
+    from seqopt.sequence.exports.formats import EXPORTS, LOST, export_plan, read_folder
 
 __all__ = [
     "EXPORTS",
@@ -25,3 +30,6 @@ __all__ = [
     "read_folder",
     "step_states",
 ]
+__getattr__, __dir__ = later(
+    __name__, dict.fromkeys(("EXPORTS", "LOST", "export_plan", "read_folder"), "formats")
+)
