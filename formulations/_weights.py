@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.optimize import linprog
 
 from seqopt.arrays import Floats
 from seqopt.errors import SolverError
@@ -84,6 +83,8 @@ def provers(choices: _Weighable, weighed: Weighed) -> Floats:
 
 def _highest(totals: Floats, most: float) -> tuple[Floats, float]:
     """Return the weights at which the lowest plane of totals (n, S) is highest, and its height."""
+    from scipy.optimize import linprog  # noqa: PLC0415  # slow to import, for scenarios only
+
     planes, count = totals.shape
     size = float(np.abs(totals).max()) or 1.0
     found = linprog(

@@ -69,6 +69,26 @@ def test_importing_the_door_loads_none_of_its_rooms():
     assert done.stdout.split() == []
 
 
+FREE = ["optimize", "chain:bricks=7", "--schedule", "free", "--quiet"]
+
+
+def loaded_by_command(*words):
+    """Return which libraries a command has loaded that wait until they are asked for."""
+    late = ("pandas.core", "scipy.optimize", "seqopt.scene.imports.formats")
+    code = (
+        f"import sys\nfrom seqopt._cli.main import load, main\nload({words})\n"
+        f"assert main({words}) == 0\n"
+        f"print()\nprint(*[name for name in {late} if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return done.stdout.splitlines()[-1].split()
+
+
+def test_a_free_plan_loads_no_tables_and_no_programs(tmp_path):
+    assert loaded_by_command(*FREE) == []
+    assert loaded_by_command(*FREE, "--out", str(tmp_path / "out")) == ["pandas.core"]
+
+
 @pytest.mark.slow
 def test_a_heavy_import_is_seen():
     assert loaded_by("import seqopt.report.charts") == ["matplotlib"]

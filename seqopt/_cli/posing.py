@@ -235,12 +235,16 @@ def _asked_aim(options: argparse.Namespace) -> RobustAim:
         raise ProblemError(f"--robust: {error}") from error
 
 
-def _asked_scenarios(options: argparse.Namespace, scene: Scene) -> tuple[Scenarios, Scenarios]:
-    """Return the scenarios to choose by, and those of the next seed that judge."""
+def _asked_scenarios(
+    options: argparse.Namespace, scene: Scene
+) -> tuple[Scenarios, Scenarios | None]:
+    """Return the scenarios to choose by, and those of the next seed that judge if any are to."""
     count = count_word(options.scenarios, "--scenarios", MOST, usual=COUNT)
-    other = count_word(options.unseen, "--unseen", MOST, usual=count)
-    seed = count_word(options.seed, "--seed", MOST, least=0)
-    return _drawn(scene, options, count, seed), _drawn(scene, options, other, seed + 1)
+    seed, other = count_word(options.seed, "--seed", MOST, least=0), None
+    if options.unseen is not None:
+        other = count_word(options.unseen, "--unseen", MOST)
+    known = _drawn(scene, options, count, seed)
+    return known, None if other is None else _drawn(scene, options, other, seed + 1)
 
 
 def _drawn(scene: Scene, options: argparse.Namespace, count: int, seed: int) -> Scenarios:

@@ -14,7 +14,6 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-import pandas as pd
 
 from seqopt.errors import SolverError, StepError
 from seqopt.graph._counted import least_by_counts
@@ -31,9 +30,9 @@ from seqopt.judge.certificate import Certificate
 from seqopt.problem.problem import LARGEST, Goal, Measure
 from seqopt.problem.standing import _size, slack
 from seqopt.responses._props import EXCESS_COLUMN
-from seqopt.responses._tolerance import is_tolerance, misfits_along, with_tolerances
+from seqopt.responses._tolerance import COLUMN, is_tolerance, misfits_along, tolerances_along
 from seqopt.responses.quantities import CHOSEN_BY, PROP_EXCESS
-from seqopt.responses.table import analyze, force_column
+from seqopt.responses.table import _analyzed, _Columns, force_column
 from seqopt.sequence._rule_check import check_carried, check_free
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind
@@ -232,7 +231,7 @@ def plan_values(
         return _in_all(problem, steps, [plan_values(each, steps, claimed) for each in problem.each])
     check_props(problem.engine, steps)
     check_shape(problem.engine, steps, problem.limits)
-    columns = _state_columns(problem, steps, analyze(problem.engine, steps))
+    columns = _state_columns(problem, steps, _analyzed(problem.engine, steps))
     _require_limits(problem, columns)
     margins = _margins(problem, steps)
     regrips = sum(step.kind is StepKind.REPOSITION for step in steps)
@@ -289,20 +288,24 @@ def _margins(problem: States, steps: Sequence[Step]) -> Mapping[str, float]:
 
 
 def _state_columns(
-    problem: States, steps: Sequence[Step], table: pd.DataFrame
+    problem: States, steps: Sequence[Step], table: _Columns
 ) -> Mapping[str, np.ndarray]:
-    """Return responses (n,) by name, SI units, of a table of `seqopt.analyze`."""
-    forces = table[[force_column(robot) for robot in problem.network.scene.robots]].abs()
-    out = {LARGEST: forces.max(axis=1).fillna(0.0).to_numpy(float)}
+    """Return responses (n,) by name, SI units, of the columns of `seqopt.analyze`."""
+
+    def column(name: str) -> np.ndarray:
+        return np.asarray(table[name], dtype=float)
+
+    forces = [column(force_column(robot)) for robot in problem.network.scene.robots]
+    out = {LARGEST: np.nan_to_num(np.fmax.reduce(np.abs(forces)))}
     for name in problem.named:
         if name == "C_max":
-            out[name] = np.maximum(0.0, -table["F_min_N"].to_numpy(float))
+            out[name] = np.maximum(0.0, -column("F_min_N"))
         elif name == PROP_EXCESS:
-            out[name] = table[EXCESS_COLUMN].to_numpy(float)
+            out[name] = column(EXCESS_COLUMN)
         elif is_tolerance(name):
-            out[name] = misfits_along(with_tolerances(problem.engine, steps, table, name))
+            out[name] = misfits_along({COLUMN: tolerances_along(problem.engine, steps, name)})
         elif name != LARGEST:
-            out[name] = table[CHOSEN_BY[name].column].to_numpy(float) / CHOSEN_BY[name].scale
+            out[name] = column(CHOSEN_BY[name].column) / CHOSEN_BY[name].scale
     return out
 
 

@@ -28,7 +28,7 @@ from seqopt.responses.quantities import (
     length_text,
     robot_response,
 )
-from seqopt.responses.table import _Columns, _steps_in_table, analyze, force_column
+from seqopt.responses.table import _analyzed, _Columns, _steps_in_table, force_column
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence._carrying import carried, loads
@@ -151,7 +151,7 @@ class SceneFacts:
         network = engine.network
         for method in METHODS.values():
             with suppress(StepError, MechanismError):
-                table = analyze(engine, method(network))
+                table = _analyzed(engine, method(network))
                 along = ((name, _response_along(network.scene, table, name)) for name in SCALED)
                 found.append({name: float(np.nanmax(values)) for name, values in along})
         return found

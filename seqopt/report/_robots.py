@@ -34,19 +34,23 @@ _FOLDED = ((0.75, -0.45), (0.35, 0.1), (0.2, 0.1))  # elbow, wrist, tip: up and 
 
 Arms = Mapping[str, Sequence[Floats | PosedArm | None]]
 """Points of arms, (k, 3), m, or arms in postures, by robots' names: an entry for every step."""
+Sketches = dict[tuple[str, int | None], Floats]  # points of arms (k, 3), m
 
 
 class Cell:
     """Where the robots of a scene stand, and how they hold nodes.
 
-    ``arms``: lines that are known; the others are sketched.
+    ``arms``: lines that are known; the others are sketched. ``sketched``: those that were before,
+    by robot and node; more are added.
     """
 
-    def __init__(self, scene: Scene, arms: Arms | None = None) -> None:
+    def __init__(
+        self, scene: Scene, arms: Arms | None = None, sketched: Sketches | None = None
+    ) -> None:
         self.scene, self._arms = scene, arms or {}
         self.up = np.array(scene.up)
         self.corners = np.vstack([vertices_of(brick)[0] for brick in scene.bricks])
-        self._found: dict[tuple[str, int | None], Floats] = {}
+        self._found: Sketches = {} if sketched is None else sketched
 
     @cached_property
     def level(self) -> float:
@@ -254,22 +258,23 @@ def _require_arms(scene: Scene, steps: Sequence[Step], given: Arms) -> None:
             )
 
 
-def arm_data(scene: Scene, steps: Sequence[Step], given: Arms) -> dict[str, object]:
+def arm_data(
+    scene: Scene, steps: Sequence[Step], given: Arms, sketched: Sketches | None = None
+) -> dict[str, object]:
     """Return the arms of robots in every step, ready for JSON.
 
     ``lines`` are points, each line once; ``at`` has a row for every step with the place of each
-    robot's among them, or -1.
+    robot's among them, or -1. ``sketched``: as of `Cell`.
     """
     _require_arms(scene, steps, given)
-    cell, places = Cell(scene, given), dict[str, int]()
+    cell, places, known = Cell(scene, given, sketched), dict[str, int](), {id(None): -1}
     lines, at = list[object](), list[list[int]]()
     for s, step in enumerate(steps):
-        row = []
-        for arm in cell.arms(step, s):
-            line = None if arm is None else _line(arm).round(4).tolist()
-            if line is not None and (key := str(line)) not in places:
-                places[key] = len(lines)
-                lines.append(line)
-            row.append(-1 if line is None else places[str(line)])
-        at.append(row)
+        row = cell.arms(step, s)
+        for arm in row:
+            if id(arm) not in known and arm is not None:
+                line = _line(arm).round(4).tolist()
+                known[id(arm)] = places.setdefault(str(line), len(lines))
+                lines += [line] * (len(places) - len(lines))
+        at.append([known[id(arm)] for arm in row])
     return {"lines": lines, "at": at}

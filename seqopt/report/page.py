@@ -29,7 +29,7 @@ from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, _prop_faults, overloads
-from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, arm_data
+from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, Sketches, arm_data
 from seqopt.report.text import _deciding_step, _far_off, _in_a_sentence, _robot_words, in_words
 from seqopt.responses._tolerance import each_tolerance, held_in_steps, is_linear
 from seqopt.responses.quantities import _number_text
@@ -211,11 +211,13 @@ def _carried(network: Network) -> list[list[int]]:
 class _Asked(NamedTuple):
     """What was asked of states of builds so far, by bricks and what is held; who holds.
 
-    ``offs``: how far grips may be off, m; ``fields``: of bricks, edges and ground ends.
+    ``offs``: how far grips may be off, m; ``fields``: of bricks, edges and ground ends;
+    ``sketched``: arms, by robot and node.
     """
 
     offs: dict[_Key, float]
     fields: dict[tuple[int, Grips], Fields]
+    sketched: Sketches
 
 
 def _build_data(
@@ -227,7 +229,7 @@ def _build_data(
     fields ``twist``, ``edge``, ``push`` and ``turn`` (force and moment of every ground end) have
     the ``scale`` of each step, or are None. ``known``: what was asked before.
     """
-    known = _Asked({}, {}) if known is None else known
+    known = _Asked({}, {}, {}) if known is None else known
     lines = [line.split(",") for line in csv_text(build.table).splitlines()]
     scene, off = engine.network.scene, _grips_off(engine, build, known.offs)
     own = scene.build_order
@@ -247,7 +249,7 @@ def _build_data(
         "sentence": build.sentence(scene, off),
         "words": in_words(build.name),
         "off": [] if off is None else [_off_said(far) for far in off.tolist()],
-        "arms": arm_data(scene, build.steps, build.arms),
+        "arms": arm_data(scene, build.steps, build.arms, known.sketched),
         "steps": [
             {
                 "number": step.number,
@@ -419,7 +421,7 @@ def _data(
     numbers = 6 * len(network.inner) + len(network.edge_nodes)  # of the fields of a step
     ends = np.cumsum([numbers * len(build.steps) for build in builds])
     drawn = [bool(end <= MOST) and not b.order for b, end in zip(builds, ends, strict=True)]
-    known = _Asked({} if offs is None else offs, {})
+    known = _Asked({} if offs is None else offs, {}, {})
     _ask_all(engine, builds, known, [*compress(builds, drawn)])
     return {
         "structure": _structure_data(network),

@@ -327,12 +327,16 @@ def stiffness_for(engine: Engine, steps: Sequence[Step], distance: float) -> flo
 COLUMN = "tolerance_mm"
 
 
+def tolerances_along(engine: Engine, steps: Sequence[Step], name: str = TOLERANCE) -> list[float]:
+    """Return how far the grips of steps may be off, mm, by a tolerance's name."""
+    return [1e3 * step_tolerance(engine, step, allowed_by(name)).distance for step in steps]
+
+
 def with_tolerances(
     engine: Engine, steps: Sequence[Step], table: pd.DataFrame, name: str = TOLERANCE
 ) -> pd.DataFrame:
-    """Return a table of steps with how far their grips may be off, mm, by a tolerance's name."""
-    found = [step_tolerance(engine, step, allowed_by(name)).distance for step in steps]
-    return table.assign(**{COLUMN: 1e3 * np.array(found)})
+    """Return a table of steps with that beside their responses."""
+    return table.assign(**{COLUMN: tolerances_along(engine, steps, name)})
 
 
 def tolerance_table(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:

@@ -330,11 +330,16 @@ def analyze(engine: Engine, steps: Sequence[Step]) -> pd.DataFrame:
     >>> numbers.loc[48, ["step", "M_sup_Nm", "M_sup_1_Nm", "M_sup_25_Nm"]].tolist()
     [49.0, 6.5, 0.8, 6.5]
     """
+    return _table_of(_analyzed(engine, steps))
+
+
+def _analyzed(engine: Engine, steps: Sequence[Step]) -> dict[str, list[object]]:
+    """Return the columns of `analyze`, with None where a robot does not grip."""
     if not isinstance(getattr(engine, "network", None), Network):
         kind = type(engine).__name__
         raise SceneError(f"a {kind} is not an engine; give make_engine('compliance', network)")
     steps = require_steps(steps)
-    return response_table(engine.network, zip(steps, _each_fields(engine, steps), strict=True))
+    return _response_columns(engine.network, zip(steps, _each_fields(engine, steps), strict=True))
 
 
 def _analyze_builds(engine: Engine, builds: Sequence[Sequence[Step]]) -> list[pd.DataFrame]:

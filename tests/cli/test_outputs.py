@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import os
 import stat
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
 from seqopt._cli.main import main
+from seqopt.contact.mortar import DRY, EPOXY
+from seqopt.responses import _tolerance
+from seqopt.stability import _builds
 
 PLAN = "step,type,bricks,rob1_node,rob2_node,rob3_node\n1,place,1,1,,\n"
 
@@ -68,3 +72,30 @@ def test_a_failure_makes_no_folder(capsys, tmp_path):
     words = ("optimize", "--formulation", "overlap_dp", "--limit", "F_largest=9")
     assert main([*words, "--out", str(tmp_path / "new" / "out")]) != 0
     assert not list(tmp_path.iterdir())
+
+
+def test_what_a_line_says_is_not_asked_again_for_the_page(monkeypatch, tmp_path):
+    """Tolerances and verdicts of states, and what robots do, are found once for line and page."""
+    asked, tasks = Counter(), []
+    misfits, verdicts = _tolerance._misfits_of, _builds._one_by_one
+
+    def each(engine, keys):
+        asked.update(("off", bricks, held) for _, bricks, held in keys)
+        return misfits(engine, keys)
+
+    def proven(parts, steps, mortar, tell=None):
+        asked.update((mortar, step.bricks, step.grips) for step in steps)
+        return verdicts(parts, steps, mortar, tell)
+
+    for module in ("_cli.outputs", "report.page"):
+        monkeypatch.setattr(
+            f"seqopt.{module}.tasks_csv", lambda _: tasks.append(1) or "", raising=False
+        )
+    monkeypatch.setattr("seqopt.sequence.exports._tasks.tasks_csv", lambda _: tasks.append(1) or "")
+    monkeypatch.setattr(_tolerance, "_misfits_of", each)
+    monkeypatch.setattr(_builds, "_one_by_one", proven)
+    asked_for = ["optimize", "chain:bricks=7", "--schedule", "free", "--out", str(tmp_path / "out")]
+    assert main([*asked_for, "--quiet"]) == 0
+    assert {kind for kind, *_ in asked} == {"off", DRY, EPOXY}
+    assert {*asked.values()} == {1}
+    assert len(tasks) == 1

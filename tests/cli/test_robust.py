@@ -65,6 +65,22 @@ def test_a_plan_over_scenarios_is_written(capsys, tmp_path, scene, aim):
     assert len(pd.read_csv(folder / "selection.csv")) > 0
 
 
+@pytest.mark.parametrize("more", [(), ("--schedule", "free")])
+def test_other_scenarios_judge_only_where_that_is_asked(capsys, tmp_path, scene, monkeypatch, more):
+    for name in ("judge_unseen", "worst_values"):
+        home = f"seqopt.plan.out_of_sample.{name}"
+        monkeypatch.setattr(home, lambda *_, name=name: pytest.fail(name))
+    words = ("--robust", "worst-peak", "--scenarios", "2", "--vary", "position=0", *more)
+    status, out, _ = optimize(capsys, tmp_path, scene, *words)
+    assert status == 0
+    assert ("over 2 scenarios (worst-peak)" in out) == (not more)
+    assert "unseen" not in out
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["scenarios"]["count"] == 2
+    assert "unseen" not in summary
+    assert not (tmp_path / "out" / "scenarios.csv").exists()
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -224,9 +224,11 @@ class Found:
         out |= {"left_out": dict(self.clock.left_out)} if self.clock.left_out else {}
         out |= {} if self.props is None else {"fewest_props": self.props.described()}
         known, unseen = self.asked.known, self.asked.unseen
-        if known is None or unseen is None:
+        if known is None:
             return out
         out |= {"robust": str(self.asked.aim), "scenarios": known.settings}
+        if unseen is None:
+            return out
         if self.trial is not None:
             return out | {"unseen": unseen.settings, "worth": self.trial.summary()}
         worst = None
@@ -480,13 +482,15 @@ def _value(found: Found) -> str:
     if plan.order is not None:
         values = ", ".join(f"{name} {value_text(name, v)}" for name, v in plan.objective.items())
         return f"{values}, {plan.status}, {plan.order.bound_said}"
-    if found.trial is not None:
-        unseen = found.trial.summary()["unseen"]
-        return (
-            f"{plan._value} over {len(found.trial.known)} scenarios ({plan.title}); over "
-            f"unseen ones {unseen['robust']:.6g}, the nominal plan {unseen['nominal']:.6g}"
-        )
-    return plan._value
+    known = found.asked.known
+    if known is None or isinstance(plan.graph, States):
+        return plan._value
+    value = f"{plan._value} over {len(known.scenes)} scenarios ({plan.title})"
+    if found.trial is None:
+        return value
+    unseen = found.trial.summary()["unseen"]
+    others = f"{unseen['robust']:.6g}, the nominal plan {unseen['nominal']:.6g}"
+    return f"{value}; over unseen ones {others}"
 
 
 def _search(plan: Plan) -> str:

@@ -37,7 +37,8 @@ ROBUST = {
     "--formulation: worst-peak (the largest cost of any step), worst-total (the largest total), or "
     "cvar=0.9 (the mean total of the worst tenth)",
     "--scenarios N": "how many samples of the scene (default: 30)",
-    "--unseen N": "how many other samples, of the next seed, judge the plan (default: as many)",
+    "--unseen N": "how many other samples, of the next seed, judge the plan (default: none; as "
+    "many as there are scenarios double the time)",
     "--seed N": "which samples are drawn (default: 0)",
     "--vary NAME=VALUE ...": "how far samples are from the scene: stiffness=3 (of each joint, by a "
     "factor up to it, up or down), density=0.1 (of each brick, up to this share), position=0.002 "
