@@ -217,7 +217,7 @@ def test_optimize(capsys, tmp_path):
     folder = tmp_path / "new" / "out"
     arguments = ("optimize", "--formulation", "overlap_dp", "--out", str(folder), "--tables", "all")
     status, out, _ = run(capsys, *arguments)
-    assert (status, out.count("\n")) == (0, 3)
+    assert (status, out.count("\n")) == (0, 4)
     report = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert report["status"] == "optimal"
     assert report["gap"] == pytest.approx(0)
@@ -382,7 +382,7 @@ def test_optimize_without_proof(capsys, tmp_path):
         ("without", ("--no-proof", "--tables", "all")),
     ):
         status, out, _ = run(capsys, "optimize", *chosen, *words, "--out", str(tmp_path / folder))
-        assert (status, out.count("\n")) == (0, 1)
+        assert (status, out.count("\n")) == (0, 2)
         assert ("not compared with the optimum" in out) == (folder == "without")
     plans = [pd.read_csv(tmp_path / name / "plan.csv") for name in ("with", "without")]
     pd.testing.assert_frame_equal(*plans)
@@ -590,8 +590,10 @@ def test_the_command_line_says_why(capsys):
     said = capsys.readouterr().err
     assert "engine: compliance for 49 grip sets: brick 11: its centroid lies 65.2 mm" in said
     dry = ["analyze", "--method", "sequential", "--engine", "auto", "--mortar", "dry"]
-    assert main(dry) == 3
-    assert "step 9: 5 bricks: joints open or slip and brick" in capsys.readouterr().err
+    assert main(dry) == 4  # some steps are mechanisms, of others it is not known
+    said = capsys.readouterr().err
+    assert "step 9: 5 bricks: joints open or slip and brick" in said
+    assert "neither came to rest nor became unstable" in said
     assert main(["analyze", "--method", "sequential", "--engine", "planar"]) == 2
     assert "use the compliance engine" in capsys.readouterr().err
     assert main(["analyze", "--method", "sequential", "--mortar", "dry"]) == 2

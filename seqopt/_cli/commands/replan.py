@@ -155,7 +155,7 @@ def _as_optimize(options: argparse.Namespace, scene_file: Path) -> argparse.Name
     """Return what is asked, as words of ``optimize`` that go on from the step."""
     words = ["optimize", str(scene_file), "--schedule", FREE]
     base = parser("optimize").parse_args(words)
-    told = _told(options.plan)
+    told = _told(options.plan, lost=bool(options.lost))
     for name, value in vars(options).items():
         usual = told.get(name) if name in ASKED and not value else None
         setattr(base, name, usual or value)
@@ -170,8 +170,11 @@ def _as_optimize(options: argparse.Namespace, scene_file: Path) -> argparse.Name
     return base
 
 
-def _told(folder: Path) -> dict[str, Any]:
-    """Return what was asked of a plan, as words, as far as words say it."""
+def _told(folder: Path, *, lost: bool) -> dict[str, Any]:
+    """Return what was asked of a plan, as words, as far as words say it.
+
+    ``lost``: whether fewer robots take part from now on, for which the default is another one.
+    """
     try:
         told = parse_json(read_text(folder / "summary.json"), "summary")
     except FileError:
@@ -179,8 +182,8 @@ def _told(folder: Path) -> dict[str, Any]:
     if not isinstance(told, dict) or told.get("schedule") != FREE:
         return {}
     rules, limits = (_texts(told.get(name)) for name in ("rules", "limits"))
-    if rules.get("least_grips") == _usual_of(told.get("rules")):
-        del rules["least_grips"]  # of fewer robots it may be another
+    if lost and rules.get("least_grips") == _usual_of(told.get("rules")):
+        del rules["least_grips"]
     names = ("least_grips", "newest", "payload", "regrips", "ending", "candidates")
     criterion, aims = told.get("criterion"), told.get("aims")
     return {
