@@ -84,7 +84,9 @@ def asked_engine(options: argparse.Namespace, network: Network) -> Engine:
     mortar = None if options.mortar is None else mortar_word(options.mortar, "--mortar")
     of_verdicts = options.engine not in LIMITED and not getattr(options, "no_stability", True)
     if options.engine is None:
-        return simplest(make_engine(DEFAULT, network, None if of_verdicts else mortar))
+        engine = make_engine(DEFAULT, network, None if of_verdicts else mortar)
+        # with a mortar of its own an engine is asked where joints open: set by set
+        return simplest(engine) if of_verdicts or mortar is None else engine
     try:
         return make_engine(options.engine, network, None if of_verdicts else mortar)
     except SceneError as error:
