@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import os
 import stat
 import tempfile
@@ -141,9 +142,23 @@ def csv_text(table: pd.DataFrame, digits: int = 6) -> str:
     return str(safe.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n"))
 
 
-def write_csv(path: Path, table: pd.DataFrame) -> None:
-    """Write a table as a CSV file, as `csv_text` and `write_bytes` do."""
-    write_text(path, csv_text(table))
+def rows_text(rows: Sequence[Mapping[str, object]], digits: int = 6) -> str:
+    """Return rows with the same columns as `csv_text` does a table: without pandas, which is slow.
+
+    >>> rows_text([{"step": 1, "brick": "=a", "tilt": 2 / 3}]).splitlines()
+    ['step,brick,tilt', "1,'=a,0.666667"]
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([harmless(name) for name in rows[0]] if rows else [])
+    writer.writerows([_cell(value, digits) for value in row.values()] for row in rows)
+    return text.getvalue()
+
+
+def _cell(value: object, digits: int) -> object:
+    if isinstance(value, float):
+        return "" if math.isnan(value) else f"{value:.{digits}g}"
+    return "" if value is None else harmless(value) if isinstance(value, str) else value
 
 
 def write_bytes(path: Path, content: bytes | str) -> None:

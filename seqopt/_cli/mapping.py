@@ -24,14 +24,6 @@ from seqopt.scene._counts import scene_of_bricks
 from seqopt.scene.scene import Scene, in_order
 from seqopt.stability.failure_map import FailureMap, _brick_map, failure_map
 
-MAP = {
-    "--map AXIS": "map where builds fail, over what holds their joints and over friction, tilt "
-    "(degrees) or bricks, with values of your own as tilt=0,2,5; of the fixed methods, a loop and "
-    "a free schedule, or of --method or --plan alone; bricks: of how many a scene in words is "
-    "built, else how many are placed",
-    "--holds NAMES": "with --map: what holds the joints, of dry, bond=STRENGTH (Pa) and epoxy, "
-    "with commas between them (default: dry,epoxy)",
-}
 BRICKS = "bricks"
 WAYS = ("friction", "tilt")
 SHARES = (0.5, 0.75, 1.0, 1.25, 1.5)  # of the bricks of a scene, by default

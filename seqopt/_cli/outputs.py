@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from seqopt._cli.words.given import is_folder
-from seqopt._files import csv_text, require_apart, require_folder, write_csv, write_folder
+from seqopt._files import (
+    csv_text,
+    require_apart,
+    require_folder,
+    rows_text,
+    write_folder,
+    write_text,
+)
 from seqopt._showing import PAGE
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.states.states import States
@@ -173,11 +180,14 @@ def _plain(value: object) -> Any:
     return json.loads(json.dumps(value), parse_constant=lambda _: None)
 
 
-def put_table(path: Path | None, table: pd.DataFrame, said: str) -> dict[str, Any]:
+def put_table(
+    path: Path | None, table: pd.DataFrame | Sequence[Mapping[str, object]], said: str
+) -> dict[str, Any]:
     """Write a table, and return what an answer says of it: without a file it is the data."""
+    text = rows_text(table) if isinstance(table, Sequence) else csv_text(table)
     if path is None:
-        return {"data": csv_text(table)}
-    write_csv(path, table)
+        return {"data": text}
+    write_text(path, text)
     return {"text": f"{said} written to {path}", "written": (path,)}
 
 

@@ -131,8 +131,9 @@ def assess(
     """
     with _Asked("assess", {"scene": scene, **words}, progress) as options:
         answer = _assess.run(options)
-        table = answer.facts["steps" if options.map is None else "cases"]
-        assert isinstance(table, pd.DataFrame)
+        found = answer.facts["steps" if options.map is None else "cases"]
+        assert isinstance(found, pd.DataFrame | list)
+        table = found if isinstance(found, pd.DataFrame) else pd.DataFrame(found)
         table.attrs["notes"] = [*answer.notes]
         return table
 

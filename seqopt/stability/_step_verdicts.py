@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import pickle
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
-import pandas as pd
 
 from seqopt.contact._partial_assemblies import PartialAssemblies
 from seqopt.contact.assembly import Assembly
@@ -275,26 +274,29 @@ _MARGINS = (
 )  # in the table of `seqopt.stability.steps.stability_table`
 
 
-def format_rows(table: pd.DataFrame) -> str:
-    """Return in a line how many steps stand, fall and are undecided, and what proved it."""
-    found, proofs = Counter(table["verdict"]), Counter(table["proof"])
+def format_rows(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return in a line how many steps stand, fall and are undecided, and what proved it.
+
+    ``rows``: as of `stability_row`.
+    """
+    found, proofs = (Counter(row[name] for row in rows) for name in ("verdict", "proof"))
     words = zip(Verdict, ("stand", "do not stand", "are undecided"), strict=True)
     said = ", ".join(f"{found[verdict.value]} {word}" for verdict, word in words)
-    jammed = [*table["jammed"]].count(True)
+    jammed = sum(bool(row["jammed"]) for row in rows)
     said += f" ({jammed} only jammed: do not trust these)" if jammed else ""
     by = ", ".join(f"{count} by {proof}" for proof, count in proofs.most_common())
-    unproven = int(table["unproven"].sum())
+    unproven = sum(row["unproven"] for row in rows)
     ends = f"; {unproven} cases unproven" if unproven else ""
-    return f"{len(table)} steps: {said}; proven {by}{ends}{''.join(_extremes(table))}"
+    return f"{len(rows)} steps: {said}; proven {by}{ends}{''.join(_extremes(rows))}"
 
 
-def _extremes(table: pd.DataFrame) -> Iterator[str]:
+def _extremes(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Yield the margin of the worst step, of every kind that was found."""
     for column, name, said, scale in _MARGINS:
-        values = table[column].to_numpy(dtype=float)
+        values = np.array([row[column] for row in rows], dtype=float)
         if np.isnan(values).all():
             continue
         worst = int(np.nanargmin(values) if column == _TILT else np.nanargmax(values))
         value = f"{values[worst] * scale:.4g}"
         ends = said.format(value) if np.isfinite(values[worst]) else "no value is enough"
-        yield f"; {name}: {ends} (step {table['step'].iloc[worst]})"
+        yield f"; {name}: {ends} (step {rows[worst]['step']})"

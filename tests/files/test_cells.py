@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from seqopt._files import _FORMULA, csv_text, harmless, plain
+from seqopt._files import _FORMULA, csv_text, harmless, plain, rows_text
 from seqopt.engines.registry import make_engine
 from seqopt.network.build import build_network
 from seqopt.responses.table import analyze
@@ -64,3 +66,22 @@ def is_number(cell):
 def test_numbers_stay_numbers():
     table = pd.DataFrame({"-a": [-1.5, 2.0], "b": ["=1", "x"], "c": [pd.NA, -3]})
     assert csv_text(table) == "'-a,b,c\n-1.5,'=1,\n2,x,-3\n"
+
+
+def test_rows_are_written_as_tables_are():
+    """With and without pandas a table is the same file, byte by byte."""
+    columns = {
+        "step": [1, 2, 10],
+        "type": ["place", 'a "b", c', "x\ny"],
+        "=brick": ["=a", "", "'+1"],
+        "tilt": [2 / 3, 1e-12, -123456789.0],
+        "bond": [math.nan, math.inf, 0.0],
+        "jammed": [False, True, True],
+    }
+    table = pd.DataFrame(columns)
+    assert rows_text(table.to_dict("records")) == csv_text(table)
+    counted = table.assign(share=np.float32(0.1), step=table["step"].astype(np.int64))
+    own = [
+        dict(zip(counted, row, strict=True)) for row in zip(*map(counted.get, counted), strict=True)
+    ]
+    assert rows_text(own) == csv_text(counted)

@@ -21,6 +21,10 @@ def bar(*, on_the_ground=False):
     return Blocks(vertex[None], tuple(Contact((-1, 0), face) for face in faces)).assembly(2000.0)
 
 
+def rows_of(table):
+    return table.to_dict("records")
+
+
 @pytest.mark.parametrize("friction", [1e-3, 0.5])
 def test_a_bar_between_walls_is_marked(friction):
     result = assess(bar(), Mortar(friction=friction))
@@ -30,7 +34,9 @@ def test_a_bar_between_walls_is_marked(friction):
     step = Step(1, StepKind.PLACE, 1, (None,))
     table = stability_table([step], [result])
     assert table["jammed"].tolist() == [True]
-    assert "1 stand, 0 do not stand, 0 are undecided (1 only jammed" in format_rows(table)
+    assert "1 stand, 0 do not stand, 0 are undecided (1 only jammed" in format_rows(
+        table.to_dict("records")
+    )
 
 
 def test_what_its_weight_holds_is_not_marked():
@@ -45,7 +51,7 @@ def test_what_its_weight_holds_is_not_marked():
         result = assess(assembly, mortar)
         assert not result.jammed, name
         table = stability_table([Step(1, StepKind.PLACE, 1, (None,))], [result])
-        assert "jammed" not in format_rows(table)
+        assert "jammed" not in format_rows(rows_of(table))
 
 
 def test_the_worst_margin_of_the_steps_is_said():
@@ -53,10 +59,10 @@ def test_the_worst_margin_of_the_steps_is_said():
     table = stability_table(steps, [assess(bar(on_the_ground=True), DRY)] * 2)
     margins = [name for name, *_ in _MARGINS]
     table[margins] = np.nan
-    assert format_rows(table).endswith("proven 2 by cone program")
+    assert format_rows(rows_of(table)).endswith("proven 2 by cone program")
     table["friction_needed"] = [0.0, 0.25]
-    assert format_rows(table).endswith("; friction: needs 0.25 at most (step 2)")
+    assert format_rows(rows_of(table)).endswith("; friction: needs 0.25 at most (step 2)")
     table["friction_needed"] = [np.inf, 0.25]
     table["tilt_survived_deg"] = [7.0, 3.0]
     said = "; friction: no value is enough (step 1); tilt: survives 3° at least (step 2)"
-    assert format_rows(table).endswith(said)
+    assert format_rows(rows_of(table)).endswith(said)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
@@ -22,7 +23,6 @@ from seqopt._cli.asked import (
     carrying_notes,
     scene_facts,
 )
-from seqopt._cli.mapping import MAP, answer_map
 from seqopt._cli.options import (
     BUILT,
     HOLDS,
@@ -47,7 +47,6 @@ from seqopt.engines.registry import USUAL, make_engine, versions
 from seqopt.errors import FileError, ProblemError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.report._failures import load_page
 from seqopt.responses.quantities import _steps_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.steps import Step
@@ -76,6 +75,8 @@ def answer_load_factor(options: argparse.Namespace) -> Answer:
     said = {name: format_load_factors(steps, found) for name, found in each.items()}
 
     def files() -> dict[str, bytes | str]:
+        from seqopt.report._failures import load_page  # noqa: PLC0415  # only where files are written
+
         engine = make_engine(USUAL, network, None)
         page = load_page(engine, plan_name(options), steps, each, said)
         return {"load_factors.csv": csv_text(table), PAGE: page}
@@ -99,7 +100,7 @@ def answer_load_factor(options: argparse.Namespace) -> Answer:
     )
 
 
-Row = dict[str, object]
+Row = dict[str, Any]
 
 
 class Rows:
@@ -193,6 +194,14 @@ HOW = {
     "between them; each takes several times as long (default: none; with --steps: all)",
     "--steps FROM:TO": "steps of which margins are found, as 40:60 (default: all)",
 }
+MAP = {
+    "--map AXIS": "map where builds fail, over what holds their joints and over friction, tilt "
+    "(degrees) or bricks, with values of your own as tilt=0,2,5; of the fixed methods, a loop and "
+    "a free schedule, or of --method or --plan alone; bricks: of how many a scene in words is "
+    "built, else how many are placed",
+    "--holds NAMES": "with --map: what holds the joints, of dry, bond=STRENGTH (Pa) and epoxy, "
+    "with commas between them (default: dry,epoxy)",
+}
 WORKERS = {"--workers N": "processes to share the steps among (default: 1)"}
 OUT = {"--out FILE": "CSV file to write (default: standard output); with --map a folder"}
 OF_HOLDS = "With --map, --holds says what is in the joints."
@@ -219,6 +228,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> Answer:
     """Assess every step of a sequence, or map builds; tables are written whatever the verdicts."""
     if options.map is not None:
+        from seqopt._cli.mapping import answer_map  # noqa: PLC0415  # for maps only
+
         return answer_map(options)
     if options.load_factor:
         return answer_load_factor(options)
@@ -226,40 +237,42 @@ def run(options: argparse.Namespace) -> Answer:
     scene, mortars = asked_scene(options), asked_mortars(options)
     network = build_network(scene)
     steps = asked_steps(options, network)
-    rows = _found(options, network, steps, mortars)
-    table = pd.DataFrame(rows.rows)
-    went_on = f"kept: {rows.taken_up} of {len(table)} verdicts, found before, from {rows.path}"
-    each = {name: table[table["mortar"] == name] for name in mortars}
+    kept = _found(options, network, steps, mortars)
+    rows = kept.rows
+    went_on = f"kept: {kept.taken_up} of {len(rows)} verdicts, found before, from {kept.path}"
+    each = {name: [row for row in rows if row["mortar"] == name] for name in mortars}
     lines = [f"{_with_mortar(name)}: {format_rows(own)}" for name, own in each.items()]
-    answer = put_table(options.out, table, "\n".join(lines) + ";")
-    rows.done()
-    undecided = table["verdict"] == Verdict.UNDECIDED.value
-    unsure = _steps_in_words([*dict.fromkeys(table["step"][undecided])])
+    answer = put_table(options.out, rows, "\n".join(lines) + ";")
+    kept.done()
+    counts = {name: _counted(own) for name, own in each.items()}
+    undecided = [row["step"] for row in rows if row["verdict"] == Verdict.UNDECIDED.value]
+    unsure = _steps_in_words([*dict.fromkeys(undecided)])
     said = f"{unsure}: undecided; this says nothing about them"
-    falls = (each[[*mortars][-1]]["verdict"] == Verdict.FALLS.value).any()
+    falls = counts[[*mortars][-1]][Verdict.FALLS.value]
     status = Status.DOES_NOT_HOLD if falls else Status.DONE
     return Answer(
         facts={
             "scene": scene_facts(scene),
             "mortar": {name: asdict(mortar) for name, mortar in mortars.items()},
             "versions": versions(),
-            "verdicts": {name: _counted(own) for name, own in each.items()},
-            "steps": table,
+            "verdicts": counts,
+            "steps": rows,
         },
         **answer,
         notes=(
-            *((went_on,) if rows.taken_up else ()),
+            *((went_on,) if kept.taken_up else ()),
             *_settlement_notes(scene),
             *carrying_notes(scene, steps),
         ),
-        failures=(f"seqopt: solver failed: {said}",) if undecided.any() else (),
-        status=Status.FAILED if undecided.any() else status,
+        failures=(f"seqopt: solver failed: {said}",) if undecided else (),
+        status=Status.FAILED if undecided else status,
     )
 
 
-def _counted(table: pd.DataFrame) -> dict[str, int]:
+def _counted(rows: Sequence[Row]) -> dict[str, int]:
     """Return how many steps have each verdict."""
-    return {verdict.value: int((table["verdict"] == verdict.value).sum()) for verdict in Verdict}
+    found = Counter(row["verdict"] for row in rows)
+    return {verdict.value: found[verdict.value] for verdict in Verdict}
 
 
 def _found(
