@@ -170,7 +170,7 @@ def _as_optimize(options: argparse.Namespace, scene_file: Path) -> argparse.Name
     return base
 
 
-def _told(folder: Path, *, lost: bool) -> dict[str, Any]:
+def _told(folder: Path, *, lost: bool = False) -> dict[str, Any]:
     """Return what was asked of a plan, as words, as far as words say it.
 
     ``lost``: whether fewer robots take part from now on, for which the default is another one.
