@@ -90,7 +90,7 @@ def answer_load_factor(options: argparse.Namespace) -> Answer:
     unproven = f"seqopt: solver failed: {_steps_in_words([*dict.fromkeys(unsure)])}: not proven"
     status = Status.DOES_NOT_HOLD if np.any(failing) else Status.DONE
     return Answer(
-        facts={"scene": scene_facts(scene), "versions": versions(), "steps": table},
+        facts={"scene": scene_facts(scene), "versions": versions, "steps": table},
         text="\n".join([*lines, where]) if written else "",
         data="" if written else csv_text(table),
         written=written,
@@ -254,7 +254,7 @@ def run(options: argparse.Namespace) -> Answer:
         facts={
             "scene": scene_facts(scene),
             "mortar": {name: asdict(mortar) for name, mortar in mortars.items()},
-            "versions": versions(),
+            "versions": versions,
             "verdicts": counts,
             "steps": rows,
         },
@@ -284,7 +284,8 @@ def _found(
     """Return the rows of all steps, mortar by mortar; those kept of an earlier run are taken up."""
     margins, at = _asked_margins(options, steps)
     workers = count_word(options.workers, "--workers", MOST_WORKERS, usual=1)
-    asked = dump_scene(network.scene), steps, mortars, margins, at, versions()
+    kept = options.out is not None  # else nobody takes them up
+    asked = (dump_scene(network.scene), steps, mortars, margins, at, versions()) if kept else ()
     rows = Rows(options.out, asked)
     try:
         for before, (name, mortar) in enumerate(mortars.items()):
