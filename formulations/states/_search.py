@@ -293,16 +293,20 @@ def after_margins(problem: States, search: Search, tell: Watching) -> StatePath:
 
 
 def narrow(
-    problem: States, width: int, tell: Watching, most: Sequence[float] | None = None
+    problem: States,
+    width: int,
+    tell: Watching,
+    most: Sequence[float] | None = None,
+    enough: float = -np.inf,
 ) -> StatePath | None:
     """Return the best plan through a few states of every brick count, if there is one.
 
     Where states must stand it is asked of all of them only if the best paths fall; ``most``: what
-    goals may take of it, whether states stand or not.
+    goals may take of it, whether states stand or not; ``enough``: as of `Explorer`.
     """
     for standing in (False, True)[: 1 + bool(problem.demands)]:
         space = FreeStates(problem, regrips=False, standing=standing)
-        found = Explorer(space, width, tell)
+        found = Explorer(space, width, tell, enough)
         with suppress(NothingFoundError):
             if found.rise(np.inf if most is None else most[0]):
                 visited, best = exact_best(found, problem.budgets)

@@ -44,6 +44,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import groupby
+from math import comb
 from operator import itemgetter, le
 
 import numpy as np
@@ -73,6 +74,8 @@ from seqopt.graph.states.states import States
 from seqopt.problem.problem import Measure
 from seqopt.work.progress import Tell
 
+MANY = 500_000  # grip sets, about: to look at all takes longer than a second narrow search
+WIDER = 4  # how many times as wide the second narrow search is
 FAR_BELOW = 4.0  # what the narrow search finds, over the first threshold
 
 
@@ -136,24 +139,33 @@ class _Search:
         problem, floors = self._problem, tuple(map(tied, floors_of_goals(self._problem)))
         self.bound = floors[0]
         try:
-            self.incumbent = found = self._first(floors)
-            if found and not problem.budgets and all(map(le, found.objective, floors)):
-                return found  # no plan is better
+            # later goals need all states that take as much: a wider search may spare them
+            sets = comb(2 * len(problem.network.inner), problem.space.robots)
+            many = len(problem.goals) > 1 and sets * problem.space.levels > MANY
+            for wider in (1, WIDER)[: 1 + many]:
+                plans = [self.incumbent, self._first(floors, wider)]
+                found = min(filter(None, plans), key=lambda p: p.objective, default=None)
+                self.incumbent = found
+                if found and not problem.budgets and all(map(le, found.objective, floors)):
+                    return found  # no plan is better
             if found is None and problem.budgets:
                 _require_room(problem, self._tell)
             return self.best()
         except (StopError, KeyboardInterrupt) as stop:
             return _unproven(plan_by_then(self.incumbent, stop), self._wide, self.bound)
 
-    def _first(self, floors: tuple[float, ...]) -> StatePath | None:
+    def _first(self, floors: tuple[float, ...], wider: int) -> StatePath | None:
         """Return a first plan; where that is expensive, only if it takes no more than floors."""
-        problem, width = self._problem, self._options.width
+        problem, width = self._problem, wider * self._options.width
+        enough = floors[0] if wider > 1 else -np.inf
         most = floors if self._options.dear else None
         if most and problem.each and not problem.demands:
-            found = _in_all(problem, narrow(problem.each[0], width, self._tell, most), floors)
+            found = _in_all(
+                problem, narrow(problem.each[0], width, self._tell, most, enough), floors
+            )
             if found:
                 return found
-        return narrow(problem, width, self._tell, most)
+        return narrow(problem, width, self._tell, most, enough)
 
     def best(self) -> StatePath:
         """Return the best plan, by a threshold that rises until states below it reach an end."""

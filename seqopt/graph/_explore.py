@@ -194,6 +194,8 @@ class Explorer:
         only by moves that take nothing; from all by default.
     tell : callable, optional
         Called after every part of which states were visited; may raise to end the search.
+    enough : float, optional
+        Where there is a width, states of no larger value are as good as each other: some of them.
 
     Attributes
     ----------
@@ -214,8 +216,10 @@ class Explorer:
         space: _Space,
         width: int | None = None,
         tell: Callable[[Explorer], object] = lambda _: None,
+        enough: float = -np.inf,
     ) -> None:
-        self._space, self._width, self._tell = space, width, tell
+        self._space, self._width, self._tell, self._enough = space, width, tell, enough
+        self._draws = np.random.default_rng(0)
         key, states = space.start()
         self._parts: list[dict[Key, Part]] = [{} for _ in range(space.levels + 1)]
         self._moves: dict[tuple[int, Key, Key], list[tuple[Rows, Rows, Floats]]] = defaultdict(list)
@@ -336,7 +340,7 @@ class Explorer:
         while True:
             fresh = self._eligible(key, part)
             if self._width is not None:
-                fresh = _least(part, fresh, self._width)
+                fresh = fresh[self._best(part.values[fresh, 0])[: self._width]]
                 part.mark[part.mark == PENDING] = CLOSED
             if not len(fresh):
                 return np.concatenate(visited)
@@ -368,6 +372,12 @@ class Explorer:
             if not len(close := self._undecided(part, fresh)):
                 return fresh
             part.values[close], part.exact[close] = self._exact(key, part.states[close]), True
+
+    def _best(self, values: Floats) -> Ints:
+        """Return places of values (n,), least first; those that are small enough in any order."""
+        enough = values <= self._enough
+        drawn = np.where(enough, self._draws.random(len(values)), np.arange(len(values)))
+        return np.lexsort((drawn, np.where(enough, -np.inf, values)))
 
     def _undecided(self, part: Part, rows: Ints) -> Ints:
         """Return those rows whose six digits do not say whether they lie below the cut."""
