@@ -74,7 +74,7 @@ FREE = ["optimize", "chain:bricks=7", "--schedule", "free", "--quiet"]
 
 def loaded_by_command(*words):
     """Return which libraries a command has loaded that wait until they are asked for."""
-    late = ("pandas.core", "scipy.optimize", "seqopt.scene.imports.formats", "seqopt.report.page")
+    late = ("pandas.core", "scipy.optimize", "seqopt.exchange.imports", "seqopt.report.page")
     code = (
         f"import sys\nfrom seqopt._cli.main import load, main\nload({words})\n"
         f"assert main({words}) in (0, 1)\n"

@@ -27,11 +27,11 @@ from seqopt.engines.rigid._mixed import Solution, mixed_system
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._response_maps import ResponseMaps, scene_maps
 from seqopt.engines.rigid.compliance import ComplianceEngine
+from seqopt.exchange.contacts import flat_face, touching_faces
 from seqopt.network._mechanics import build_statics
 from seqopt.network.build import build_network
 from seqopt.scene._overlaps import _faces
 from seqopt.scene.boxes import boxes
-from seqopt.scene.imports.contacts import flat_face, touching_faces
 from seqopt.scene.library.common import _overlaps
 from seqopt.scene.shape import Surface
 from seqopt.sequence.two_robots import sequential
@@ -119,7 +119,7 @@ def evaluate(value) -> None:
             getattr(value, name)
 
 
-MECHANICS = ("scene", "network", "contact", "engines", "stability")
+MECHANICS = ("exchange", "scene", "network", "contact", "engines", "stability")
 
 
 def test_every_class_has_a_value_here(values):

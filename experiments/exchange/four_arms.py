@@ -29,6 +29,7 @@ from experiments.harness.results import FIGURES
 from seqopt._cli.main import main
 from seqopt.arms._model import PosedArm, idle_arm
 from seqopt.errors import ExtraError, SceneError
+from seqopt.exchange.exports import read_folder
 from seqopt.report._film import Film
 from seqopt.report._pictures import VIEW, _build_box, _mark_grips
 from seqopt.report._robots import Arms, Cell
@@ -38,7 +39,6 @@ from seqopt.scene.arm import Arm
 from seqopt.scene.library import ArchForm, VaultShape, WallShape, arch, herringbone_vault, wall
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
-from seqopt.sequence.exports.formats import read_folder
 from seqopt.sequence.steps import Step
 
 EXAMPLES = FIGURES.parent / "examples" / "four_arms"

@@ -44,11 +44,11 @@ from seqopt import EPOXY, Scene, Step, build_network, load_scene
 from seqopt._cli.main import main
 from seqopt.contact.faces import step_assembly
 from seqopt.errors import SceneWarning
+from seqopt.exchange._content import Given
+from seqopt.exchange.exports import EXPORTS, read_folder
+from seqopt.exchange.imports import import_scene, read_content, sniffed
 from seqopt.report._style import styled
 from seqopt.report.draw import View, draw_bricks
-from seqopt.scene.imports._content import Given
-from seqopt.scene.imports.formats import import_scene, read_content, sniffed
-from seqopt.sequence.exports.formats import EXPORTS, read_folder
 from seqopt.stability._prover import Prover
 from seqopt.stability.assessment import Verdict, _verdict_of, bonded
 

@@ -166,7 +166,7 @@ def time_files(build: ShownBuild) -> dict[str, bytes | str]:
 
 def _task_files(plan: Plan) -> dict[str, str]:
     """Return what robots do, for those who program them, by file name."""
-    from seqopt.sequence.exports._tasks import _in_postures, plan_tasks, tasks_csv, tasks_json  # noqa: PLC0415  # only where files are written
+    from seqopt.exchange._tasks import _in_postures, plan_tasks, tasks_csv, tasks_json  # noqa: PLC0415  # only where files are written
 
     scene = plan.engine.network.scene
     tasks = [*plan_tasks(scene, plan.steps)]

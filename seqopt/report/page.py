@@ -27,6 +27,7 @@ from seqopt.arms._urdf import shape_notes
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.errors import ExtraError, ProblemError, SceneError
+from seqopt.exchange._tasks import _known_tasks, plan_tasks, tasks_csv, tasks_json
 from seqopt.network.network import GROUND, Network, PartKind
 from seqopt.problem.requirements import Excess, _prop_faults, overloads
 from seqopt.report._robots import ROBOT_COLORS, Arms, Cell, Sketches, arm_data
@@ -46,7 +47,6 @@ from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Brick
 from seqopt.scene.scene import Order, Scene
 from seqopt.scene.shape import normal_of
-from seqopt.sequence.exports._tasks import _known_tasks, plan_tasks, tasks_csv, tasks_json
 from seqopt.sequence.steps import Grips, Step
 from seqopt.stability._builds import WORDS, BuildVerdicts
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from seqopt._files import parse_json, read_table, read_text
+from seqopt._files import parse_json, read_text
 from seqopt.errors import SceneError, StepError, did_you_mean
 from seqopt.scene._checks import LARGEST_NUMBER, as_float, short
 from seqopt.scene.scenarios import as_built
@@ -69,30 +68,6 @@ def _measured(scene: Scene, told: object, where: str) -> Scene:
 def _are_near(values: Sequence[object]) -> bool:
     """Return whether numbers can be places of a scene: beyond, products of them lose all digits."""
     return all(abs(as_float(value)) <= LARGEST_NUMBER for value in values)
-
-
-def read_measured(scene: Scene, path: Path) -> dict[int, tuple[float, ...]]:
-    """Return where bricks were measured, m, from a CSV file (brick, x, y, z) or of COMPAS."""
-    if path.suffix == ".json":
-        from seqopt.scene.imports.formats import import_scene  # noqa: PLC0415  # few files are
-
-        found = {brick.name: brick.position for brick in import_scene(path).bricks}
-        own = {brick.name: brick.position for brick in scene.bricks}
-        return {n: p for n, p in found.items() if n not in own or math.dist(own[n], p) > SAME}
-    names, rows = read_table(read_text(path), str(path), StepError)
-    columns = ("brick", "x", "y", "z")
-    if not rows or not {*columns} <= {*names}:
-        raise StepError(f"{path}: give a CSV file with columns {', '.join(columns)}")
-    out = {}
-    for number, row in rows:
-        try:
-            values = [float(row[name]) for name in columns]
-        except (TypeError, ValueError):
-            values = [math.nan]
-        if not _are_near(values) or values[0] % 1:
-            raise StepError(f"{path}, line {number}: give numbers for {', '.join(columns)}")
-        out[int(values[0])] = tuple(values[1:])
-    return out
 
 
 def _standing(scene: Scene, told: object, where: str) -> tuple[Scene, int]:

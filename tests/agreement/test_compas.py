@@ -13,11 +13,11 @@ import pytest
 from experiments.stability.parts.witness_cra import SAMPLES, force_only, sample_scene
 from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import Mortar
+from seqopt.exchange._content import Given
+from seqopt.exchange.contacts import flat_face
+from seqopt.exchange.exports import export_plan
+from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
-from seqopt.scene.imports._content import Given
-from seqopt.scene.imports.contacts import flat_face
-from seqopt.scene.imports.formats import import_scene
-from seqopt.sequence.exports.formats import export_plan
 from seqopt.sequence.two_robots import METHODS
 from seqopt.stability.assessment import Verdict, assess
 

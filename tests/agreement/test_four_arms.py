@@ -15,8 +15,8 @@ from PIL import Image
 from experiments.exchange.four_arms import EXAMPLES, SCENES, faults, stored_build
 from experiments.harness.results import stored
 from seqopt.errors import StepError
+from seqopt.exchange.exports import export_plan, read_folder
 from seqopt.scene.scene_file import dump_scene, load_scene
-from seqopt.sequence.exports.formats import export_plan, read_folder
 from seqopt.sequence.schedule_file import parse_plan
 from tests.builders import ROOT
 

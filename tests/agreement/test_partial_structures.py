@@ -21,10 +21,10 @@ import pytest
 from seqopt.engines.interface import Fields, Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneWarning
+from seqopt.exchange._content import Given
+from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
-from seqopt.scene.imports._content import Given
-from seqopt.scene.imports.formats import import_scene
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import ABOUT, load_scene
 from seqopt.sequence.steps import Step

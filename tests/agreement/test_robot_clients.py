@@ -11,10 +11,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from seqopt._cli.main import main
+from seqopt.exchange._tasks import FRAMES, Action, plan_tasks
+from seqopt.exchange.exports import export_plan
+from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
-from seqopt.scene.imports.formats import import_scene
-from seqopt.sequence.exports._tasks import FRAMES, Action, plan_tasks
-from seqopt.sequence.exports.formats import export_plan
 from seqopt.sequence.two_robots import METHODS
 from tests.builders import ROOT, six_bricks
 

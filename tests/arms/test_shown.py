@@ -20,13 +20,13 @@ from seqopt._cli.outputs import _task_files
 from seqopt._files import csv_text
 from seqopt.arms._model import ArmModel, idle_arm
 from seqopt.errors import ExtraError, ProblemError, SceneError
+from seqopt.exchange._tasks import Action, _in_postures, plan_tasks, tasks_json
+from seqopt.exchange.exports import export_plan, read_folder
 from seqopt.plan._studies.bases import without_arms
 from seqopt.report._film import Film
 from seqopt.report._pictures import VIEW, steps_picture
 from seqopt.report._robots import _known_arms
 from seqopt.report.page import Build, _tasks
-from seqopt.sequence.exports._tasks import Action, _in_postures, plan_tasks, tasks_json
-from seqopt.sequence.exports.formats import export_plan, read_folder
 from tests.arms.scenes import TOOL, beside, two_arms
 
 pytest.importorskip("pinocchio")

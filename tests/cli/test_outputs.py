@@ -91,7 +91,7 @@ def test_what_a_line_says_is_not_asked_again_for_the_page(monkeypatch, tmp_path)
         monkeypatch.setattr(
             f"seqopt.{module}.tasks_csv", lambda _: tasks.append(1) or "", raising=False
         )
-    monkeypatch.setattr("seqopt.sequence.exports._tasks.tasks_csv", lambda _: tasks.append(1) or "")
+    monkeypatch.setattr("seqopt.exchange._tasks.tasks_csv", lambda _: tasks.append(1) or "")
     monkeypatch.setattr(_tolerance, "_misfits_of", each)
     monkeypatch.setattr(_builds, "_one_by_one", proven)
     asked_for = ["optimize", "chain:bricks=7", "--schedule", "free", "--out", str(tmp_path / "out")]

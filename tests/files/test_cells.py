@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from seqopt._files import _FORMULA, csv_text, harmless, plain, rows_text
 from seqopt.engines.registry import make_engine
+from seqopt.exchange._tables import plan_csv
 from seqopt.network.build import build_network
 from seqopt.responses.table import analyze
-from seqopt.sequence.exports._tables import plan_csv
 from seqopt.sequence.schedule_file import parse_plan, parse_schedule, schedule_text
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS

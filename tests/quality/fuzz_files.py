@@ -26,12 +26,13 @@ from seqopt.arms._postures import PostureTable
 from seqopt.arms._reached import Site as ArmSite
 from seqopt.arms._tables import _read as read_postures
 from seqopt.errors import SeqoptError
+from seqopt.exchange._measured import read_measured
+from seqopt.exchange.exports import export_plan
+from seqopt.exchange.imports import import_scene, read_content
 from seqopt.plan.policy import Policy, find_policy
 from seqopt.responses._blocks import Answers, Block, Store
-from seqopt.scene.imports.formats import import_scene, read_content
 from seqopt.scene.scene_file import dump_scene
-from seqopt.sequence._parts import read_measured, read_site
-from seqopt.sequence.exports.formats import export_plan
+from seqopt.sequence._parts import read_site
 from seqopt.sequence.rules import with_robots
 from tests.arms.scenes import two_arms
 from tests.builders import small_arch
@@ -119,7 +120,7 @@ def _of_imports() -> Iterator[tuple[str, File]]:
     import trimesh  # noqa: PLC0415  # an extra
 
     def brought(path: Path) -> object:
-        given = seqopt.scene.imports.Given(unit="m", density=2000.0)
+        given = seqopt.exchange.Given(unit="m", density=2000.0)
         return (
             import_scene(path, given=given)
             if path.suffix in (".csv", ".json")

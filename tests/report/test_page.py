@@ -18,6 +18,7 @@ from seqopt._files import csv_text
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError
+from seqopt.exchange.contacts import face_ground, flat_face
 from seqopt.network.build import build_network
 from seqopt.plan.build import GivenSequence
 from seqopt.report import page
@@ -25,7 +26,6 @@ from seqopt.report._pages import OVER, comparison_page, plan_page
 from seqopt.report.page import LARGEST, Build, Scatter, _build_data, _structure_data, report_page
 from seqopt.responses.table import analyze
 from seqopt.scene.boxes import block_brick
-from seqopt.scene.imports.contacts import face_ground, flat_face
 from seqopt.scene.library.common import MASONRY
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene

@@ -15,13 +15,13 @@ from hypothesis import given, settings
 from experiments.harness.scenes import running_bond
 from seqopt.engines.registry import make_engine
 from seqopt.errors import ProblemError
+from seqopt.exchange import export_plan
 from seqopt.network.build import build_network
 from seqopt.report._pictures import steps_picture
 from seqopt.report._robots import Cell, arm_data
 from seqopt.report.page import Build, report_page
 from seqopt.responses.table import analyze
 from seqopt.scene.parts import Robot, Side, Sphere
-from seqopt.sequence.exports import export_plan
 from seqopt.sequence.two_robots import sequential
 from tests.browser import BROWSER, PLAIN, WORDS, browsed
 from tests.strategies import builds

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 import seqopt
 from seqopt.errors import SceneError, StepError
+from seqopt.exchange._measured import read_measured
 from seqopt.scene.scenarios import as_built
-from seqopt.sequence._parts import read_measured
 from tests.builders import six_bricks
 
 SCENE = six_bricks()

@@ -8,9 +8,9 @@ import pytest
 
 from seqopt.contact.mortar import Mortar, bond_mortar, find_mortar
 from seqopt.errors import SceneError
+from seqopt.exchange import Given, import_scene
 from seqopt.scene import Load
 from seqopt.scene.arch import ArchShape
-from seqopt.scene.imports import Given, import_scene
 from seqopt.scene.library import ArchForm, DomeShape, JointLaw, VaultShape, WallShape
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.scene.scene import Scene

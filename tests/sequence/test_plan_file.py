@@ -6,8 +6,8 @@ import pandas as pd
 import pytest
 
 from seqopt.errors import StepError
+from seqopt.exchange._tables import plan_csv
 from seqopt.network.build import build_network
-from seqopt.sequence.exports._tables import plan_csv
 from seqopt.sequence.schedule_file import parse_plan, read_plan
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.sequence.two_robots import sequential

@@ -11,6 +11,8 @@ import pytest
 
 import seqopt
 from seqopt.errors import ProblemError, SolverError, StepError
+from seqopt.exchange._tasks import Action, plan_tasks
+from seqopt.exchange.exports import plan_csv
 from seqopt.graph.orders import AllOrders
 from seqopt.graph.states._visits import explore
 from seqopt.graph.states.states import build_states
@@ -20,8 +22,6 @@ from seqopt.plan.front import find_front
 from seqopt.plan.policy import find_policy
 from seqopt.responses import analyze_staged
 from seqopt.sequence._rule_check import RuleBook, check_free
-from seqopt.sequence.exports import Action, plan_tasks
-from seqopt.sequence.exports.formats import plan_csv
 from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, StepKind, _turned_round, check_sequence

@@ -11,9 +11,9 @@ from seqopt._cli.screens import question
 from seqopt._cli.values import count_word
 from seqopt._files import require_apart, write_text
 from seqopt.errors import ProblemError
+from seqopt.exchange._content import UNITS, UPS, Given
+from seqopt.exchange.imports import FORMATS, import_scene
 from seqopt.problem._limit_words import number_word
-from seqopt.scene.imports._content import UNITS, UPS, Given
-from seqopt.scene.imports.formats import FORMATS, import_scene
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene_file import dump_scene
 

@@ -37,6 +37,7 @@ from seqopt._cli.words.optimizing import AIM, TIME
 from seqopt._cli.words.where import Place
 from seqopt._files import parse_json, read_text
 from seqopt.errors import FileError, InfeasibleError, NothingFoundError, StepError
+from seqopt.exchange._measured import read_measured
 from seqopt.plan._studies.replan import compared, without
 from seqopt.plan.plan import Plan
 from seqopt.responses._tolerance import is_tolerance, value_text
@@ -44,7 +45,7 @@ from seqopt.responses.quantities import PROP_EXCESS, TOLERANCE, length_text
 from seqopt.scene.scenarios import as_built
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import load_scene
-from seqopt.sequence._parts import SAME, read_measured
+from seqopt.sequence._parts import SAME
 from seqopt.sequence.rules import FREE, _usual_grips, with_robots
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.study.published import CRITERIA

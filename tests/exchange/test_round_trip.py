@@ -10,13 +10,13 @@ from hypothesis import HealthCheck, given, settings
 
 from experiments.harness.scenes import running_bond
 from seqopt.errors import SceneError
+from seqopt.exchange._content import Given
+from seqopt.exchange.exports import EXPORTS, LOST, export_plan
+from seqopt.exchange.imports import FORMATS, import_scene
 from seqopt.scene.boxes import as_vectors, block_brick, vertices_of
-from seqopt.scene.imports._content import Given
-from seqopt.scene.imports.formats import FORMATS, import_scene
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.parts import Robot, Sphere
 from seqopt.scene.shape import Polyhedron
-from seqopt.sequence.exports.formats import EXPORTS, LOST, export_plan
 from seqopt.sequence.steps import Step, StepKind
 from tests.blocks import with_shapes
 from tests.builders import six_bricks

@@ -14,15 +14,15 @@ from hypothesis import strategies as st
 
 from experiments.harness.scenes import running_bond
 from seqopt.errors import SeqoptError
+from seqopt.exchange._grip_frames import hold
+from seqopt.exchange._tasks import Action, plan_tasks, tasks_csv, tasks_json
+from seqopt.exchange.contacts import face_ground, flat_face
+from seqopt.exchange.exports import export_plan
 from seqopt.network.build import build_network
 from seqopt.scene.boxes import block_brick, vertices_of
-from seqopt.scene.imports.contacts import face_ground, flat_face
 from seqopt.scene.library.common import MASONRY
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.scene.scene import Scene
-from seqopt.sequence.exports._grip_frames import hold
-from seqopt.sequence.exports._tasks import Action, plan_tasks, tasks_csv, tasks_json
-from seqopt.sequence.exports.formats import export_plan
 from seqopt.sequence.steps import Step, StepKind, check_sequence
 from seqopt.sequence.two_robots import METHODS
 from tests.blocks import C_SHAPE, prism

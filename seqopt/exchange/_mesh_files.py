@@ -25,9 +25,9 @@ from seqopt._archives import Archive
 from seqopt._files import parse_json
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import FileError, SceneError
+from seqopt.exchange._content import LARGEST, UNITS, Content, FileBlock, moved
+from seqopt.exchange._meshes import mesh_content, object_content
 from seqopt.scene._checks import short
-from seqopt.scene.imports._content import LARGEST, UNITS, Content, FileBlock, moved
-from seqopt.scene.imports._meshes import mesh_content, object_content
 
 _UNASKED = logging.NullHandler()  # else Python prints what no one listens to
 _NEEDS = {  # packages and the extra that brings them

@@ -8,9 +8,9 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
+from seqopt.exchange._content import Entry, entry, listing, mapping, number, point, points
 from seqopt.scene._checks import short
 from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
-from seqopt.scene.imports._content import Entry, entry, listing, mapping, number, point, points
 from seqopt.scene.shape import normal_of
 
 _PLAIN = 1e-9  # by how much rounding may change the last row of a transformation

@@ -20,12 +20,7 @@ from seqopt._files import csv_text
 from seqopt.arms._postures import PostureTable
 from seqopt.arrays import Floats
 from seqopt.errors import StepError
-from seqopt.scene._checks import finite, positive, rows, short
-from seqopt.scene.boxes import as_vector, vertices_of
-from seqopt.scene.parts import Brick, Robot, Sphere
-from seqopt.scene.scene import Scene
-from seqopt.sequence._postures import PlanPostures, plan_postures
-from seqopt.sequence.exports._grip_frames import (
+from seqopt.exchange._grip_frames import (
     Document,
     Frame,
     Held,
@@ -35,6 +30,11 @@ from seqopt.sequence.exports._grip_frames import (
     mesh_data,
     typed,
 )
+from seqopt.scene._checks import finite, positive, rows, short
+from seqopt.scene.boxes import as_vector, vertices_of
+from seqopt.scene.parts import Brick, Robot, Sphere
+from seqopt.scene.scene import Scene
+from seqopt.sequence._postures import PlanPostures, plan_postures
 from seqopt.sequence.steps import Grips, Step, StepKind
 
 Postures = Mapping[tuple[str, int], Sequence[float]]
@@ -93,11 +93,27 @@ def plan_tasks(
 ) -> Iterator[Task]:
     """Yield what robots do in a checked plan, step by step.
 
-    ``distance``, m, is from a grip to where a tool comes from, and goes to; by default the longest
-    side of each block. ``postures``: joint values of arms by robot and node, where they are known.
-    What a step changes comes first, then who holds on, in the order of the robots. Raises
-    `SceneError` if the distance is not positive, or a posture is of no numbers; `StepError` if
-    postures name no robot or node of the scene.
+    Parameters
+    ----------
+    scene, steps
+        A scene, and a checked plan for it.
+    distance
+        From a grip to where a tool comes from, and goes to, m; by default the longest side of each
+        block.
+    postures
+        Joint values of arms by robot and node, where they are known.
+
+    Yields
+    ------
+    Task
+        What a step changes comes first, then who holds on, in the order of the robots.
+
+    Raises
+    ------
+    SceneError
+        If the distance is not positive, or a posture is of no numbers.
+    StepError
+        If postures name no robot or node of the scene.
 
     Examples
     --------

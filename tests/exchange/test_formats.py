@@ -9,9 +9,9 @@ import pytest
 import trimesh
 
 from seqopt.errors import FileError, SceneError
+from seqopt.exchange._content import Given
+from seqopt.exchange.imports import import_scene
 from seqopt.scene.arch import STANDARD_GRAVITY
-from seqopt.scene.imports._content import Given
-from seqopt.scene.imports.formats import import_scene
 from seqopt.scene.library.common import JointLaw
 from seqopt.scene.scene_file import _parse_scene, dump_scene
 from tests.blocks import box
@@ -332,7 +332,7 @@ def test_what_is_no_file_or_too_large_is_refused(tmp_path, monkeypatch):
 
 
 def test_an_assembly_of_nobodys_size_is_refused(read, monkeypatch):
-    monkeypatch.setattr("seqopt.scene.imports._building.MOST_CORNERS", 60)
+    monkeypatch.setattr("seqopt.exchange._building.MOST_CORNERS", 60)
     with pytest.raises(SceneError, match="its blocks have 72 corners; 60 is the most"):
         read("a.json", DOCUMENTS["assembly"])
 

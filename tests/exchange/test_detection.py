@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from seqopt.errors import SceneError
+from seqopt.exchange.contacts import face_ground, face_joint, flat_face, touching_faces
 from seqopt.scene.boxes import as_vectors
-from seqopt.scene.imports.contacts import face_ground, face_joint, flat_face, touching_faces
 from seqopt.scene.library.common import MASONRY
 from tests.blocks import C_SHAPE, L_SHAPE, box, prism
 
@@ -83,7 +83,7 @@ def test_what_cannot_touch_is_one_line():
 
 
 def test_blocks_without_number_in_one_place_are_refused(monkeypatch):
-    monkeypatch.setattr("seqopt.scene.imports.contacts._MOST_PAIRS", 5)
+    monkeypatch.setattr("seqopt.exchange.contacts._MOST_PAIRS", 5)
     with pytest.raises(SceneError, match="more than 5 pairs of blocks are in one place"):
         touching_faces([box((1, 1, 1))] * 4, GAP)
 

@@ -13,10 +13,10 @@ from scipy.sparse.csgraph import connected_components
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import SceneError
+from seqopt.exchange._content import MOST_BLOCKS, MOST_CORNERS, Content, FileBlock
 from seqopt.scene._checks import short
 from seqopt.scene._overlaps import bounds_of
 from seqopt.scene.boxes import as_vectors
-from seqopt.scene.imports._content import MOST_BLOCKS, MOST_CORNERS, Content, FileBlock
 from seqopt.scene.shape import FLAT, Polyhedron, Surface, bend, edges, fans
 
 if TYPE_CHECKING:

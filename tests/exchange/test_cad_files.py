@@ -14,10 +14,10 @@ from compas_model.elements import BeamElement, ColumnElement, PlateElement
 from compas_model.models import Model
 
 from seqopt.errors import FileError, SceneError
-from seqopt.scene.imports._content import FileBlock, Given
-from seqopt.scene.imports._mesh_files import _polysurface
-from seqopt.scene.imports._meshes import object_content, repair_shape
-from seqopt.scene.imports.formats import import_scene, read_content
+from seqopt.exchange._content import FileBlock, Given
+from seqopt.exchange._mesh_files import _polysurface
+from seqopt.exchange._meshes import object_content, repair_shape
+from seqopt.exchange.imports import import_scene, read_content
 
 DENSE, GIVEN = Given(density=2000.0), Given(unit="m", density=2000.0)
 WHERE = {  # lowest and highest corner of the blocks of a tower, mm
@@ -298,7 +298,7 @@ def test_a_file_that_is_broken_is_one_line(tmp_path, form):
 def test_a_package_that_is_missing_is_named(tmp_path, monkeypatch, form, package):
     path = tmp_path / f"a.{form}"
     path.write_bytes(b"")
-    found = "seqopt.scene.imports._mesh_files.find_spec"
+    found = "seqopt.exchange._mesh_files.find_spec"
     monkeypatch.setattr(found, lambda name: None if name == package else object())
     with pytest.raises(
         FileError, match=rf"reading {form} needs {package}; pip install 'seqopt\[cad\]'"

@@ -21,17 +21,11 @@ import numpy as np
 from seqopt._files import read_text
 from seqopt.arrays import Floats
 from seqopt.errors import FileError, StepError
-from seqopt.scene._checks import short
-from seqopt.scene.boxes import vertices_of
-from seqopt.scene.imports._building import block_numbers, carry
-from seqopt.scene.imports._compas_models import assembly_graph, by_guid
-from seqopt.scene.imports._compas_shapes import kind, payload
-from seqopt.scene.imports._content import assembly_json, entry
-from seqopt.scene.imports.formats import read_content, sniffed
-from seqopt.scene.parts import Brick
-from seqopt.scene.scene import Scene
-from seqopt.scene.scene_file import load_scene
-from seqopt.sequence.exports._grip_frames import (
+from seqopt.exchange._building import block_numbers, carry
+from seqopt.exchange._compas_models import assembly_graph, by_guid
+from seqopt.exchange._compas_shapes import kind, payload
+from seqopt.exchange._content import assembly_json, entry
+from seqopt.exchange._grip_frames import (
     Document,
     Frame,
     Held,
@@ -41,14 +35,14 @@ from seqopt.sequence.exports._grip_frames import (
     mesh_data,
     typed,
 )
-from seqopt.sequence.exports._tables import (
-    StepStates,
-    plan_csv,
-    plan_json,
-    sequencer_json,
-    step_states,
-)
-from seqopt.sequence.exports._tasks import Postures, Task, _known_tasks, tasks_csv, tasks_json
+from seqopt.exchange._tables import StepStates, plan_csv, plan_json, sequencer_json, step_states
+from seqopt.exchange._tasks import Postures, Task, _known_tasks, tasks_csv, tasks_json
+from seqopt.exchange.imports import read_content, sniffed
+from seqopt.scene._checks import short
+from seqopt.scene.boxes import vertices_of
+from seqopt.scene.parts import Brick
+from seqopt.scene.scene import Scene
+from seqopt.scene.scene_file import load_scene
 from seqopt.sequence.schedule_file import read_plan
 from seqopt.sequence.steps import Step, StepKind
 
@@ -390,13 +384,33 @@ def export_plan(  # what is written, and what some formats take beside
 ) -> str:
     """Return a plan for a scene in the format of another program, one of `EXPORTS`.
 
-    ``source`` is the file from which the scene was imported, of any format, for formats of COMPAS:
-    the plan then names its elements, or is written into it if it is an assembly. ``distance``, m,
-    is from a grip to where a tool comes from, and ``postures`` are joint values of arms by robot
-    and node, for formats of tasks; see `plan_tasks`. By default they are those of
-    `seqopt.arms.find_postures`, where robots of the scene have arms; an empty mapping leaves them
-    out. Raises `StepError` if the format is not known or does not take what is given; `ExtraError`
-    if postures have to be computed and what computes them (extra ``arms``) is not installed.
+    Parameters
+    ----------
+    scene, steps
+        A scene, and a checked plan for it.
+    form
+        One of `EXPORTS`.
+    source
+        The file from which the scene was imported, of any format, for formats of COMPAS: the plan
+        then names its elements, or is written into it if it is an assembly.
+    distance
+        From a grip to where a tool comes from, m, for formats of tasks; see `plan_tasks`.
+    postures
+        Joint values of arms by robot and node, for formats of tasks; by default those of
+        `seqopt.arms.find_postures`, where robots of the scene have arms. An empty mapping leaves
+        them out.
+
+    Returns
+    -------
+    str
+        The text of the file.
+
+    Raises
+    ------
+    StepError
+        If the format is not known or does not take what is given.
+    ExtraError
+        If postures have to be computed and what computes them (extra ``arms``) is not installed.
 
     Examples
     --------

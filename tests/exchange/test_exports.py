@@ -10,12 +10,12 @@ import pytest
 
 from seqopt._files import write_text
 from seqopt.errors import FileError, StepError
+from seqopt.exchange._content import Given
+from seqopt.exchange._tables import BlockState, step_states
+from seqopt.exchange.exports import EXPORTS, export_plan, read_folder
+from seqopt.exchange.imports import import_scene
 from seqopt.network.build import build_network
-from seqopt.scene.imports._content import Given
-from seqopt.scene.imports.formats import import_scene
 from seqopt.scene.scene_file import save_scene
-from seqopt.sequence.exports._tables import BlockState, step_states
-from seqopt.sequence.exports.formats import EXPORTS, export_plan, read_folder
 from seqopt.sequence.schedule_file import parse_plan
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.sequence.two_robots import METHODS

@@ -13,8 +13,8 @@ from compas.datastructures import Mesh
 
 from seqopt._cli.main import main
 from seqopt.errors import SceneError
-from seqopt.scene.imports._content import Given
-from seqopt.scene.imports.formats import import_scene
+from seqopt.exchange._content import Given
+from seqopt.exchange.imports import import_scene
 from seqopt.scene.scene_file import load_scene
 from tests.blocks import L_SHAPE, box, prism
 from tests.documents import obj

@@ -17,10 +17,8 @@ import numpy as np
 
 from seqopt.arrays import Floats
 from seqopt.errors import SceneError
-from seqopt.scene._checks import short
-from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
-from seqopt.scene.imports._building import carried, own_density
-from seqopt.scene.imports._compas_shapes import (
+from seqopt.exchange._building import carried, own_density
+from seqopt.exchange._compas_shapes import (
     frame_of,
     held_by,
     kind,
@@ -29,7 +27,7 @@ from seqopt.scene.imports._compas_shapes import (
     solid_of_element,
     transformation_of,
 )
-from seqopt.scene.imports._content import (
+from seqopt.exchange._content import (
     Content,
     Entry,
     FileBlock,
@@ -42,7 +40,9 @@ from seqopt.scene.imports._content import (
     number,
     points,
 )
-from seqopt.scene.imports._meshes import object_content
+from seqopt.exchange._meshes import object_content
+from seqopt.scene._checks import short
+from seqopt.scene.boxes import BOX_CORNERS, BOX_FACES
 from seqopt.scene.library.common import JointLaw
 
 

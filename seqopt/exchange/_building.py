@@ -10,16 +10,15 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from seqopt.errors import SceneError
-from seqopt.scene._checks import LARGEST_NUMBER, one_of, positive, rows, short, whole_between
-from seqopt.scene.boxes import as_vector, block_brick, spring_fields, vertices_of
-from seqopt.scene.imports._content import (
+from seqopt.exchange._content import (
     GROUND,
     MOST_CORNERS,
     UNITS,
@@ -35,9 +34,11 @@ from seqopt.scene.imports._content import (
     mapping,
     number,
 )
-from seqopt.scene.imports._interpenetration import interpenetrating
-from seqopt.scene.imports._meshes import Repaired, repair_shape, same_points
-from seqopt.scene.imports.contacts import Contacts, _find_contacts, face_ground, face_joint
+from seqopt.exchange._meshes import Repaired, repair_shape, same_points
+from seqopt.exchange.contacts import Contacts, _find_contacts, _widest_gap, face_ground, face_joint
+from seqopt.scene._checks import LARGEST_NUMBER, one_of, positive, rows, short, whole_between
+from seqopt.scene._overlaps import Overlap, find_overlaps
+from seqopt.scene.boxes import as_vector, block_brick, spring_fields, vertices_of
 from seqopt.scene.library.common import MASONRY, JointLaw, a_law, mobile_robots, touching_order
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.scene import Scene
@@ -207,7 +208,7 @@ def build_scene(content: Content, given: Given, source: str) -> Scene:
         total = sum((block.mended for block in blocks), Counter[str]())
         said += [f"{text}: {count}" for text, count in total.items()]
         bricks = _bricks(content, given, blocks, supports, said)
-        sunk, lines = interpenetrating(content, given, blocks, bricks)
+        sunk, lines = _interpenetrating(content, given, blocks, bricks)
         touching = _find_contacts(content, given, blocks, bricks)
         said = [*lines, *said, *touching.said]
         law = _law(content, given, touching, said)
@@ -419,3 +420,50 @@ def _order(
         {row[i] for i in sunk if i in row},
     )
     return [places[k] for k in order]
+
+
+_MOST_OVERLAPS = 100  # pairs that interpenetrate, after which no more are sought
+_SHOWN = 3  # of these in an error
+
+
+def _interpenetrating(
+    content: Content, given: Given, blocks: Sequence[Repaired], bricks: Mapping[int, Brick]
+) -> tuple[set[int], list[str]]:
+    """Return blocks that interpenetrate by more than faces tolerate, and a line on each pair.
+
+    Raises `SceneError` unless the user accepts them. A gap that is wider than by default makes no
+    overlap right, so that it counts where it is narrower.
+    """
+    most = min(_widest_gap(way, bricks) for way in (given, replace(given, gap=None)))
+    found = islice(_overlaps(content, given, blocks, most), _MOST_OVERLAPS)
+    overlaps = sorted(
+        ((pair, each) for pair, each in found if {*pair} & bricks.keys()),
+        key=lambda held: -held[1].depth,
+    )
+    keys = [block.key for block in content.blocks]
+    lines = [f"blocks {keys[i]} and {keys[j]} interpenetrate {each}" for (i, j), each in overlaps]
+    if lines and not given.accept_overlaps:
+        more = f"; {len(lines) - _SHOWN} more pairs do" if len(lines) > _SHOWN else ""
+        raise SceneError(
+            f"{'; '.join(lines[:_SHOWN])}{more}; faces tolerate {1e3 * most:.3g} mm: move them "
+            "apart, or accept it (--accept-overlaps)"
+        )
+    return {i for pair, _ in overlaps for i in pair}, [f"{line}, as accepted" for line in lines]
+
+
+def _overlaps(
+    content: Content, given: Given, blocks: Sequence[Repaired], most: float
+) -> Iterator[tuple[tuple[int, int], Overlap]]:
+    """Yield overlaps with the places of their blocks.
+
+    Bars of a frame, and beams that joints of the file hold together, run into each other by intent.
+    """
+    if content.joints and all(joint.translational for joint in content.joints):
+        return
+    intended = {frozenset(joint.blocks) for joint in content.joints}
+    solids = {i: b.solid for i, b in enumerate(blocks) if isinstance(b.solid, Polyhedron)}
+    places = [*solids]
+    for each in find_overlaps([*solids.values()], [most] * len(solids), given.progress):
+        pair = (places[each.pair[0]], places[each.pair[1]])
+        if frozenset(pair) not in intended:
+            yield pair, each

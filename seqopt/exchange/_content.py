@@ -109,15 +109,30 @@ class Content:
 class Given:
     """What the user adds if a file does not say it.
 
-    ``unit``: unit of length of the file, one of `UNITS`; ``up``: which axis of the file points up,
-    ``z`` or ``y``, by default that of its format; ``density``: of blocks for which the file has
-    none, kg/m³; ``supports``: keys of blocks that are fixed, or of layers and groups of blocks, in
-    place of those of the file; ``law``: stiffness of joints by area, in
-    place of that of the file; ``gap``: most that may lie between faces that touch, m; ``detect``:
-    whether to look for faces although the file has some; ``accept_overlaps``: whether blocks may
-    interpenetrate by more than faces tolerate; ``robots``: how many mobile robots the
-    scene gets, three if the file has none; ``name``: of the scene; ``progress``: told how far it is
-    to find faces, which takes long of many blocks.
+    Parameters
+    ----------
+    unit
+        Unit of length of the file: m, cm, mm, in or ft.
+    up
+        Axis of the file that points up, ``z`` or ``y``; by default that of its format.
+    density
+        Of blocks for which the file has none, kg/m³.
+    supports
+        Keys of blocks that are fixed, or of layers and groups of blocks; by default the file's.
+    law
+        Stiffness of joints by area; by default the file's.
+    gap
+        Most that may lie between faces that touch, m.
+    detect
+        Whether to look for faces although the file has some.
+    accept_overlaps
+        Whether blocks may interpenetrate by more than faces tolerate.
+    robots
+        Number of mobile robots that the scene gets, three if the file has none.
+    name
+        Of the scene.
+    progress
+        Called with how far the search for faces is, which takes long of many blocks.
     """
 
     unit: str | None = None

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from seqopt.errors import SceneError
-from seqopt.scene.imports._building import upward_order
+from seqopt.exchange._building import upward_order
 
 
 @given(

@@ -15,11 +15,11 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import FileError, SceneError
+from seqopt.exchange._content import GROUND, Content, FileJoint, Given
+from seqopt.exchange._meshes import Repaired
 from seqopt.scene._checks import positive, short, units
 from seqopt.scene._overlaps import TOLERATED, bounds_of, near_pairs
 from seqopt.scene.boxes import as_vector, spring_fields
-from seqopt.scene.imports._content import GROUND, Content, FileJoint, Given
-from seqopt.scene.imports._meshes import Repaired
 from seqopt.scene.library.common import DOWN, JointLaw
 from seqopt.scene.parts import Brick, Ground, Joint
 from seqopt.scene.shape import Polyhedron, Surface, normal_of, plane_axes

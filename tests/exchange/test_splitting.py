@@ -10,11 +10,11 @@ import trimesh
 
 from seqopt._cli.main import main
 from seqopt.errors import SceneError, SceneWarning
+from seqopt.exchange._content import Given
+from seqopt.exchange._mesh_files import read_obj
+from seqopt.exchange._meshes import repair_shape
+from seqopt.exchange.imports import import_scene, read_content
 from seqopt.scene.boxes import as_vectors
-from seqopt.scene.imports._content import Given
-from seqopt.scene.imports._mesh_files import read_obj
-from seqopt.scene.imports._meshes import repair_shape
-from seqopt.scene.imports.formats import import_scene, read_content
 from seqopt.scene.scene_file import load_scene
 from seqopt.scene.shape import Polyhedron
 from tests.blocks import box

@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from seqopt._cli.main import main
 from seqopt.errors import SceneError, SceneWarning
-from seqopt.scene.imports._compas_models import read_model, read_timber
-from seqopt.scene.imports._content import Given
-from seqopt.scene.imports.formats import import_scene
+from seqopt.exchange._compas_models import read_model, read_timber
+from seqopt.exchange._content import Given
+from seqopt.exchange.imports import import_scene
 from tests.blocks import box
 from tests.documents import element, matrix, model, nested, timber
 

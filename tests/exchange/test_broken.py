@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 
 from experiments.harness.scenes import running_bond
 from seqopt.errors import SeqoptError
+from seqopt.exchange._building import build_scene
+from seqopt.exchange._content import Given
+from seqopt.exchange.exports import export_plan
+from seqopt.exchange.imports import _DOCUMENTS as READERS
+from seqopt.exchange.imports import sniffed
 from seqopt.network.build import build_network
-from seqopt.scene.imports._building import build_scene
-from seqopt.scene.imports._content import Given
-from seqopt.scene.imports.formats import _DOCUMENTS as READERS
-from seqopt.scene.imports.formats import sniffed
-from seqopt.sequence.exports.formats import export_plan
 from seqopt.sequence.two_robots import METHODS
 from tests.documents import DOCUMENTS as OTHERS
 

@@ -1,0 +1,45 @@
+r"""Scenes from files of other programs, and plans in their formats.
+
+COMPAS, meshes, tables of boxes and frames are read, and the packages that wrote the files are not
+needed:
+
+>>> import tempfile
+>>> from pathlib import Path
+>>> from seqopt.exchange import Given, import_scene
+>>> with tempfile.TemporaryDirectory() as folder:
+...     path = Path(folder, "two.csv")
+...     _ = path.write_text("x,y,z,length,width,height\n0,0,1,2,1,2\n0,0,2.5,2,1,1\n")
+...     scene = import_scene(path, given=Given(unit="m", density=2000.0))
+>>> print(scene.provenance.splitlines()[1])
+a table of boxes: no faces
+
+Plans are written as tables, JSON, tasks of robots, and for COMPAS:
+
+>>> import seqopt
+>>> from seqopt.exchange import export_plan
+>>> scene = seqopt.load_scene("arch25")
+>>> steps = seqopt.sequential(seqopt.build_network(scene))
+>>> export_plan(scene, steps, "csv").splitlines()[0][:40]
+'step,type,bricks,placed,rob1_node,rob1_b'
+"""
+
+from typing import TYPE_CHECKING
+
+from seqopt._later import later
+
+if TYPE_CHECKING:
+    from seqopt.exchange._content import Given
+    from seqopt.exchange._tasks import plan_tasks
+    from seqopt.exchange.exports import export_plan
+    from seqopt.exchange.imports import import_scene
+
+__all__ = ["Given", "export_plan", "import_scene", "plan_tasks"]
+__getattr__, __dir__ = later(
+    __name__,
+    {
+        "Given": "_content",
+        "export_plan": "exports",
+        "import_scene": "imports",
+        "plan_tasks": "_tasks",
+    },
+)
