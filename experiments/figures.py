@@ -24,6 +24,7 @@ from matplotlib.patches import Rectangle
 from experiments.harness.charts import subplots
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import FIGURES, save_figure
+from experiments.harness.yardstick import VALUES
 from seqopt import FreeRules, build_network, load_scene, pose, three_robot_loop
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
@@ -35,7 +36,6 @@ from seqopt.report.comparison import method_tables
 from seqopt.report.draw import View, draw_bricks, draw_grips, draw_network, force_key
 from seqopt.report.text import in_words
 from seqopt.scene.boxes import boxes
-from seqopt.study._yardstick import VALUES
 from seqopt.study.published import WORST_RATIO, as_printed, printed_steps
 
 VIEW = View(azimuth=35, elevation=22)

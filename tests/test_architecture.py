@@ -36,11 +36,10 @@ ROOMS = (
     {"workflow"},
     {"exchange"},
     {"report"},
-    {"_paper"},
     {"_cli"},
     {"__init__", "__main__"},
 )  # a room imports from rooms above it in this list only
-OUTER = {"exchange", "report", "_paper", "_cli"}  # plug in; the inner rooms do without them
+OUTER = {"exchange", "report", "_cli"}  # plug in; the inner rooms do without them
 TOP = {"workflow", "__init__", "__main__"}  # open inner and outer rooms
 SOLVERS = {"cvxpy", "clarabel", "highspy"}
 SOLVER_HOME = "formulations"

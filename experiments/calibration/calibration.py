@@ -27,15 +27,15 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from experiments.calibration.parts import barrel_vaults as barrel
 from experiments.calibration.parts import calibration_spread as spread
+from experiments.calibration.parts.barrel_vaults import BED, LAWS, MEASURES, Law, laws, vaults
 from experiments.calibration.parts.calibration_chart import chart
 from experiments.calibration.parts.calibration_readings import entries, readings, summary
 from experiments.calibration.parts.calibration_spread import left_out, threshold, whole
 from experiments.harness.claim import Claim, Finding, Options
 from experiments.harness.results import stored
 from seqopt.arrays import Floats
-from seqopt.study import _barrel_vaults as barrel
-from seqopt.study._barrel_vaults import BED, LAWS, MEASURES, Law, laws, vaults
 
 
 def turning_share(law: Law, pair: tuple[float, float]) -> Floats:

@@ -44,11 +44,11 @@ from experiments.calibration.parts import arch_numbers as arch
 from experiments.calibration.parts.arch_numbers import BRICKS, OFFSETS, SHAPE, Free, scene_of
 from experiments.harness.claim import Claim, Finding, Option, Options
 from experiments.harness.results import HOME, save_table
+from experiments.harness.yardstick import VALUES
 from seqopt import Scene, build_network, save_scene
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.responses.quantities import TO_1E_3MM, responses_of, support_forces, support_moments
-from seqopt.study._yardstick import VALUES
 from seqopt.study.published import printed_steps
 
 SCENE = HOME.parent / "seqopt" / "data" / "scenes" / "arch25.json"

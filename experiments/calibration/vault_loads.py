@@ -19,6 +19,8 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from experiments.calibration.parts import barrel_vaults as barrel
+from experiments.calibration.parts.barrel_vaults import BED, LAWS, Vault, vaults
 from experiments.calibration.parts.vault_thrust import UNIT, borne, loaded_vault
 from experiments.harness.claim import Claim, Finding, Options, told
 from seqopt import DRY
@@ -28,8 +30,6 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from seqopt.scene import Load
 from seqopt.stability._load_factor import load_factor
-from seqopt.study import _barrel_vaults as barrel
-from seqopt.study._barrel_vaults import BED, LAWS, Vault, vaults
 
 NAMES = {False: "bare", True: "filled"}
 PAIR = (67e9, 81e9)  # N/m³; translational and rotational, about those of the calibration

@@ -37,13 +37,13 @@ from experiments.harness.claim import Claim, Finding, Option, Options
 from experiments.harness.lmgc90 import python_with_lmgc90
 from experiments.harness.results import RESULTS, stored
 from experiments.harness.scenes import arch25
+from experiments.harness.yardstick import STEPS, error, moved
 from seqopt import EPOXY, Step, sequential
 from seqopt.arrays import Floats
 from seqopt.contact._elastic_limits import find_elastic_limits
 from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.study._yardstick import STEPS, error, moved
 from seqopt.study.published import STUDY_PADS, printed
 
 SIDES = 1e-3 * np.arange(4.0, 51.0)  # m, of the scan

@@ -2,10 +2,10 @@
 
 These three are the secant stiffness of a vault test, the calibrated stiffness of all eight, and the
 errors against discrete elements. The others agree at least in part: half or more of their values
-are within 5 % of print beyond rounding (`seqopt.study._yardstick`).
+are within 5 % of print beyond rounding (`experiments.harness.yardstick`).
 
-Method: `seqopt._paper.items` lists the paper's figures and tables in order with
-what has no numbers; `seqopt._paper.rows` computes every printed value anew.
+Method: `parts.counterpart_items` lists the paper's figures and tables in order with what has no
+numbers; `parts.counterpart_rows` computes every printed value anew.
 Which three disagree was seen in the first run; the claim fails if a fourth does, if one of the
 three agrees, or if an item has no values.
 
@@ -20,10 +20,17 @@ from matplotlib.figure import Figure
 
 from experiments.harness.claim import Claim, Finding, Options, none_of
 from experiments.harness.results import FIGURES, save_table, stored
+from experiments.study.parts.counterpart_charts import drawn
+from experiments.study.parts.counterpart_items import (
+    DISAGREES,
+    ITEMS,
+    TITLES,
+    Item,
+    statement,
+    verdict,
+)
 from experiments.study.parts.counterpart_page import page
-from seqopt._paper.charts import drawn
-from seqopt._paper.items import DISAGREES, ITEMS, TITLES, Item, statement, verdict
-from seqopt._paper.rows import Ours, ours, tabulate
+from experiments.study.parts.counterpart_rows import Ours, ours, tabulate
 
 KNOWN = {"fig:secant_stiff", "table:model_results", "table:validation_results"}
 QUICK = {"fig:arch_vault", "table:model_results", "table:2robot_tension", "table:optimization2"}

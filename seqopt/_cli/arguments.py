@@ -106,7 +106,6 @@ COMMANDS = {
     "export": _Command("write a plan in a format of others", "commands.exporting"),
     "instance": _Command("write the graph of a problem, for any solver", "bare.instance"),
     "judge": _Command("check a bare solution of an instance, and a bound", "bare.judge"),
-    "paper": _Command("set the paper's tables and figures beside ours", "commands.paper"),
     "completion": _Command("let the shell complete words of seqopt", "commands.completion"),
 }
 

@@ -98,8 +98,7 @@ def plan_tasks(
     scene, steps
         A scene, and a checked plan for it.
     distance
-        From a grip to where a tool comes from, and goes to, m; by default the longest side of each
-        block.
+        From a grip to where a tool comes from, and goes to, m; by default a block's longest side.
     postures
         Joint values of arms by robot and node, where they are known.
 
@@ -125,8 +124,7 @@ def plan_tasks(
     [('rob2', 'pick', 2), ('rob2', 'place', 2), ('rob1', 'hold', 1)]
     """
     far = None if distance is None else positive("distance", distance, "m")
-    known = _checked(scene, postures or {})
-    found = cache(partial(_grip, scene, far, known))
+    found = cache(partial(_grip, scene, far, _checked(scene, postures or {})))
     last: Grips = (None,) * len(scene.robots)
     for step in steps:
         tasks = []

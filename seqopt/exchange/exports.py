@@ -196,9 +196,12 @@ class _Source:
     graph: Any = None  # its document if it is a graph of compas_assembly
 
 
-def _read_source(scene: Scene, path: Path) -> _Source:
+def _read_source(scene: Scene, source: str | Path | None) -> _Source | None:
     """Return the file from which a scene was imported, in any format that ``import`` knows."""
-    content, graph = read_content(path), None
+    if source is None:
+        return None
+    path, graph = Path(source), None
+    content = read_content(path)
     keys = names = [block.key for block in content.blocks]
     if path.suffix.lower() == ".json":
         document = assembly_json(read_text(path), str(path))
@@ -391,14 +394,9 @@ def export_plan(  # what is written, and what some formats take beside
     form
         One of `EXPORTS`.
     source
-        The file from which the scene was imported, of any format, for formats of COMPAS: the plan
-        then names its elements, or is written into it if it is an assembly.
-    distance
-        From a grip to where a tool comes from, m, for formats of tasks; see `plan_tasks`.
-    postures
-        Joint values of arms by robot and node, for formats of tasks; by default those of
-        `seqopt.arms.find_postures`, where robots of the scene have arms. An empty mapping leaves
-        them out.
+        The imported file, for formats of COMPAS: its elements are named, and an assembly completed.
+    distance, postures
+        For formats of tasks, see `plan_tasks`; by default postures that the arms can have.
 
     Returns
     -------
@@ -409,8 +407,6 @@ def export_plan(  # what is written, and what some formats take beside
     ------
     StepError
         If the format is not known or does not take what is given.
-    ExtraError
-        If postures have to be computed and what computes them (extra ``arms``) is not installed.
 
     Examples
     --------
@@ -424,11 +420,10 @@ def export_plan(  # what is written, and what some formats take beside
         raise StepError(f"format is {short(form)}; give one of {', '.join(EXPORTS)}")
     if form not in _TASKS and (distance is not None or postures):
         raise StepError(f"format {form} takes no distance or postures; {', '.join(TASKS)} do")
-    if form in _WITH_SOURCE:
-        read = None if source is None else _read_source(scene, Path(source))
-        return _WITH_SOURCE[form](scene, steps, read)
-    if source is not None:
+    if source is not None and form not in _WITH_SOURCE:
         raise StepError(f"format {form} takes no source; leave it out")
+    if form in _WITH_SOURCE:
+        return _WITH_SOURCE[form](scene, steps, _read_source(scene, source))
     if form in _TASKS:
         return _TASKS[form](scene, _known_tasks(scene, steps, distance, postures))
     return _BLOCKS[form](scene) if form in _BLOCKS else _PLAIN[form](scene, steps)

@@ -11,7 +11,7 @@ from seqopt.scene.scene_file import save_scene
 from tests.builders import small_arch
 from tests.commands import command
 
-OF_OTHERS = {"next", "import", "judge", "paper", "completion"}  # of a policy, files, a shell
+OF_OTHERS = {"next", "import", "judge", "completion"}  # of a policy, files, a shell
 ALONE = sorted(COMMANDS.keys() - OF_OTHERS)
 
 

@@ -106,7 +106,7 @@ def test_every_example_of_help_can_be_parsed():
 def test_every_option_stands_in_a_group_with_a_title():
     for command in _commands(parser()):
         titles = [group.title for group in command._action_groups if group._group_actions]
-        if command.prog not in ("seqopt completion", "seqopt paper"):
+        if command.prog != "seqopt completion":
             assert len(titles) >= 3, command.prog
             assert all(title.endswith("?") for title in titles[1:] if title), command.prog
         loose = [a.dest for a in command._optionals._group_actions]

@@ -10,21 +10,7 @@ import pytest
 from scipy import stats
 
 from experiments.calibration.calibration import intervals, squares, turning_share
-from experiments.calibration.parts.calibration_readings import GROUPS, RATIO, against_study, closest
-from experiments.calibration.parts.calibration_spread import (
-    ANEW,
-    GAIN,
-    IN_SAMPLE,
-    chosen_anew,
-    comparison,
-    interval,
-    left_out,
-    rotational,
-)
-from experiments.harness.results import RESULTS
-from seqopt.network._mechanics import spring_maps
-from seqopt.network.build import build_network
-from seqopt.study._barrel_vaults import (
+from experiments.calibration.parts.barrel_vaults import (
     BED,
     Chain,
     chain,
@@ -39,6 +25,20 @@ from seqopt.study._barrel_vaults import (
     square_scale,
     vaults,
 )
+from experiments.calibration.parts.calibration_readings import GROUPS, RATIO, against_study, closest
+from experiments.calibration.parts.calibration_spread import (
+    ANEW,
+    GAIN,
+    IN_SAMPLE,
+    chosen_anew,
+    comparison,
+    interval,
+    left_out,
+    rotational,
+)
+from experiments.harness.results import RESULTS
+from seqopt.network._mechanics import spring_maps
+from seqopt.network.build import build_network
 from seqopt.study.published import printed
 
 VAULTS = vaults()

@@ -41,8 +41,8 @@ from experiments.placement import (
 )
 from experiments.stability import classical, dry_map, witnesses
 from experiments.study import criteria_variants, paper_counterparts
+from experiments.study.parts.counterpart_items import ITEMS
 from experiments.times import makespan
-from seqopt._paper.items import ITEMS
 from seqopt.study.published import printed
 
 STUDY = printed("de_validation").set_index("bricks")["error_percent"]

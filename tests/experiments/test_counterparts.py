@@ -9,9 +9,16 @@ import pandas as pd
 import pytest
 
 from experiments.study.paper_counterparts import KNOWN, faults
+from experiments.study.parts.counterpart_items import (
+    AGREES,
+    DISAGREES,
+    ITEMS,
+    PARTLY,
+    TITLES,
+    verdict,
+)
 from experiments.study.parts.counterpart_page import page
-from seqopt._paper.items import AGREES, DISAGREES, ITEMS, PARTLY, TITLES, verdict
-from seqopt._paper.rows import COUNTERPARTS, cell
+from experiments.study.parts.counterpart_rows import COUNTERPARTS, cell, ours, tabulate
 from tests.builders import ROOT
 
 STORED = pd.read_csv(ROOT / "experiments" / "results" / "paper_counterparts.csv")
@@ -70,6 +77,17 @@ def test_whatever_has_numbers_has_a_counterpart():
     for item in WITH_NUMBERS:
         assert f"](figures/counterpart_{item.picture}.png)" in PAGE
         assert (ROOT / "docs" / "figures" / f"counterpart_{item.picture}.png").exists()
+
+
+@pytest.mark.slow
+def test_what_is_computed_is_what_is_stored():
+    own = ours()
+    values = pd.concat([tabulate(item.label, own) for item in WITH_NUMBERS], ignore_index=True)
+    for column in ("id", "quantity", "at"):
+        assert [*values[column]] == [*STORED[column]]
+    assert values["ours"].to_numpy(float) == pytest.approx(
+        STORED["ours"].to_numpy(float), rel=1e-4, abs=1e-4
+    )
 
 
 def test_an_item_without_counterpart_is_found():

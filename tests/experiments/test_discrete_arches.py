@@ -24,9 +24,9 @@ from experiments.discrete.parts.arch_pads import (
     readings,
 )
 from experiments.harness.results import RESULTS
+from experiments.harness.yardstick import STEPS, error, moved
 from seqopt.engines.discrete.engine import Across, Pinch, _pad_stiffness
 from seqopt.sequence.two_robots import sequential
-from seqopt.study._yardstick import STEPS, error, moved
 from seqopt.study.published import STUDY_PADS, printed
 
 

@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 from scipy.optimize import minimize
 
+from experiments.calibration.parts import barrel_vaults as barrel
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
 from seqopt.responses import calibrate
 from seqopt.scene.arch import ArchShape, arch_scene
-from seqopt.study import _barrel_vaults as barrel
 
 SHIFT, TURN = 1.7, 0.4  # factors that are to be found
 SLIDE, BEND = 3e7, 4e5

@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from experiments.harness.yardstick import errors, percentiles, tension_share
 from seqopt.report.comparison import compare
 from seqopt.responses.table import analyze
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study._yardstick import errors, percentiles, tension_share
 from seqopt.study.published import EQUATIONS, as_printed, printed, printed_steps, published_plan
 
 FITTED = {"sequential": "Table A.1", "cantilever": "Table A.2"}

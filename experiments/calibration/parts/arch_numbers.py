@@ -8,11 +8,11 @@ import pandas as pd
 from scipy.optimize import brentq
 
 from experiments.harness.results import RESULTS
+from experiments.harness.yardstick import ROUNDING, errors, percentiles, tension_share
 from seqopt import ArchShape, Scene, analyze, arch_scene, build_network, load_scene
 from seqopt.arrays import Floats
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study._yardstick import ROUNDING, errors, percentiles, tension_share
 from seqopt.study.published import PUBLISHED, ROBOTS, as_printed, printed_steps, published_plan
 
 SPAN, HEIGHT, BRICKS = 2.08, 1.93, 25  # m, section 3.1

@@ -13,9 +13,9 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
+from experiments.calibration.parts import barrel_vaults
+from experiments.calibration.parts.barrel_vaults import Parts, Vault, chain, planar_parts, vaults
 from seqopt.arrays import Floats
-from seqopt.study import _barrel_vaults as barrel_vaults
-from seqopt.study._barrel_vaults import Parts, Vault, chain, planar_parts, vaults
 
 PRINTED = (1e11, 0.9e9)  # N/m³ and what is printed in kN/(rad m²), in N
 POWERS = {"b": (0, 1.0), "b t": (1, 1.0), "b t2": (2, 1.0), "b t3/12": (3, 1 / 12)}

@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from experiments.calibration.parts import barrel_vaults
+from experiments.calibration.parts.barrel_vaults import BED, LAWS, MEASURES, Law, Vault, errors, fit
 from seqopt.arrays import Floats
-from seqopt.study import _barrel_vaults as barrel_vaults
-from seqopt.study._barrel_vaults import BED, LAWS, MEASURES, Law, Vault, errors, fit
 
 LEVEL = 0.95
 ACROSS = {"rigid": 0.0, "as stiff as along": 1.0, "a tenth as stiff": 10.0}  # compliance ratio

@@ -11,12 +11,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import linprog
 
+from experiments.calibration.parts.barrel_vaults import Vault
 from seqopt import Scene
 from seqopt.arrays import Floats
 from seqopt.network.build import build_network
 from seqopt.scene import Load
 from seqopt.scene.library import barrel_vault
-from seqopt.study._barrel_vaults import Vault
 from seqopt.study.published import printed
 
 UNIT = 1000.0  # N; the load of which multiples are sought

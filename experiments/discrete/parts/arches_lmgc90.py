@@ -19,6 +19,7 @@ from experiments.discrete.parts import arch_pads
 from experiments.discrete.parts.arch_pads import SPREADS, AtCorners, padded, posed
 from experiments.harness import lmgc90
 from experiments.harness.lmgc90 import python_with_lmgc90
+from experiments.harness.yardstick import error, inner_nodes, moved
 from seqopt import EPOXY, Step
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
@@ -27,7 +28,6 @@ from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network._mechanics import node_motion
 from seqopt.network.network import GROUND, Network
-from seqopt.study._yardstick import error, inner_nodes, moved
 from seqopt.study.published import STUDY_BED, STUDY_PADS
 
 PAD = 0.02  # m, side of the square that a pad touches: not printed

@@ -7,15 +7,23 @@ import textwrap
 
 import pandas as pd
 
-from seqopt._paper.items import AGREES, DISAGREES, ITEMS, PARTLY, TITLES, Item, stated, verdict
+from experiments.study.parts.counterpart_items import (
+    AGREES,
+    DISAGREES,
+    ITEMS,
+    PARTLY,
+    TITLES,
+    Item,
+    stated,
+    verdict,
+)
 
 INTRODUCTION = """\
 ## Every figure and table
 
 `python -m experiments.study.paper_counterparts` computes every figure and table that has numbers,
 draws them beside the printed ones, and writes this part of the page; all values are in
-`experiments/results/paper_counterparts.csv`. `seqopt paper --out DIR` writes the same tables and
-figures from an installation. The error is the difference beyond rounding, relative
+`experiments/results/paper_counterparts.csv`. The error is the difference beyond rounding, relative
 to the printed value or to 1. An item *agrees* if every value is within 5 % of print, *agrees in
 part* if at least half of the values are, and *disagrees* otherwise.
 

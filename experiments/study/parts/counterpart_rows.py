@@ -1,7 +1,7 @@
 """Printed and computed values, side by side, of every figure and table of the paper.
 
-Every function yields the rows of one item of `seqopt._paper.items`, named by its
-label in `COUNTERPARTS`.
+Every function yields the rows of one item of `counterpart_items`, named by its label in
+`COUNTERPARTS`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from experiments.calibration.parts.barrel_vaults import BED, chain, fit, laws, vaults
+from experiments.harness.yardstick import ROUNDING, STEPS, VALUES, error, inner_nodes, moved
 from seqopt.arrays import Floats
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Engine
@@ -30,8 +32,6 @@ from seqopt.sequence.schedule import OpenGrip, OpenStep
 from seqopt.sequence.steps import Step
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.sequence.two_robots import METHODS
-from seqopt.study._barrel_vaults import BED, chain, fit, laws, vaults
-from seqopt.study._yardstick import ROUNDING, STEPS, VALUES, error, inner_nodes, moved
 from seqopt.study.published import (
     EQUATIONS,
     STUDY_BED,

@@ -11,14 +11,21 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
-from seqopt._paper import rows as counterpart_rows
-from seqopt._paper.items import NEAR, caption
-from seqopt._paper.rows import LOOP, RESPONSES, Ours, arch_corners, bed_of_springs, plan_rows
+from experiments.calibration.parts.barrel_vaults import Vault, chain, vaults
+from experiments.study.parts import counterpart_rows
+from experiments.study.parts.counterpart_items import NEAR, caption
+from experiments.study.parts.counterpart_rows import (
+    LOOP,
+    RESPONSES,
+    Ours,
+    arch_corners,
+    bed_of_springs,
+    plan_rows,
+)
 from seqopt.engines.interface import Want
 from seqopt.report._robots import ROBOT_COLORS
 from seqopt.report._style import BLUE, INK, SMALL, VERMILION, dress, look, new_figure, plain, styled
 from seqopt.report.draw import View, draw_bricks, draw_grips
-from seqopt.study._barrel_vaults import Vault, chain, vaults
 from seqopt.study.published import printed
 
 OURS, STUDY, OFF = BLUE, "#222222", VERMILION
