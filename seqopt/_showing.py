@@ -9,37 +9,23 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from seqopt._files import write_text
+from seqopt._registry import offered
 from seqopt.errors import ExtraError
 
 PAGE = "report.html"  # the page in a folder that a command writes
-DISPLAYS = {
-    "card": "seqopt.report._notebook",
-    "scene_picture": "seqopt.report._pictures",
-    "network_picture": "seqopt.report._pictures",
-    "steps_picture": "seqopt.report._pictures",
-    "tilt_picture": "seqopt.report._failure_chart",
-    "gantt_picture": "seqopt.report._pictures",
-    "seconds_picture": "seqopt.report.gantt._seconds",
-    "Film": "seqopt.report._film",
-    "build_page": "seqopt.report._pages",
-    "failure_figure": "seqopt.report._failure_chart",
-    "speed_chart": "seqopt.report._speed._chart",
-}
-"""The functions that draw, by name, and the module of each."""
 
 
 def display(name: str) -> Callable[..., Any]:
-    """Return a function of `DISPLAYS`, loaded when it is first asked for.
+    """Return the function that draws something, loaded when it is first asked for.
 
     Raises `ExtraError` if it needs matplotlib and that is not installed.
     """
     try:
-        found: Callable[..., Any] = getattr(import_module(DISPLAYS[name]), name)
+        found: Callable[..., Any] = offered(name)
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] != "matplotlib":
             raise

@@ -26,7 +26,6 @@ from formulations.times._stages import ALMOST, Choose, StageFound, Stages
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
-from seqopt.graph._timed import timed_graph
 from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
 from seqopt.graph.instances.instance import PEAK, TIME, Instance
 from seqopt.graph.paths import tied
@@ -36,9 +35,10 @@ from seqopt.graph.states.states import States
 from seqopt.problem.problem import Goal, Measure
 from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence._rule_space import FreeSpace
-from seqopt.sequence._timing import StepTime, reassigned_steps, step_times
-from seqopt.stability._aging.builds import CuringBuilds
-from seqopt.stability._aging.cuts import FallCuts
+from seqopt.times._curing import CuringBuilds
+from seqopt.times._fall_cuts import FallCuts
+from seqopt.times._graph import timed_graph
+from seqopt.times._steps import StepTime, reassigned_steps, step_times
 from seqopt.work.progress import Tell
 
 

@@ -38,12 +38,12 @@ from seqopt.problem.requirements import Criterion
 from seqopt.scene._props import Prop
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
-from seqopt.sequence._timing import step_times
 from seqopt.sequence.rules import FREE, Direction, FreeRules
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import StepKind
-from seqopt.stability._aging.builds import CuringBuilds
+from seqopt.times._curing import CuringBuilds
+from seqopt.times._steps import step_times
 from seqopt.workflow import SEARCH, posed
 
 ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone

@@ -13,10 +13,11 @@ import numpy as np
 from seqopt._files import parse_json, read_text
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError, SolverError
-from seqopt.graph._timed import HELD, NOW, TimedGraph
 from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _Target, _target_sums
 from seqopt.judge._claims import ABOVE, Claim, first_stage, next_stage, proven, within_caps
+from seqopt.judge._twin import twin_of
 from seqopt.judge.certificate import TOLERANCE, Certificate
+from seqopt.problem.problem import Measure
 from seqopt.scene._checks import as_float, short
 
 WHAT = ("nodes", "arcs", "acts")
@@ -261,7 +262,8 @@ def _walked(instance: Instance, answer: Answer) -> _Walk:
         raise SolverError(f"the path stops at node {at}, where none may end")
     ends = 0.0
     if instance.timed is not None and instance.asks_time:
-        ends = path_makespan(instance.timed, arcs, acts)
+        twin = twin_of(Measure.MAKESPAN)
+        ends = np.nan if twin is None else twin.path_value(instance.timed, arcs, acts)
     return _Walk(arcs, ends)
 
 
@@ -359,28 +361,3 @@ def _require_modest(goal: _Target, claim: Claim, found: tuple[float, float], *, 
         raise SolverError(
             f"{goal.name}: a bound of {claim.value:.9g} is claimed, and {bound:.9g} is proven"
         )
-
-
-def path_makespan(timed: TimedGraph, arcs: Ints, acts: Ints | None = None) -> float:
-    """Return when the last act of a path ends, s, whoever acts as is best, or as acts (k,) say."""
-    first = np.searchsorted(timed.move, np.arange(len(timed.prepares) + 1))
-    labels = {(0.0, *[0.0] * len(timed.kinds))}
-    for step, arc in enumerate(arcs.tolist()):
-        every = range(first[arc], first[arc + 1]) if acts is None else [int(acts[step])]
-        found = {_acted(timed, act, label) for act in every for label in labels}
-        labels = {x for x in found if not any(_beats(y, x) for y in found)}
-    return min(label[0] for label in labels)
-
-
-def _acted(timed: TimedGraph, act: int, label: tuple[float, ...]) -> tuple[float, ...]:
-    """Return when an act ends, and since when robots of columns are free after it."""
-    end, *since = label
-    move, column = timed.move[act], int(timed.column[act])
-    begins = end if column < 0 else max(end, since[column] + float(timed.prepares[move]))
-    ends = begins + float(timed.acts[move])
-    where = {HELD: 0.0, NOW: ends}
-    return (ends, *(where[o] if o < 0 else since[o] for o in timed.origin[act].tolist()))
-
-
-def _beats(first: tuple[float, ...], second: tuple[float, ...]) -> bool:
-    return first != second and all(a <= b for a, b in zip(first, second, strict=True))

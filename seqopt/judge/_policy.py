@@ -14,7 +14,7 @@ from seqopt.arrays import Floats, Ints
 from seqopt.errors import SolverError
 from seqopt.graph.graph import Graph
 from seqopt.graph.states.states import States
-from seqopt.judge._proof import Asked, Passable, _Levels, _rows
+from seqopt.judge._proof import Asked, Levels, Passable, _rows
 from seqopt.judge.certificate import TOLERANCE
 
 WRONG = "the policy is not what it says: {}"
@@ -35,7 +35,7 @@ def check_policy(
         return 0
     twin = replace(problem)
     passable = Passable(twin)
-    found = _Levels(passable, {}, Asked(exact=True))
+    found = Levels(passable, {}, Asked(exact=True))
     graph = found.graph()
     row = _row_of(twin, passable, found, (levels, states))
     amounts, left = graph.amounts[:, 0], np.where(graph.ends, _nothing(graph), values[row])
@@ -59,7 +59,7 @@ def _nothing(graph: Graph) -> float:
     return -np.inf if graph.peaks[0] else 0.0
 
 
-def _row_of(problem: States, passable: Passable, found: _Levels, table: tuple[Ints, Ints]) -> Ints:
+def _row_of(problem: States, passable: Passable, found: Levels, table: tuple[Ints, Ints]) -> Ints:
     """Return the rows of a table that the states of the proof have; all must have one."""
     levels, states = table
     parts = []

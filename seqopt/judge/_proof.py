@@ -26,13 +26,13 @@ from seqopt.graph.paths import (
     strictly_below,
     tied,
 )
+from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import move_amounts
 from seqopt.graph.states.states import States
 from seqopt.judge._answers import alike, ask, near, screens
-from seqopt.judge._mortar_floors import cured_rows
 from seqopt.judge._rule_moves import Follows, RuleTables, ScheduleTables
 from seqopt.judge._standing_proof import StandingProof
-from seqopt.judge._timed_goals import Claim, GoalProofs, TimedStates
+from seqopt.judge._twin import Twin
 from seqopt.problem.problem import Measure
 from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses._grip_sets import KnownRows
@@ -290,14 +290,14 @@ class Proof:
         """Return whether states strictly below the one worst value there is reach no end."""
         if [goal.measure for goal in self._passable.problem.goals] != [Measure.PEAK]:
             return False
-        graph = _Levels(self._passable, self._told, Asked(values, strict=True)).graph()
+        graph = Levels(self._passable, self._told, Asked(values, strict=True)).graph()
         seen = reached(graph)
         self.states = int(seen.sum())
         return not graph.ends[seen].any()
 
     def _of_paths(self, asked: Asked) -> tuple[float, ...]:
         """Return bounds by the paths of states that are not proven to fall."""
-        levels = _Levels(self._passable, self._told, asked)
+        levels = Levels(self._passable, self._told, asked)
         graph, values = levels.graph(), asked.values
         while True:
             out = lexicographic_bounds(graph, values)
@@ -314,34 +314,19 @@ class Proof:
         """Return the same for plans within budgets, by prices that a formulation gives."""
         caps, margins = self._passable.problem.budgets, values[: self._passable.margins]
         stand = margins if self._passable.stands.asked(margins) else None
-        levels = _Levels(self._passable, self._told, Asked(values, stand, exact=True))
+        levels = Levels(self._passable, self._told, Asked(values, stand, exact=True))
         self.states = sum(map(len, levels.states))
         return budget_bounds(levels.graph(), values, claimed, (caps, prices))
 
-    def timed_bounds(self, claim: Claim) -> tuple[float, ...]:
-        """Return the same for builds in time, by labels that a formulation gives.
-
-        Raises `SolverError` if labels are given that do not prove what is claimed.
-        """
-        passable, values = self._passable, claim.values
-        k = passable.margins
-        levels = _Levels(passable, self._told, Asked(values, exact=True))
-        graph, margins = levels.graph(), values[:k]
-        stands = passable.stands.asked(margins)
-
-        def fallen(level: int, rows: Ints) -> Bools:
-            if not stands:
-                return np.zeros(len(rows), dtype=bool)
-            return ~passable.may_stand(level, rows, margins)
-
-        bricks = [passable.tables.bricks_at(level) if level else 0 for level in levels.levels]
-        grips = [passable.held_by(rows) for rows in levels.states]
-        cured = cured_rows(passable.problem, bricks, grips, claim.motions)
+    def timed_bounds(
+        self, twin: Twin, values: Sequence[float], found: StatePath
+    ) -> tuple[float, ...]:
+        """Return the same for measures of whole paths, by their twin, of a path that is claimed."""
+        passable = self._passable
+        levels = Levels(passable, self._told, Asked(values, exact=True))
+        graph, bounds = levels.graph(), twin.bounds(levels, values, found)
         while True:
-            own = passable.tables, levels.states, levels.levels, graph, fallen, cured
-            states = TimedStates(passable.problem, *own)
-            proofs = GoalProofs(states, claim)
-            out = (*values[:k], *proofs.bounds(k))
+            out = (*values[: passable.margins], *bounds(graph))
             early = [b < v - BELOW * abs(v) for b, v in zip(out, values, strict=False)]
             fell = self._fallen(levels, graph, values) if any(early) else ()
             if not len(fell):
@@ -362,7 +347,7 @@ class Proof:
             return True
         if self._passable.stands.asked(margins) and not caps:
             return self._cuts(margins)
-        graph = _Levels(self._passable, self._told, Asked((), margins)).graph()
+        graph = Levels(self._passable, self._told, Asked((), margins)).graph()
         self.states = max(self.states, graph.states)
         return is_beyond(graph, caps) if caps else not graph.ends[reached(graph)].any()
 
@@ -372,7 +357,7 @@ class Proof:
         ``values``: of goals; of the first alone, if it is about a worst step, or of none. States
         with fewer bricks are all that this depends on. Result: None where a plan may be as good.
         """
-        levels, tables = _Levels(self._passable, {}, Asked(values, ())), self._passable.tables
+        levels, tables = Levels(self._passable, {}, Asked(values, ())), self._passable.tables
         parts = np.repeat(levels.levels, [*map(len, levels.states)])
         graph = levels.graph()
         seen = reached(graph)
@@ -385,7 +370,7 @@ class Proof:
 
         Which are asked is of no account: without those that fall, no end may be reached.
         """
-        passable, levels = self._passable, _Levels(self._passable, {}, Asked())
+        passable, levels = self._passable, Levels(self._passable, {}, Asked())
         graph = levels.graph()
         parts = np.repeat(np.arange(len(levels.states)), [*map(len, levels.states)])
         starts = np.searchsorted(parts, np.arange(len(levels.states)))
@@ -411,7 +396,7 @@ class Proof:
         room = [not b >= v - BELOW * abs(v) for v, b in zip(values, bounds, strict=False)]
         return next((k for k in range(self._passable.margins, len(room)) if room[k]), None)
 
-    def _fallen(self, levels: _Levels, graph: Graph, values: Sequence[float]) -> Ints:
+    def _fallen(self, levels: Levels, graph: Graph, values: Sequence[float]) -> Ints:
         """Return the states of a path that would be better that are proven to fall."""
         passable, first, out = self._passable, 0, [np.zeros(0, dtype=np.int64)]
         margins = values[: passable.margins]
@@ -429,11 +414,11 @@ class Proof:
         return np.concatenate(out)
 
 
-class _Levels:
+class Levels:
     """The states that a better plan could pass, level by level, and the moves between them."""
 
     def __init__(self, passable: Passable, told: Mapping[int, Ints], asked: Asked) -> None:
-        self._passable, self._asked = passable, asked
+        self.passable, self._asked = passable, asked
         self.levels, self.states = list[int](), list[Ints]()
         none = np.zeros(0, dtype=np.int64)  # it may end where it begins
         self._moves = [(none, none, np.zeros((0, len(passable.problem.goals))))]
@@ -452,13 +437,13 @@ class _Levels:
         self.states.append(start)
         self._ends.append(np.zeros(1, dtype=bool))
         self._count += 1
-        return [(move.source, move) for move in self._passable.tables.follow(level, start)]
+        return [(move.source, move) for move in self.passable.tables.follow(level, start)]
 
     def _close(
         self, level: int, entries: Ints, coming: list[tuple[Ints, Follows]]
     ) -> list[tuple[Ints, Follows]]:
         """Add the states of a level; return the moves that place the next one."""
-        part, tables = self._passable.closed(level, entries, self._asked), self._passable.tables
+        part, tables = self.passable.closed(level, entries, self._asked), self.passable.tables
         moves = [(follows.source + self._count, follows) for follows in part.follows]
         order = np.argsort(part.codes, kind="stable")
         for source, move in [*coming, *(pair for pair in moves if pair[1].level == level)]:
@@ -468,7 +453,7 @@ class _Levels:
             kept[kept] = part.codes[order[at[kept]]] == wanted[kept]
             target = order[at[kept]]
             taken = move._replace(way=move.way[kept])
-            amounts = self._passable.moved(part.values[target], taken)
+            amounts = self.passable.moved(part.values[target], taken)
             self._moves.append((source[kept], self._count + target, amounts))
         self._count += len(part.states)
         self.levels.append(level)
@@ -480,7 +465,7 @@ class _Levels:
         """Return them as a graph; the moves are then used up."""
         source, target, amounts = map(np.concatenate, zip(*self._moves, strict=True))
         self._moves.clear()
-        peaks = tuple(goal.measure is Measure.PEAK for goal in self._passable.problem.goals)
+        peaks = tuple(goal.measure is Measure.PEAK for goal in self.passable.problem.goals)
         rows = source.astype(np.int32), target.astype(np.int32)
         return Graph(*rows, amounts, peaks, np.concatenate(self._ends))
 

@@ -16,16 +16,13 @@ from itertools import pairwise
 import numpy as np
 
 from seqopt.errors import SolverError, StepError
-from seqopt.graph._counted import least_by_counts
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
-from seqopt.judge._mortar_check import check_cured
 from seqopt.judge._posture_rules import check_postures, check_props
 from seqopt.judge._proof import BELOW, Hint, Proof
 from seqopt.judge._shape_rules import check_shape
 from seqopt.judge._standing_proof import proven_margins, require_margin
-from seqopt.judge._time_proof import makespan, step_ends
-from seqopt.judge._timed_goals import Claim
+from seqopt.judge._twin import Twin, twin_of
 from seqopt.judge.certificate import Certificate
 from seqopt.problem.problem import LARGEST, Goal, Measure
 from seqopt.problem.standing import _size, slack
@@ -57,12 +54,13 @@ def judge_schedule(
     a limit is exceeded, or a plan is better than promised; `StepError` if a step breaks a rule.
     """
     values = _as_claimed(problem, selection, steps)
-    if problem.is_timed and np.isfinite(selection.bound).any():
-        return _in_time(problem, selection, values, hint)
-    if selection.stopped:  # its bounds are claimed, not proven; how long builds take is counted
-        bounds = _counted(problem, values, (-np.inf,) * len(values))
+    twin = twin_of(Measure.MAKESPAN) if problem.is_timed else None
+    if twin is not None and np.isfinite(selection.bound).any():
+        return _by_twin(problem, twin, selection, values, hint)
+    if selection.stopped or (problem.is_timed and twin is None):
+        bounds = _counted(problem, twin, values, (-np.inf,) * len(values))
         gap = _gap(problem.aims, values, bounds)
-        return Certificate(values, bounds, gap, gap)
+        return Certificate(values, bounds, gap, gap)  # its bounds are claimed, not proven
     if problem.totals:
         return _over_totals(problem, selection, values[0], hint)
     proof = Proof(problem, hint)
@@ -77,20 +75,19 @@ def judge_schedule(
     return Certificate(values, bounds, gap, gap, {}, proof.states)
 
 
-def _in_time(
-    problem: States, selection: StatePath, values: tuple[float, ...], hint: Hint | None
+def _by_twin(
+    problem: States, twin: Twin, selection: StatePath, values: tuple[float, ...], hint: Hint | None
 ) -> Certificate:
-    """Return the certificate of a build in time: what labels prove, and prices alone."""
+    """Return the certificate of a build of which a measure of the whole path counts."""
     aims, proof = len(problem.aims), Proof(problem, hint)
     for goal, spent, cap in zip(problem.goals[aims:], values[aims:], problem.budgets, strict=True):
         if not spent <= cap + TOLERANCE * cap:
             raise SolverError(f"{goal} is {spent:.9g}, more than the {cap:g} that are allowed")
     margins = _margin_bounds(problem, proof, values)
-    claim = Claim(values, selection.bound, selection.proofs, selection.motions)
-    bounds = (*margins, *proof.timed_bounds(claim)[len(margins) :])
+    bounds = (*margins, *proof.timed_bounds(twin, values, selection)[len(margins) :])
     pairs = list(zip(bounds, values, strict=False))
     bounds = tuple(v if b >= v - BELOW * abs(v) else b for b, v in pairs)
-    bounds = _counted(problem, values, bounds)
+    bounds = _counted(problem, twin, values, bounds)
     said = zip(bounds, selection.bound, values, strict=False)
     claimed = [min(v, max(b, other)) for b, other, v in said]
     gap, left = (_gap(problem.goals, values, each) for each in (bounds, claimed))
@@ -98,12 +95,12 @@ def _in_time(
 
 
 def _counted(
-    problem: States, values: Sequence[float], bounds: Sequence[float]
+    problem: States, twin: Twin | None, values: Sequence[float], bounds: Sequence[float]
 ) -> tuple[float, ...]:
     """Return bounds of first goals, those on makespans no less than what all builds take."""
-    if not problem.is_timed:
+    if twin is None:
         return tuple(bounds)
-    least = least_by_counts(problem.network, problem.rules)
+    least = twin.least(problem.network, problem.rules)
     return tuple(
         max(bound, min(least, value)) if goal.measure is Measure.MAKESPAN else bound
         for goal, value, bound in zip(problem.goals, values, bounds, strict=False)
@@ -235,29 +232,22 @@ def plan_values(
     _require_limits(problem, columns)
     margins = _margins(problem, steps)
     regrips = sum(step.kind is StepKind.REPOSITION for step in steps)
-    travel = _travel_of(problem, steps)
     moves: dict[Measure, float] = {Measure.STEPS: len(steps), Measure.REGRIPS: regrips}
-    moves |= {Measure.TRAVEL: travel, Measure.MAKESPAN: _makespan(problem, steps, starts)}
+    moves[Measure.TRAVEL] = _travel_of(problem, steps)
     out = []
     for k, goal in enumerate(problem.goals):
         if goal.of_margins:
             require_margin(goal.response, claimed[k], margins[goal.response])
             out.append(claimed[k])
-        elif not goal.of_states:
+        elif goal.measure in moves:
             out.append(float(moves[goal.measure]))
+        elif not goal.of_states:
+            twin = twin_of(goal.measure)
+            out.append(claimed[k] if twin is None else twin.value(problem, steps, starts))
         else:
             costs = _costs(problem, goal, columns, [step.bricks for step in steps])
             out.append(float(costs.max() if goal.measure is Measure.PEAK else costs.sum()))
     return tuple(out)
-
-
-def _makespan(problem: States, steps: Sequence[Step], starts: Sequence[float]) -> float:
-    """Return how long a build takes, s, and require that no step comes before its mortar holds."""
-    standing, scene, begin = problem.standing, problem.network.scene, problem.rules.begin
-    if standing is None or standing.curing is None:
-        return makespan(scene, steps, begin)
-    check_cured(problem.network, steps, standing, starts, begin)
-    return step_ends(scene, steps, starts, begin)[-1]
 
 
 def _in_all(

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from seqopt._registry import offered
 from seqopt.arrays import Bools, Ints
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph._explore import Explorer, Visited
-from seqopt.graph._timed import TimedGraph, timed_graph
+from seqopt.graph._timed import TimedGraph
 from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.graph.graph import Graph
 from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _by_goal, _Cap, _Target
@@ -156,7 +157,7 @@ def _of_states(name: str, graph: States | AllOrders, below: float) -> Instance:
     if states.is_timed:
         if states.standing is not None and states.standing.curing is not None:
             raise ProblemError("instance: how mortar cures is not in it; leave curing out")
-        timed = timed_graph(states, visited)
+        timed = offered("timed_graph")(states, visited)
         every = [k for k, goal in enumerate(states.goals) if goal.measure is not Measure.MAKESPAN]
         peaks = tuple(whole.peaks[k] for k in every)
         whole = Graph(whole.source, whole.target, whole.amounts[:, every], peaks, whole.ends)

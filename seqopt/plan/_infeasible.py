@@ -16,7 +16,6 @@ from seqopt.arrays import Ints
 from seqopt.engines.registry import recipe_of
 from seqopt.errors import InfeasibleError, NothingFoundError, SeqoptError, SolverError
 from seqopt.graph._budgets import within_budgets
-from seqopt.graph._counted import least_by_counts
 from seqopt.graph._explore import Explorer
 from seqopt.graph.layers.costs import Budget, LayeredCosts, _array_by_array, _where_allowed
 from seqopt.graph.layers.interface import CostProblem, PlacementProblem
@@ -26,6 +25,7 @@ from seqopt.graph.states._visits import barred, explore
 from seqopt.graph.states.states import States
 from seqopt.judge._budget_proof import is_kept, least_within, too_small
 from seqopt.judge._proof import Proof
+from seqopt.judge._twin import twin_of
 from seqopt.judge.certificate import least_sum
 from seqopt.plan._softer import HARD, _ground_moves, _softer, _whole_load
 from seqopt.plan.search._margin_search import WORST, StandingLook, bisected, with_margin
@@ -212,7 +212,9 @@ def _over_budget(problem: States, found: Explorer, name: str, *, exact: bool) ->
     words, proven = [], False
     for k, cap in enumerate(problem.budgets, start=len(problem.aims)):
         if problem.goals[k].measure is Measure.MAKESPAN:  # what it is at best takes a search
-            if (least := least_by_counts(problem.network, problem.rules)) > tied(cap):
+            twin = twin_of(Measure.MAKESPAN)
+            least = -np.inf if twin is None else twin.least(problem.network, problem.rules)
+            if least > tied(cap):
                 proven = True
                 words.append(f"makespan is at least {least:.6g} s, and {cap:g} s are allowed")
                 continue

@@ -8,19 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from seqopt._registry import offered
 from seqopt._showing import Page, Shown, display
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines.interface import Engine
-from seqopt.plan._times import reassign, times_table
 from seqopt.problem.standing import Standing
 from seqopt.responses._enough import Enough, what_was_enough
 from seqopt.responses._props import props_table
 from seqopt.responses._tolerance import tolerance_table
 from seqopt.responses.table import Departure, LinearRange, grips_table
-from seqopt.sequence._timing import Waits, has_durations, step_times
+from seqopt.sequence._durations import has_durations
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step
-from seqopt.stability._aging.builds import CuringBuilds
 from seqopt.stability._step_verdicts import step_verdicts
 from seqopt.stability.assessment import MARGINS, Verdict
 from seqopt.stability.steps import assess_steps, stability_table
@@ -142,15 +141,18 @@ class ShownBuild(Shown):
         ``joint`` that was the last to hold. Raises `StepError` if it is not known how long a robot
         takes that acts.
         """
-        return times_table(self.engine.network.scene, self.steps, self._waits, self._begin)
+        scene = self.engine.network.scene
+        table: pd.DataFrame = offered("times_table")(scene, self.steps, self._waits, self._begin)
+        return table
 
     @property
     def makespan(self) -> float | None:
         """How long the build takes, s; None if it is not known how long robots take."""
-        scene = self.engine.network.scene
         if not self._timed:
             return None
-        return step_times(scene, self.steps, self._waits, self._begin)[-1].end
+        scene = self.engine.network.scene
+        times = offered("step_times")(scene, self.steps, self._waits, self._begin)
+        return float(times[-1].end)
 
     @property
     def _begin(self) -> Site | None:
@@ -158,12 +160,9 @@ class ShownBuild(Shown):
         return None
 
     @cached_property
-    def _waits(self) -> Waits | None:
-        """Says how long steps wait for mortar, where it cures."""
-        curing = None if self.standing is None else self.standing.curing
-        if self.standing is None or curing is None:
-            return None
-        return CuringBuilds(self.engine.network, self.standing.mortar, curing).waits
+    def _waits(self) -> Any:
+        """Says how long steps wait for mortar; None where none cures."""
+        return offered("mortar_waits")(self.engine.network, self.standing)
 
     def reassigned(self) -> tuple[Step, ...]:
         """Return the same grips in the same order by robots with which the build takes least.
@@ -173,7 +172,10 @@ class ShownBuild(Shown):
         some have arms, whose postures count.
         """
         scene = self.engine.network.scene
-        return reassign(scene, self.steps, self.responses(), self._waits, self._begin)
+        own: tuple[Step, ...] = offered("reassign")(
+            scene, self.steps, self.responses(), self._waits, self._begin
+        )
+        return own
 
     def plot(
         self, step: int | Sequence[int] | None = None, *, forces: bool = False, magnify: float = 0.0

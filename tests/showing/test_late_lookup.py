@@ -10,8 +10,10 @@ from importlib import import_module
 import pytest
 
 import seqopt
-from seqopt._showing import DISPLAYS, Page, display
+from seqopt._registry import OFFERS
+from seqopt._showing import Page, display
 from seqopt.errors import ExtraError
+from seqopt.judge._twin import Twin
 
 WITHOUT = """
 import sys
@@ -30,9 +32,10 @@ for draw in (scene.plot, plan.plot, plan.gantt, plan.animate, plan.engine.networ
 """
 
 
-def test_every_display_is_where_it_is_said_to_be():
-    for name, module in DISPLAYS.items():
-        assert callable(getattr(import_module(module), name))
+def test_what_outer_rooms_offer_is_where_it_is_said_to_be():
+    for name, module in OFFERS.items():
+        found = getattr(import_module(module), name)
+        assert callable(found) or isinstance(found, Twin), name
         assert display(name) is getattr(import_module(module), name)
 
 
@@ -49,7 +52,7 @@ def test_without_matplotlib_there_are_tables_and_one_line_that_says_what_to_inst
 
 
 def test_another_module_that_is_missing_is_not_taken_for_matplotlib(monkeypatch):
-    monkeypatch.setitem(DISPLAYS, "nothing", "seqopt.report.nothing")
+    monkeypatch.setitem(OFFERS, "nothing", "seqopt.report.nothing")
     with pytest.raises(ModuleNotFoundError, match=r"seqopt\.report\.nothing") as caught:
         display("nothing")
     assert not isinstance(caught.value, ExtraError)

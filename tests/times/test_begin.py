@@ -9,13 +9,13 @@ import pytest
 
 import seqopt
 from seqopt.errors import ProblemError, SceneError, SolverError
-from seqopt.judge._mortar_check import check_cured
 from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._status import Status
 from seqopt.problem.standing import Standing
-from seqopt.sequence._timing import step_times
 from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.site import Site
+from seqopt.times._step_check import check_cured
+from seqopt.times._steps import step_times
 from tests.brute_force import ONES
 from tests.times.builders import RULES, WORDS, engine_of, least_makespan
 from tests.times.curing import least_cured_makespan

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 import seqopt
 from seqopt.errors import InfeasibleError
-from seqopt.graph._counted import least_by_counts
 from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._status import Status
-from seqopt.sequence._timing import step_times
 from seqopt.sequence.rules import FreeRules, with_robots
+from seqopt.times._counts import least_by_counts
+from seqopt.times._steps import step_times
 from tests.brute_force import ONES
 from tests.builders import small_arch
 from tests.times.builders import RULES, WORDS, engine_of, least_makespan

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 import seqopt
 from seqopt.contact.curing import Curing, _find_curing
 from seqopt.errors import InfeasibleError, ProblemError, SceneError, SolverError, StepError
-from seqopt.judge._mortar_check import check_cured
 from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._status import Status
 from seqopt.problem.standing import Standing
 from seqopt.sequence.rules import FreeRules, with_robots
-from seqopt.stability._aging.builds import CuringBuilds, JointsInTime
+from seqopt.times._curing import CuringBuilds, JointsInTime
+from seqopt.times._step_check import check_cured
 from tests.brute_force import ONES
 from tests.times.builders import WORDS, engine_of
 from tests.times.curing import least_cured_makespan

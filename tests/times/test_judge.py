@@ -9,6 +9,7 @@ import pytest
 
 import seqopt
 from formulations.times._search import in_time
+from seqopt._registry import OFFERS
 from seqopt.errors import SolverError
 from seqopt.graph.formulation import Formulation, FormulationKind, On, find_formulation
 from seqopt.graph.graph import LabelProof
@@ -77,6 +78,13 @@ def test_prices_that_prove_too_much_are_made_such_as_prove(plan):
     none = LabelProof(states[:0], labels[:0], 10.0 * prices - 1.0)
     proof = judged(plan, proofs=(none,))
     assert proof.bounds[0] < plan.makespan
+
+
+def test_without_the_twin_of_a_room_the_certificate_says_claimed(plan, monkeypatch):
+    monkeypatch.delitem(OFFERS, "makespan")
+    proof = judged(plan)
+    assert proof.values == plan.selection.objective
+    assert (proof.bounds, proof.gap) == ((-np.inf,), np.inf)
 
 
 def test_without_labels_it_is_claimed(plan):

@@ -14,9 +14,9 @@ import seqopt
 from seqopt.contact.curing import _find_curing
 from seqopt.engines.interface import Want
 from seqopt.errors import SceneError
-from seqopt.plan._times import SHARE, _softened, aged_table
-from seqopt.sequence._timing import step_times
 from seqopt.sequence.steps import Step, StepKind
+from seqopt.times._steps import step_times
+from seqopt.times._tables import SHARE, _softened, aged_table
 from tests.builders import small_arch
 from tests.commands import command as run
 from tests.times.builders import WORDS

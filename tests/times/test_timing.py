@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 import seqopt
 from seqopt.errors import SceneError, StepError
-from seqopt.judge._time_proof import makespan
-from seqopt.plan._times import busy_table, reassign, times_table
 from seqopt.scene import Durations
-from seqopt.sequence._timing import step_times
+from seqopt.times._step_check import step_ends
+from seqopt.times._steps import step_times
+from seqopt.times._tables import busy_table, reassign, times_table
 from tests.commands import command as run
 from tests.times.builders import WORDS
 
@@ -43,7 +43,7 @@ def timed(durations):
 def test_times_are_those_of_the_longest_way(durations, name):
     scene, steps = timed(durations), STEPS[name]
     times = step_times(scene, steps)
-    assert times[-1].end == pytest.approx(makespan(scene, steps))
+    assert times[-1].end == pytest.approx(step_ends(scene, steps)[-1])
     for before, after in pairwise(times):
         assert before.end <= after.start <= after.end
     busy = busy_table(scene, steps).set_index("robot")
@@ -102,7 +102,7 @@ def best_of_all(scene, steps):
             )
         if fits:
             own = [replace(s, grips=tuple(row)) for s, row in zip(steps, rows, strict=True)]
-            best = min(best, makespan(scene, own))
+            best = min(best, step_ends(scene, own)[-1])
     return best
 
 

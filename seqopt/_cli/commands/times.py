@@ -44,15 +44,16 @@ from seqopt._files import csv_text
 from seqopt.contact.curing import _find_curing
 from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ProblemError, SceneError, StepError
-from seqopt.judge._mortar_check import check_cured
 from seqopt.network.build import build_network
-from seqopt.plan._times import SHARE, aged_table, busy_table
 from seqopt.plan.build import GivenSequence
 from seqopt.problem.standing import Standing
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
-from seqopt.sequence._timing import has_durations, step_times
+from seqopt.sequence._durations import has_durations
 from seqopt.sequence.steps import Step
+from seqopt.times._step_check import check_cured
+from seqopt.times._steps import step_times
+from seqopt.times._tables import SHARE, aged_table, busy_table
 
 DESCRIPTION = (
     "Say how long a build takes and who does what when. A robot that holds nothing prepares what "

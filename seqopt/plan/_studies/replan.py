@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from seqopt._registry import offered
 from seqopt.errors import SeqoptError, StepError
 from seqopt.graph.states.states import States
 from seqopt.judge._posture_rules import check_postures
@@ -14,11 +15,9 @@ from seqopt.problem.requirements import _carrying_excesses, overloads
 from seqopt.responses.table import analyze
 from seqopt.scene.scene import Scene, in_order
 from seqopt.sequence._rule_check import check_free
-from seqopt.sequence._timing import step_times
 from seqopt.sequence.rules import FreeRules, Payload
 from seqopt.sequence.site import Site, _begin_step
 from seqopt.sequence.steps import Step
-from seqopt.stability._aging.builds import CuringBuilds
 
 
 def without(
@@ -96,11 +95,10 @@ def goes_on(states: States, steps: Sequence[Step]) -> dict[str, float]:
 
 def _starts(states: States, steps: Sequence[Step]) -> tuple[float, ...]:
     """Return when steps that go on start at the earliest, s, where they wait for mortar."""
-    standing = states.standing
-    if standing is None or standing.curing is None:
+    waits = offered("mortar_waits")(states.network, states.standing)
+    if waits is None:
         return ()
-    waits = CuringBuilds(states.network, standing.mortar, standing.curing).waits
-    times = step_times(states.network.scene, steps, waits, states.rules.begin)
+    times = offered("step_times")(states.network.scene, steps, waits, states.rules.begin)
     return tuple(time.start for time in times)
 
 

@@ -21,10 +21,11 @@ from seqopt.report._pictures import DARK, LANE, SHADES, _label, _lanes
 from seqopt.report._style import new_picture, styled
 from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
-from seqopt.sequence._timing import StepTime, Waits, step_times
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step
+from seqopt.times._curing import Waits
+from seqopt.times._steps import StepTime, step_times
 
 PER_STEP, NARROWEST, WIDEST = 0.15, 7.0, 30.0  # inches
 BESIDE = 1.8  # inches that names and the key of shades take

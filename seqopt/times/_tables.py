@@ -22,11 +22,11 @@ from seqopt.problem.requirements import LIMIT_TOLERANCE
 from seqopt.responses.table import analyze, force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence._carrying import can_carry, carried
-from seqopt.sequence._timing import StepTime, Waits, reassigned_steps, step_times
 from seqopt.sequence.schedule import Hold
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, StepKind, idle_robots
-from seqopt.stability._aging.builds import JointsInTime
+from seqopt.times._curing import JointsInTime, Waits
+from seqopt.times._steps import StepTime, reassigned_steps, step_times
 
 SHARE = "least_share"
 

@@ -13,14 +13,16 @@ from seqopt.errors import SolverError
 from seqopt.graph.duality import cut, potentials
 from seqopt.graph.graph import Graph, LabelProof
 from seqopt.graph.paths import tied
+from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
-from seqopt.judge._mortar_floors import CuredRows
+from seqopt.judge._proof import Levels
 from seqopt.judge._rule_moves import RuleTables, ScheduleTables
-from seqopt.judge._time_proof import Closed, Limits, Team, TimedMoves, kept_below, limit_below
 from seqopt.problem.problem import Measure
-from seqopt.sequence._timing import require_durations
+from seqopt.sequence._durations import require_durations
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
+from seqopt.times._label_proof import Closed, Limits, Team, TimedMoves, kept_below, limit_below
+from seqopt.times._mortar_floors import CuredRows, cured_rows
 
 Fallen = Callable[[int, Ints], Bools]
 
@@ -219,3 +221,31 @@ class GoalProofs:
         if prices.ndim != 2 or prices.shape[1] != 1 + len(order):
             raise SolverError("there is no price for every robot")
         return np.asarray(prices[:, [0, *order]])
+
+
+def label_bounds(
+    levels: Levels, values: Sequence[float], found: StatePath
+) -> Callable[[Graph], tuple[float, ...]]:
+    """Return what bounds the goals after those about margins, by labels, on a subgraph of levels.
+
+    ``values``: of all goals; ``found``: what is claimed, with labels. The function raises
+    `SolverError` if labels are given that do not prove what is claimed.
+    """
+    passable = levels.passable
+    first, tables = passable.margins, passable.tables
+    margins, claim = values[:first], Claim(values, found.bound, found.proofs, found.motions)
+
+    def fallen(level: int, rows: Ints) -> Bools:
+        if not passable.stands.asked(margins):
+            return np.zeros(len(rows), dtype=bool)
+        return ~passable.may_stand(level, rows, margins)
+
+    bricks = [tables.bricks_at(level) if level else 0 for level in levels.levels]
+    grips = [passable.held_by(rows) for rows in levels.states]
+    cured = cured_rows(passable.problem, bricks, grips, claim.motions)
+
+    def bounds(graph: Graph) -> tuple[float, ...]:
+        own = tables, levels.states, levels.levels, graph, fallen, cured
+        return GoalProofs(TimedStates(passable.problem, *own), claim).bounds(first)
+
+    return bounds

@@ -25,13 +25,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeVar
 
-from seqopt.errors import ProblemError, StepError
-from seqopt.scene._durations import EXAMPLE, Durations
+from seqopt.errors import StepError
+from seqopt.scene._durations import Durations
 from seqopt.scene.scene import Scene
-from seqopt.sequence.rules import FreeRules
-from seqopt.sequence.schedule import Hold, Schedule, holds
+from seqopt.sequence._durations import require_durations
+from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.site import Site, _begin_step
 from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind, check_sequence
+from seqopt.times._curing import Waits
 
 
 @dataclass(frozen=True)
@@ -53,23 +54,6 @@ class StepTime:
     end: float
     cures: float | None = None
     joint: str = ""
-
-
-Waits = Callable[[AnyStep, Sequence[float], float], tuple[float, str]]
-"""Says from when on, no sooner than a time, a step may be done after bricks were in their places at
-some times, and for which joint it waits; empty if for none."""
-
-
-def require_durations(scene: Scene, robots: Sequence[int] | None = None) -> tuple[Durations, ...]:
-    """Return the durations of some robots of a scene, by index, or of all; none is assumed."""
-    which = range(len(scene.robots)) if robots is None else robots
-    lacking = [scene.robots[r].name for r in which if scene.robots[r].durations is None]
-    if lacking:
-        raise StepError(
-            f"scene {scene.name}: it is not known how long {', '.join(lacking)} "
-            f"take{'s' * (len(lacking) == 1)}; give durations, as {EXAMPLE}"
-        )
-    return tuple(d for r in which if (d := scene.robots[r].durations) is not None)
 
 
 def step_times(
@@ -143,25 +127,6 @@ def way_seconds(scene: Scene, own: Durations, last: object, node: object) -> flo
     if own.speed is None or not isinstance(last, int) or not isinstance(node, int):
         return 0.0
     return math.dist(scene.node_position(last), scene.node_position(node)) / own.speed
-
-
-def has_durations(scene: Scene) -> bool:
-    """Return whether it is known how long every robot takes."""
-    return bool(scene.robots) and all(robot.durations is not None for robot in scene.robots)
-
-
-def has_speeds(scene: Scene) -> bool:
-    """Return whether ways of some robot take time of their own."""
-    return any(robot.durations and robot.durations.speed for robot in scene.robots)
-
-
-def require_for_makespan(scene: Scene, moves: FreeRules | Schedule) -> None:
-    """Raise a `ProblemError` unless it is known how long those take who take part."""
-    team = moves.team(scene) if isinstance(moves, FreeRules) else None
-    try:
-        require_durations(scene, team)
-    except StepError as error:
-        raise ProblemError(f"makespan: {error}") from None
 
 
 _NOTHING = -1  # in the place of the number of a grip

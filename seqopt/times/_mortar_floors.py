@@ -12,8 +12,8 @@ from seqopt.contact.curing import Curing
 from seqopt.graph.states.states import States
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
-from seqopt.stability._aging.builds import JointsInTime
-from seqopt.stability._aging.cuts import FallCuts
+from seqopt.times._curing import JointsInTime
+from seqopt.times._fall_cuts import FallCuts
 
 Grips = tuple[Ints, Floats]
 CLOSE = 1e-9  # of a time: what rounding may take from an age

@@ -6,7 +6,7 @@ grow, so a state that stands with what its joints have when it begins stands whi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar
 from seqopt.errors import SceneError, StepError
 from seqopt.network.network import Network
+from seqopt.problem.standing import Standing
 from seqopt.sequence.steps import AnyStep, Grips, Step, StepKind
 from seqopt.stability._prover import Proven
 from seqopt.stability._verdict_chain import VerdictChain
@@ -83,6 +84,11 @@ class JointsInTime:
         count = self.count(bricks)
         since = placed[:, self.closing[:count]]
         return np.asarray((since[:, :, None] + self.ages[:count]).reshape(len(placed), -1))
+
+
+Waits = Callable[[AnyStep, Sequence[float], float], tuple[float, str]]
+"""Says from when on, no sooner than a time, a step may be done after bricks were in their places at
+some times, and for which joint it waits; empty if for none."""
 
 
 class CuringBuilds:
@@ -157,3 +163,10 @@ def _motion(assembly: Assembly, proven: Proven) -> Floats | None:
     if _verdict_of(proven) is not Verdict.FALLS:
         return None
     return np.asarray(proven.answer.motion / np.repeat([1.0, assembly.scales[1]], 3))
+
+
+def mortar_waits(network: Network, standing: Standing | None) -> Waits | None:
+    """Return what says how long steps wait for mortar; None where none cures."""
+    if standing is None or standing.curing is None:
+        return None
+    return CuringBuilds(network, standing.mortar, standing.curing).waits

@@ -1,4 +1,4 @@
-"""That no step of a build comes before its mortar holds: ages, bonds and verdicts found again."""
+"""When steps end, and that none comes before its mortar holds: found again for the judge."""
 
 from __future__ import annotations
 
@@ -6,20 +6,78 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from seqopt.arrays import Floats, Ints
 from seqopt.contact.assembly import Assembly
 from seqopt.contact.curing import Curing
 from seqopt.contact.faces import Contacts, step_assembly
 from seqopt.errors import SolverError
-from seqopt.judge._time_proof import step_ends
+from seqopt.graph.states.states import States
 from seqopt.network.network import Network
 from seqopt.problem.standing import Standing
+from seqopt.scene.scene import Scene
 from seqopt.sequence.site import Site
 from seqopt.sequence.steps import Step, StepKind
 from seqopt.stability.assessment import Verdict, verdict
+from seqopt.times._label_proof import BETTER
 
-Grips = tuple[Ints, Floats]
 CLOSE = 1e-9  # of a time: what rounding may take from an age
+
+
+def makespan_of_steps(problem: States, steps: Sequence[Step], starts: Sequence[float]) -> float:
+    """Return how long a build takes, s, and require that no step comes before its mortar holds."""
+    standing, scene, begin = problem.standing, problem.network.scene, problem.rules.begin
+    if standing is None or standing.curing is None:
+        starts = ()
+    else:
+        check_cured(problem.network, steps, standing, starts, begin)
+    return [0.0, *step_ends(scene, steps, starts, begin)][-1]
+
+
+def step_ends(
+    scene: Scene, steps: Sequence[Step], starts: Sequence[float] = (), begin: Site | None = None
+) -> tuple[float, ...]:
+    """Return when steps end, s, at the earliest, or where they start at some times.
+
+    ``begin``: where the build begins, with robots that are free from then on.
+
+    Raises `SolverError` if one starts before the one before it ends, or its robot is ready.
+    """
+    ends, let_go = [0.0], dict[int, int]()
+    grips, held = _at_first(scene, begin)
+    for i, step in enumerate(steps, start=1):
+        waits, acts = [ends[-1]], 0.0
+        for r, (robot, old, new) in enumerate(zip(scene.robots, grips, step.grips, strict=True)):
+            own = robot.durations
+            if old == new or own is None:
+                continue
+            if new is None:
+                acts, let_go[r] = max(acts, own.release), i
+                continue
+            placing = step.kind is StepKind.PLACE
+            acts = own.place if placing else own.grip
+            way = 0.0
+            if own.speed is not None and r in held:
+                between = np.subtract(scene.node_position(held[r]), scene.node_position(new))
+                way = float(np.linalg.norm(between)) / own.speed
+            ready = own.fetch if placing else own.approach
+            waits.append(ends[let_go.get(r, 0)] + ready + way)
+            held[r] = new
+        start = max(waits)
+        if starts:
+            if not starts[i - 1] >= start - BETTER * abs(start):
+                raise SolverError(f"step {i} starts at {starts[i - 1]:.6g} s, not from {start:.6g}")
+            start = starts[i - 1]
+        ends.append(start + acts)
+        grips = step.grips
+    return tuple(ends[1:])
+
+
+def _at_first(scene: Scene, begin: Site | None) -> tuple[Sequence[int | None], dict[int, int]]:
+    """Return what robots hold where a build begins, and where they hold or held last."""
+    if begin is None:
+        return (None,) * len(scene.robots), {}
+    grips = begin.holds(scene)
+    lasts = (begin.stays or (None,) * len(grips), grips)
+    return grips, {r: n for nodes in lasts for r, n in enumerate(nodes) if n is not None}
 
 
 def check_cured(

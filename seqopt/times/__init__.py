@@ -1,0 +1,1 @@
+"""How long builds take: robots that prepare, mortar that cures, and the proof of makespans."""

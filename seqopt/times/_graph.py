@@ -1,0 +1,182 @@
+"""The states of a build as a graph in time: their acts, and what mortar asks of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
+from seqopt.graph._explore import Visited
+from seqopt.graph._timed import HELD, NOW, TimedGraph
+from seqopt.graph.graph import Graph
+from seqopt.graph.states.states import States
+from seqopt.sequence._durations import require_durations
+from seqopt.sequence.schedule import Schedule
+from seqopt.sequence.steps import StepKind
+from seqopt.times._fall_cuts import FallCuts
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CuringStates(FrozenValue):
+    """What states of a build in time ask of mortar that cures.
+
+    ``cuts``: motions in which states fall, a floor under waits; ``bricks`` (n,): that stand;
+    ``held`` (n, r), ``payload`` (n, r): the grips of states, as of `FallCuts`; ``full`` (b,): at
+    which age all joints that a brick closes have their full bond, s; ``placed`` (b,): when bricks
+    that stand at first were in their places, s, zero of others.
+    """
+
+    cuts: FallCuts
+    bricks: Ints
+    held: Ints
+    payload: Floats
+    full: Floats
+    placed: Floats
+
+    def starts(self, state: Ints, placed: Floats, start: Floats) -> Floats:
+        """Return from when on, no sooner than times (n,), s, states may begin, for all known.
+
+        ``placed`` (n, b): when bricks were in their places; that which a step places counts then.
+        """
+        out = start.copy()
+        for bricks in np.unique(self.bricks[state]).tolist():
+            rows = np.flatnonzero(self.bricks[state] == bricks)
+            if bricks:
+                grips = self.held[state[rows]], self.payload[state[rows]]
+                out[rows] = self.cuts.starts(bricks, grips, placed[rows], start[rows])
+        return out
+
+
+class _Moves(NamedTuple):
+    """What moves do, by column of the state before or after."""
+
+    before: Ints  # (m, c); entries of states
+    after: Ints  # (m, c)
+    taken: Bools  # (m, c); nodes that are held afterwards and were not
+    dropped: Bools  # (m, c); nodes that were held and are not afterwards
+    able: Bools  # (m, c); whose robot may be the one who takes the grip
+    places: Bools  # (m,); which place a brick
+
+
+def timed_graph(problem: States, visited: Visited, cuts: FallCuts | None = None) -> TimedGraph:
+    """Return the states that were visited, in time; all robots have durations.
+
+    ``cuts``: what is known of states that fall while mortar cures.
+    """
+    space, graph = problem.space, visited.graph
+    rows = np.concatenate([each[:, : space.robots] for *_, each in visited.states])
+    levels = np.repeat([key for key, *_ in visited.states], [len(s) for *_, s in visited.states])
+    kinds = np.repeat(np.arange(len(space.slots)), [end - first for first, end in space.slots])
+    found = _moves(problem, graph, rows.astype(np.int64), levels)
+    prepares, acts = _times(problem, found)
+    move, column = np.nonzero(found.able)
+    others = np.flatnonzero(~found.taken.any(axis=1))
+    move, column = np.append(move, others), np.append(column, np.full(len(others), -1))
+    order = np.argsort(move, kind="stable")
+    move, column = move[order], column[order]
+    free = rows <= 0
+    alike = np.asarray(free[:, 1:] & (rows[:, 1:] == rows[:, :-1]) & (kinds[1:] == kinds[:-1]))
+    origin = _origins(space.slots, found, move, column, parks=space.parks)
+    work = _work(space.slots, found, prepares, acts)
+    states, longest = (graph, levels, free, alike, kinds), _longest(problem)
+    curing = None if cuts is None else _curing(problem, visited, cuts)
+    return TimedGraph(*states, move, column, origin, prepares, acts, work, longest, curing)
+
+
+def _curing(problem: States, visited: Visited, cuts: FallCuts) -> CuringStates:
+    """Return what visited states ask of mortar."""
+    every = [(level, *problem._grips(rows, stand=True)) for level, _, rows in visited.states]
+    bricks = [np.full(len(held), problem.space.bricks_at(level)) for level, held, _ in every]
+    held, payload = (np.concatenate([each[k] for each in every]) for k in (1, 2))
+    full, begin = cuts.joints.full, problem.rules.begin
+    placed = np.zeros(len(full))
+    placed[: 0 if begin is None else begin.bricks] = () if begin is None else begin.placed
+    return CuringStates(cuts, np.concatenate(bricks), held, payload, full, placed)
+
+
+def _moves(problem: States, graph: Graph, rows: Ints, levels: Ints) -> _Moves:
+    """Return what moves do, kind by kind."""
+    before, after = rows[graph.source], rows[graph.target]
+    taken, dropped, able = (np.zeros(after.shape, dtype=bool) for _ in range(3))
+    for first, end in problem.space.slots:
+        old, new = before[:, first:end], after[:, first:end]
+        taken[:, first:end] = (new > 0) & ~(new[:, :, None] == old[:, None]).any(axis=2)
+        dropped[:, first:end] = (old > 0) & ~(old[:, :, None] == new[:, None]).any(axis=2)
+        had, has = ((old[:, :, None] == each[:, None]).sum(axis=2) for each in (old, new))
+        able[:, first:end] = (old <= 0) & (had > has)
+        able[~taken[:, first:end].any(axis=1), first:end] = False
+    places = levels[graph.target] > levels[graph.source]
+    if isinstance(problem.rules, Schedule):
+        kinds = [False, *(step.kind is StepKind.PLACE for step in problem.rules.steps)]
+        places = np.array(kinds)[levels[graph.target]]
+    return _Moves(before, after, taken, dropped, able, places)
+
+
+def _longest(problem: States) -> Floats:
+    """Return how long robots of columns take at most to be prepared, wherever they go, (c,), s."""
+    network, kinds = problem.network, problem.space.kinds
+    own = require_durations(network.scene, [robot for kind in kinds for robot in kind.robots])
+    across = float(np.linalg.norm(np.ptp(network.node_position[network.inner.ravel()], axis=0)))
+    return np.array([max(d.fetch, d.approach) + across / (d.speed or np.inf) for d in own])
+
+
+def _times(problem: States, found: _Moves) -> tuple[Floats, Floats]:
+    """Return how long moves take to be prepared, and to be done, (m,), s."""
+    space, scene = problem.space, problem.network.scene
+    own = require_durations(scene, [robot for kind in space.kinds for robot in kind.robots])
+    times = np.array([[d.fetch, d.place, d.approach, d.grip, d.release] for d in own])
+    prepares, acts = np.zeros(len(found.places)), np.zeros(len(found.places))
+    move, column = np.nonzero(found.taken)
+    placing = found.places[move]
+    prepares[move] = np.where(placing, times[column, 0], times[column, 2])
+    acts[move] = np.where(placing, times[column, 1], times[column, 3])
+    move, column = np.nonzero(found.dropped)
+    np.maximum.at(acts, move, times[column, 4])
+    if not space.parks:
+        return prepares, acts
+    at = np.pad(problem.network.node_position[problem.network.inner.ravel()], ((1, 0), (0, 0)))
+    move = np.flatnonzero(found.able.any(axis=1))
+    column = found.able[move].argmax(axis=1)
+    last, node = -found.before[move, column], (found.after * found.taken)[move].max(axis=1)
+    slow = np.array([0.0 if d.speed is None else 1 / d.speed for d in own])
+    prepares[move] += np.linalg.norm(at[node] - at[last], axis=1) * (last > 0) * slow[column]
+    return prepares, acts
+
+
+def _origins(
+    slots: tuple[tuple[int, int], ...], found: _Moves, move: Ints, column: Ints, *, parks: bool
+) -> Ints:
+    """Return from where columns of the states after acts have their readiness, (a, c).
+
+    Entries of a kind are sorted, held ones first: those of free robots come in the same order in
+    the state before, who takes a grip aside, and with those who let go.
+    """
+    out = np.full((len(move), found.after.shape[1]), HELD)
+    for first, end in slots:
+        columns = np.arange(first, end)
+        before, after = found.before[move, first:end], found.after[move, first:end]
+        dropped = found.dropped[move, first:end]
+        keys = np.where(dropped, -before if parks else 0, before).astype(float)
+        keys[((before > 0) & ~dropped) | (columns == column[:, None])] = -np.inf
+        source = np.where(dropped, NOW, columns)
+        order = np.argsort(-keys, axis=1, kind="stable")
+        source = np.take_along_axis(source, order, axis=1)
+        held = (after > 0).sum(axis=1)
+        place = np.arange(end - first) - held[:, None]
+        sought = np.take_along_axis(source, place.clip(min=0), axis=1)
+        out[:, first:end] = np.where(place >= 0, sought, HELD)
+    return out
+
+
+def _work(
+    slots: tuple[tuple[int, int], ...], found: _Moves, prepares: Floats, acts: Floats
+) -> Floats:
+    """Return how long moves take of the time of all, and of robots of every kind, (m, 1 + k), s."""
+    columns = [acts]
+    for first, end in slots:
+        takes = found.taken[:, first:end].any(axis=1)
+        busy = (found.before[:, first:end] > 0).sum(axis=1) + takes
+        columns.append(acts * busy + prepares * takes)
+    return np.column_stack(columns)
