@@ -33,6 +33,7 @@ from matplotlib.figure import Figure
 from experiments.discrete.parts.arch_pads import JOINTS, Reading, readings
 from experiments.discrete.parts.arches_lmgc90 import PAD, READINGS, witness
 from experiments.discrete.parts.discrete_chart import chart
+from experiments.discrete.parts.pads import Across, Pinch
 from experiments.harness.claim import Claim, Finding, Option, Options
 from experiments.harness.lmgc90 import python_with_lmgc90
 from experiments.harness.results import RESULTS, stored
@@ -41,7 +42,7 @@ from experiments.harness.yardstick import STEPS, error, moved
 from seqopt import EPOXY, Step, sequential
 from seqopt.arrays import Floats
 from seqopt.contact._elastic_limits import find_elastic_limits
-from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
+from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.study.published import STUDY_PADS, printed

@@ -47,13 +47,20 @@ class _Plane(FrozenValue):
 def find_plane(network: Network) -> _Plane | str:
     """Return the plane of a structure: bricks, springs and gravity lie in it, springs along it.
 
-    Bricks may be of any width: their nodes need not lie in the plane, their centroids must. Where
-    there is none, the result is what lies outside, a clause that goes into a sentence.
+    It is upright: its normal is the horizontal direction in which centroids and springs spread
+    least, or, where all stand above each other, a horizontal axis of the first spring. Bricks may
+    be of any width: their nodes need not lie in the plane, their centroids must. Where there is no
+    plane, the result is what lies outside, a clause that goes into a sentence.
     """
-    springs = network.springs
+    springs, up = network.springs, np.array(network.scene.up)
     points = np.vstack([network.centroid, springs.position, springs.anchor])
-    normal = _normal(network, points - points.mean(axis=0))
-    up = np.array(network.scene.up)
+    spread = points - points.mean(axis=0)
+    flat = spread - np.outer(spread @ up, up)
+    if np.abs(flat).max() <= _FLAT * np.abs(spread).max():
+        flat = springs.axes[0] - np.outer(springs.axes[0] @ up, up)
+        flat = flat[np.linalg.norm(flat, axis=1).argmax()][None]
+    normal = np.cross(up, np.linalg.svd(flat, full_matrices=False)[2][0])
+    normal = np.asarray(normal / np.linalg.norm(normal))
     pulled = any(network.scene.gravity)  # otherwise up may stand on the plane
     axes = np.array([np.cross(up, normal), up]) if pulled else plane_axes(normal)[1:]
     plane = _Plane(points.mean(axis=0), normal, axes)
@@ -78,31 +85,12 @@ def _leaves_plane(plane: _Plane, hands: Hands, columns: Ints) -> Bools:
         out |= away > _FLAT * size
     if hands.give is not None:
         give = hands.each_give(*columns.shape)
-        inside, across = plane.basis, _across(plane)
+        across = Basis(plane.normal[None], plane.axes)
         turned = hands.turns is not None
-        ways = [b.wrench if turned else b.force for b in (inside, across)]
+        ways = [b.wrench if turned else b.force for b in (plane.basis, across)]
         mixed = np.abs(ways[0] @ give @ ways[1].T).max(axis=(1, 2, 3), initial=0.0)
         out |= mixed > _FLAT * np.abs(give).max(axis=(1, 2, 3), initial=0.0)
     return out
-
-
-def _across(plane: _Plane) -> Basis:
-    """Return the force and the moments that leave a plane."""
-    return Basis(plane.normal[None], plane.axes)
-
-
-def _normal(network: Network, spread: Floats) -> Floats:
-    """Return the horizontal direction in which points (P, 3) about their middle spread least.
-
-    Where they all stand above each other, a horizontal axis of the first spring.
-    """
-    up = np.array(network.scene.up)
-    flat = spread - np.outer(spread @ up, up)
-    if np.abs(flat).max() <= _FLAT * np.abs(spread).max():
-        flat = network.springs.axes[0] - np.outer(network.springs.axes[0] @ up, up)
-        flat = flat[np.linalg.norm(flat, axis=1).argmax()][None]
-    normal = np.cross(up, np.linalg.svd(flat, full_matrices=False)[2][0])
-    return np.asarray(normal / np.linalg.norm(normal))
 
 
 def _points_outside(network: Network, plane: _Plane) -> str:

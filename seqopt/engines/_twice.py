@@ -28,24 +28,14 @@ def add_products(start: Floats, matrix: sparse.csr_array, factors: Floats) -> Fl
     for place in range(int(count.max(initial=0))):
         rows = np.flatnonzero(count > place)
         at = matrix.indptr[rows] + place
-        product, rounded = _product(matrix.data[at], factors[matrix.indices[at]])
-        total[rows], off = _sum(total[rows], product)
-        lost[rows] += off + rounded
+        a, b = matrix.data[at], factors[matrix.indices[at]]
+        product, (a1, a2), (b1, b2) = a * b, _halves(a), _halves(b)
+        rounded = a2 * b2 - (((product - a1 * b1) - a2 * b1) - a1 * b2)  # exact (Dekker)
+        before = total[rows]
+        total[rows] = after = before + product
+        part = after - before
+        lost[rows] += (before - (after - part)) + (product - part) + rounded  # exact (Knuth)
     return total + lost
-
-
-def _sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Return the rounded sum and its exact error (Knuth)."""
-    total = a + b
-    part = total - a
-    return total, (a - (total - part)) + (b - part)
-
-
-def _product(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Return the rounded product and its exact error (Dekker), halves of digits at a time."""
-    product = a * b
-    (a1, a2), (b1, b2) = _halves(a), _halves(b)
-    return product, a2 * b2 - (((product - a1 * b1) - a2 * b1) - a1 * b2)
 
 
 def _halves(a: Floats) -> tuple[Floats, Floats]:

@@ -61,13 +61,20 @@ def _solve_one(
     grips = _hold(network, columns, hands, deformation.shape[1])
     load = np.zeros((deformation.shape[1] // 6, 6))
     load[network.inner[:bricks].ravel(), :3] = network.inner_weight[: 2 * bricks]
-    _add_loads(network, bricks, load)
+    both, applied = network.inner[:bricks], network.applied(bricks)
+    arm = network.centroid[:bricks] - network.node_position[both].mean(axis=1)
+    applied[:, 3:] += np.cross(arm, applied[:, :3])
+    load[both] += 0.5 * applied[:, None]  # what pulls at bricks beside their weight
     held = network.inner.ravel()[columns]
     base = np.flatnonzero(network.node_kind[:nodes] == PartKind.BASE.value)
     free = np.ones(load.shape, dtype=bool)
     free[base] = False
     free.ravel()[grips.fixed] = False
-    unknown, motion = np.flatnonzero(free), _moved_ground(network, base, load.shape)
+    ends, still = network.springs.support.tolist(), np.zeros(load.shape)
+    for node in base:
+        ground = network.scene.grounds[ends.index(network.node_spring[node])]
+        still[node] = ground.movement or 0.0
+    unknown, motion = np.flatnonzero(free), still.ravel()
     motion[grips.fixed] = grips.moved
     whole = sparse.csr_array(sparse.vstack([deformation, grips.spring]))
     every = np.concatenate([stiffness, grips.stiffness])
@@ -134,23 +141,6 @@ def _hold(network: Network, columns: Ints, hands: Hands | None, size: int) -> _H
     held = np.concatenate(fixed)
     moved = far[~soft].ravel()
     return _Holds(held, moved, rows, np.array(stiffness), np.array(stretched), turns)
-
-
-def _add_loads(network: Network, bricks: int, load: Floats) -> None:
-    """Add to forces and moments at nodes (n, 6) what pulls at bricks beside their weight."""
-    both, applied = network.inner[:bricks], network.applied(bricks)
-    arm = network.centroid[:bricks] - network.node_position[both].mean(axis=1)
-    applied[:, 3:] += np.cross(arm, applied[:, :3])
-    load[both] += 0.5 * applied[:, None]
-
-
-def _moved_ground(network: Network, base: Ints, shape: tuple[int, ...]) -> Floats:
-    """Return the motions (6n,) of nodes of which the base nodes alone move, with the ground."""
-    out, support = np.zeros(shape), network.springs.support.tolist()
-    for node in base:
-        ground = network.scene.grounds[support.index(network.node_spring[node])]
-        out[node] = ground.movement or 0.0
-    return out.ravel()
 
 
 def _frame(network: Network, bricks: int, contrast: float) -> tuple[Ints, sparse.csr_array, Floats]:

@@ -198,15 +198,11 @@ def keep_wanted(answer: Fields, want: Want) -> Fields:
     return replace(answer, **{name: getattr(answer, name)[:, :0] for name in dropped})
 
 
-def _owner(values: Floats) -> Floats:
-    """Return the array that others are cut from, itself if it is not."""
-    return values.base if isinstance(values.base, np.ndarray) else values
-
-
 def require_finite(answer: Fields, bricks: int, grips: ArrayLike) -> Fields:
     """Return fields if all of their numbers are finite; raise `SolverError` if one is not."""
     each = [getattr(answer, name) for name in _NAMES]
-    whole = {id(found): found for found in map(_owner, each)}
+    owners = (v.base if isinstance(v.base, np.ndarray) else v for v in each)  # cut from one array
+    whole = {id(found): found for found in owners}
     if all(isfinite(found.sum()) for found in whole.values() if found.size):
         return answer
     for name, values in zip(_NAMES, each, strict=True):

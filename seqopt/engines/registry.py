@@ -96,18 +96,18 @@ def _arithmetic() -> str:
     home = Path(__file__).parents[1]
     found = (home / name for name in _ARITHMETIC)
     files = [f for p in found for f in ([p] if p.is_file() else sorted(p.rglob("*.py")))]
-    mark = hashlib.sha256(f"{np.__version__} {scipy.__version__} {_numba()}".encode())
+    loops = _version("numba", "none")  # whose loops answer where it is installed
+    mark = hashlib.sha256(f"{np.__version__} {scipy.__version__} {loops}".encode())
     for file in files:
         mark.update(file.relative_to(home).as_posix().encode() + file.read_bytes())
     return mark.hexdigest()
 
 
-def _numba() -> str:
-    """Return the version of numba, whose loops answer in its place where it is installed."""
+def _version(package: str, missing: str) -> str:
     try:
-        return version("numba")
+        return version(package)
     except PackageNotFoundError:
-        return "none"
+        return missing
 
 
 def recipe_of(engine: object) -> Recipe | None:
@@ -241,11 +241,7 @@ def provenance(engine: Engine) -> dict[str, object]:
 @cache
 def versions() -> Mapping[str, str]:
     """Return the versions of Python, of seqopt and of the packages that it needs, by name."""
-    found = {"python": platform.python_version()}
     lines = (line for line in requires("seqopt") or () if "extra ==" not in line)
-    for name in ("seqopt", *(re.split(r"[^\w.-]", line)[0] for line in lines)):
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
+    names = ("seqopt", *(re.split(r"[^\w.-]", line)[0] for line in lines))
+    known = {name: _version(name, "not installed") for name in names}
+    return {"python": platform.python_version()} | known

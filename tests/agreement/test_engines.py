@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.rigid._mixed import solve_dense
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.graph.layers.layers import candidate_layers
@@ -21,6 +20,7 @@ from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import WEIGHTED, published_plan
 from tests.builders import block, hinged, scaled, six_bricks, small_arch
+from tests.direct_solve import solve_dense
 from tests.strategies import arches, both_sided, loosened, states, walls
 
 FIELDS = ("edge_force", "displacement", "grip_force", "support", "joint_wrench", "brick_twist")

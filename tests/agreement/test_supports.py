@@ -13,10 +13,11 @@ from seqopt.engines._planar import PlanarEngine
 from seqopt.engines.discrete.engine import DiscreteEngine
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.rigid._mixed import solve_dense, solve_mixed
+from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network.build import build_network
 from tests.builders import from_both_sides
+from tests.direct_solve import solve_dense
 
 STRONG = Mortar(friction=1.0, tensile_strength=1e12, cohesion=1e12)
 ROUTES = {

@@ -19,10 +19,11 @@ from seqopt.engines.diagnosis import (
 )
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.rigid._mixed import mixed_system, solve_dense, ungripped_system
+from seqopt.engines.rigid._mixed import mixed_system, ungripped_system
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SolverError
 from seqopt.network.build import build_network
+from tests.direct_solve import solve_dense
 from tests.limit_scenes import HELD, LOOSE_AT, chain, loosened, without_joint
 from tests.reference_chain import solve_exactly
 

@@ -17,7 +17,7 @@ from seqopt.engines.rigid import _refinement as refinement
 from seqopt.engines.rigid._grip_equations import _solve_positive
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mechanism import require_resistance, ungripped_system
-from seqopt.engines.rigid._mixed import solve_dense, solve_mixed
+from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._refinement import (
     Refinement,
@@ -42,6 +42,7 @@ from tests.builders import (
     solve_batch,
     torsion_free,
 )
+from tests.direct_solve import solve_dense
 from tests.limit_scenes import HELD, chain, loosened, without_joint
 from tests.reference_chain import solve_exactly
 

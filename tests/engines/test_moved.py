@@ -11,11 +11,12 @@ from seqopt.engines._hands import read_hands
 from seqopt.engines.diagnosis import Finding, diagnose
 from seqopt.engines.interface import _NAMES, Want, grip_columns
 from seqopt.engines.registry import ENGINES
-from seqopt.engines.rigid._mixed import solve_dense, solve_mixed
+from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import GripError
 from seqopt.network.build import build_network
 from tests.builders import hinged, six_bricks
+from tests.direct_solve import solve_dense
 
 SETS = [[3, 8, 11], [4, 5, 9]]  # two hold one brick in the second
 

@@ -19,7 +19,6 @@ from seqopt.engines.rigid._grip_equations import (
 )
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._mechanism import ungripped_system
-from seqopt.engines.rigid._mixed import solve_dense
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._refinement import _held_operator, _hold_loose
 from seqopt.engines.rigid._response_maps import _GATHERED, loads_of
@@ -35,6 +34,7 @@ from tests.builders import (
     solve_batch,
     torsion_free,
 )
+from tests.direct_solve import solve_dense
 
 SCENES = {
     "arch": small_arch(5),

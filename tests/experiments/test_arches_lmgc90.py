@@ -30,10 +30,10 @@ from experiments.discrete.parts.arches_lmgc90 import (
     spread_engine,
     witness,
 )
+from experiments.discrete.parts.pads import Across, Pinch
 from experiments.harness.lmgc90 import python_with_lmgc90
 from experiments.harness.yardstick import error, moved
 from seqopt.engines.discrete._bed import BedStiffness
-from seqopt.engines.discrete.engine import Across, Pinch
 from seqopt.network.network import GROUND
 from seqopt.sequence.two_robots import sequential
 from seqopt.study.published import STUDY_BED, STUDY_PADS

@@ -23,16 +23,26 @@ from experiments.discrete.parts.arch_pads import (
     pads_at_corners,
     readings,
 )
+from experiments.discrete.parts.pads import Across, PaddedEngine, Pinch, pad_stiffness
 from experiments.harness.results import RESULTS
 from experiments.harness.yardstick import STEPS, error, moved
-from seqopt.engines.discrete.engine import Across, Pinch, _pad_stiffness
+from seqopt.engines.interface import Want
 from seqopt.sequence.two_robots import sequential
-from seqopt.study.published import STUDY_PADS, printed
+from seqopt.study.published import STUDY_BED, STUDY_PADS, printed
 
 
 @pytest.fixture(scope="module")
 def step(engine25):
     return sequential(engine25.network)[STEPS[17] - 1]
+
+
+def test_pads_let_a_brick_turn_and_balance(engine25):
+    net, pinch = engine25.network, Pinch(Across.WIDTH, STUDY_PADS, side=0.03)
+    found = PaddedEngine(net, bed=STUDY_BED, pinch=pinch).solve(10, [[19]], Want.ALL)
+    assert np.abs(found.brick_twist[0, 9]).max() > 0
+    total = found.grip_force[0].sum(axis=0) + found.support[0, :, :3].sum(axis=0)
+    weight = -net.weight[:10].sum(axis=0)
+    assert total == pytest.approx(weight, abs=1e-6 * np.abs(weight).max())
 
 
 @pytest.mark.parametrize("across", list(Across))
@@ -43,7 +53,7 @@ def test_even_pads_can_stand_for_pads_at_corners(engine25, across):
     if across == Across.THICKNESS:
         axis = np.cross(brick.length_axis, axis)
     even, corners = (
-        _pad_stiffness(engine25.network, 16, center, p) for p in (pinch, pads_at_corners(pinch))
+        pad_stiffness(engine25.network, 16, center, p) for p in (pinch, pads_at_corners(pinch))
     )
     np.testing.assert_allclose(corners[:3, :3], even[:3, :3], atol=1e-6)
     turning = 2 * pinch.stiffness.tangential * pinch.side**4 / 6

@@ -39,12 +39,13 @@ from seqopt.arrays import Floats, Ints
 from seqopt.engines.diagnosis import UNRESISTED, WELL, _spectrum, residual
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Fields, Want, grip_columns
-from seqopt.engines.rigid._mixed import solve_dense, solve_mixed
+from seqopt.engines.rigid._mixed import solve_mixed
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import MechanismError, SolverError
 from seqopt.network.build import build_network
 from seqopt.network.network import Network
 from seqopt.report._style import BLUE, GRAY, GREEN, VERMILION, dress, new_figure, plain, styled
+from tests.direct_solve import solve_dense
 from tests.limit_scenes import (
     Case,
     chain,

@@ -183,13 +183,7 @@ EQUIVALENT = (
         for new in (">", ">=")
     ),
     Equivalent(GRIPS, "most * lowest >= least", ">=", ">", "no doubt is it to the last bit"),
-    Equivalent(
-        "seqopt.engines.rigid._pairs",
-        "@cache",
-        "@cache",
-        "",
-        "what is kept is made anew, and the same",
-    ),
+    Equivalent(GRIPS, "@cache", "@cache", "", "what is kept is made anew, and the same"),
     Equivalent(GROWTH, "AT_ONCE = 2**17", "2", "1", "how many are changed at a time"),
     Equivalent(COSTS, "given.flat[0]", "0", "-1", "all of these entries are one"),
     Equivalent(

@@ -76,7 +76,6 @@ MODULES = {
     ),
     "seqopt.engines.rigid._operator": RIGID,
     "seqopt.engines.rigid._grip_equations": RIGID,
-    "seqopt.engines.rigid._pairs": RIGID,
     "seqopt.engines.rigid._growth": ("engines/test_operator", "engines/test_growth"),
     "seqopt.graph.layers.costs": ("graph/test_costs", "plan/test_values"),
     **PROOFS,

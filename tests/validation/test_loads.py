@@ -11,7 +11,7 @@ import seqopt
 from seqopt.engines._auto import AutoEngine, Level
 from seqopt.engines.diagnosis import residual
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.rigid import ComplianceEngine, solve_dense, solve_mixed
+from seqopt.engines.rigid import ComplianceEngine, solve_mixed
 from seqopt.engines.rigid._refinement import Refinement
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
@@ -20,6 +20,7 @@ from seqopt.scene import Load
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.library import DomeShape, WallShape, chain, dome, wall
 from tests.builders import HERE
+from tests.direct_solve import solve_dense
 
 SLIDE, TURN = 3e7, 4e5  # N/m, N m/rad of every joint
 LENGTH = 0.2

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import linalg
 
+from experiments.discrete.parts.pads import Across, PaddedEngine, Pinch
 from seqopt import EPOXY, Step
 from seqopt.arrays import Floats
 from seqopt.contact._elastic_limits import opening_maps
@@ -25,7 +26,6 @@ from seqopt.contact.assembly import Assembly
 from seqopt.contact.faces import bare_assembly, step_assembly
 from seqopt.engines.discrete._bed import BedStiffness
 from seqopt.engines.discrete._system import System, build_system
-from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.interface import Fields, Want
 from seqopt.network.network import GROUND, Network
 from seqopt.study.published import STUDY_BED, STUDY_PADS
@@ -35,7 +35,7 @@ CLEAR = 1e-3  # m, between a pad's plane and the joints' corners: on one plane, 
 SPREADS = ("corners", "even")
 
 
-class AtCorners(DiscreteEngine):
+class AtCorners(PaddedEngine):
     """Discrete elements on the paper's bed, all of it at the corners of the faces."""
 
     def solve(self, bricks: int, grips: ArrayLike, want: Want = Want.RESPONSES) -> Fields:
@@ -177,10 +177,10 @@ class Reading:
         """What the tables call it."""
         return "node" if self.pinch is None else f"pads, {self.pinch.across.name.lower()}"
 
-    def engine(self, net: Network) -> DiscreteEngine:
+    def engine(self, net: Network) -> PaddedEngine:
         """Return the discrete elements so read."""
         if self.joint != CORNERS:
-            return DiscreteEngine(net, bed=JOINTS[self.joint], pinch=self.pinch)
+            return PaddedEngine(net, bed=JOINTS[self.joint], pinch=self.pinch)
         pinch = None if self.pinch is None else pads_at_corners(self.pinch)
         return AtCorners(net, bed=STUDY_BED, pinch=pinch)
 

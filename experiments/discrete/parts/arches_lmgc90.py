@@ -17,6 +17,7 @@ from scipy.spatial import ConvexHull
 
 from experiments.discrete.parts import arch_pads
 from experiments.discrete.parts.arch_pads import SPREADS, AtCorners, padded, posed
+from experiments.discrete.parts.pads import Across, PaddedEngine, Pinch
 from experiments.harness import lmgc90
 from experiments.harness.lmgc90 import python_with_lmgc90
 from experiments.harness.yardstick import error, inner_nodes, moved
@@ -24,7 +25,6 @@ from seqopt import EPOXY, Step
 from seqopt.arrays import Floats
 from seqopt.contact.assembly import Assembly
 from seqopt.engines.discrete._bed import BedStiffness
-from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.network._mechanics import node_motion
 from seqopt.network.network import GROUND, Network
@@ -102,11 +102,11 @@ def moved_by_twists(network: Network, step: Step, twist: Floats) -> Floats:
     return np.asarray(np.linalg.norm(every[inner_nodes(network, step)], axis=1))
 
 
-def spread_engine(network: Network, pinch: Pinch, spread: str) -> DiscreteEngine:
+def spread_engine(network: Network, pinch: Pinch, spread: str) -> PaddedEngine:
     """Return our discrete elements with faces that are even beds or springs at corners."""
     if spread == "corners":
         return AtCorners(network, bed=STUDY_BED, pinch=arch_pads.pads_at_corners(pinch))
-    return DiscreteEngine(network, bed=STUDY_BED, pinch=pinch)
+    return PaddedEngine(network, bed=STUDY_BED, pinch=pinch)
 
 
 def compared(

@@ -149,7 +149,7 @@ def nodes_compared(own: Ours) -> Rows:
 
 def _discrete(network: Network) -> DiscreteEngine:
     """Return discrete elements as printed, with a robot that holds a node."""
-    return DiscreteEngine(network, bed=STUDY_BED, pinch=None)
+    return DiscreteEngine(network, bed=STUDY_BED)
 
 
 def discrete_elements(own: Ours) -> Rows:

@@ -1,7 +1,7 @@
 """Discrete elements: rigid bricks on beds of springs that open, slip and break.
 
 `DiscreteEngine` lays a bed over every joint's face (`BedStiffness` and `Mortar` say what it
-carries), holds nodes or pinches bricks between pads (`Pinch`), and follows the structure to rest.
+carries), holds nodes, and follows the structure to rest.
 """
 
 from typing import TYPE_CHECKING
@@ -10,9 +10,7 @@ from seqopt._later import later
 from seqopt.engines.discrete._bed import BedStiffness
 
 if TYPE_CHECKING:
-    from seqopt.engines.discrete.engine import Across, DiscreteEngine, Pinch
+    from seqopt.engines.discrete.engine import DiscreteEngine
 
-__all__ = ["Across", "BedStiffness", "DiscreteEngine", "Pinch"]
-__getattr__, __dir__ = later(
-    __name__, dict.fromkeys(("Across", "DiscreteEngine", "Pinch"), "engine")
-)
+__all__ = ["BedStiffness", "DiscreteEngine"]
+__getattr__, __dir__ = later(__name__, {"DiscreteEngine": "engine"})

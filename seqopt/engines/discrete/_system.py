@@ -16,7 +16,7 @@ import numpy as np
 from scipy import linalg, sparse
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
-from seqopt.contact._elastic_limits import Quadrature, face_quadrature, first_points, opening_maps
+from seqopt.contact._elastic_limits import face_quadrature, first_points, opening_maps
 from seqopt.contact._elastic_limits import quadrature_stiffness as bed_stiffness
 from seqopt.contact.faces import bare_assembly
 from seqopt.contact.mortar import Mortar
@@ -143,9 +143,14 @@ def build_system(network: Network, bricks: int, mortar: Mortar, bed: BedStiffnes
     maps = opening_maps(assembly, bed_points.point, face, network.springs.position[acting])
     own = None
     if bed is None:
-        stiffness = spring_stiffness(network, acting)
-        moduli = _moduli(stiffness, bed_points, maps)
-        own = _without(stiffness, bed_stiffness(bed_points, maps, moduli))
+        stiffness, even = spring_stiffness(network, acting), np.ones((len(acting), 2))
+        beds = bed_stiffness(bed_points, maps, even)
+        pairs = zip(stiffness, beds, strict=True)
+        most = np.array([linalg.eigh(k, b, eigvals_only=True)[-1] for k, b in pairs])
+        moduli = even * (_BED_OVER_JOINT * most[:, None])  # stiffer than its joint every way
+        share = np.eye(6) - np.linalg.solve(bed_stiffness(bed_points, maps, moduli), stiffness)
+        layer = np.linalg.solve(share.transpose(0, 2, 1), stiffness.transpose(0, 2, 1))
+        own = np.asarray(0.5 * (layer + layer.transpose(0, 2, 1)))  # in series with their beds
     else:
         moduli = np.tile([bed.normal, bed.tangential], (len(acting), 1))
     length = max(network.scene.placed[0].dimensions)
@@ -180,21 +185,6 @@ def _joined(
         return joint, sparse.csr_array(units.shape), unit
     layer = sparse.hstack([joint, -gap[:, 6 * bricks :]])
     return gap, sparse.csr_array(layer.T @ _diagonal(own) @ layer), unit
-
-
-def _moduli(stiffness: Floats, points: Quadrature, maps: Floats) -> Floats:
-    """Return the moduli (J, 2) of beds that are stiffer than their joints (J, 6, 6) every way."""
-    even = np.ones((len(stiffness), 2))
-    beds = bed_stiffness(points, maps, even)
-    most = [linalg.eigh(k, b, eigvals_only=True)[-1] for k, b in zip(stiffness, beds, strict=True)]
-    return even * (_BED_OVER_JOINT * np.array(most)[:, None])
-
-
-def _without(stiffness: Floats, bed: Floats) -> Floats:
-    """Return the layers (J, 6, 6) that make joints when in series with beds."""
-    share = np.eye(6) - np.linalg.solve(bed, stiffness)
-    out = np.linalg.solve(share.transpose(0, 2, 1), stiffness.transpose(0, 2, 1))
-    return np.asarray(0.5 * (out + out.transpose(0, 2, 1)))
 
 
 def _diagonal(blocks: Floats) -> sparse.csr_array:

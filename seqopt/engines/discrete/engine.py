@@ -4,7 +4,7 @@ A joint is its own elastic spring in series with a bed of points over the face b
 so that within the elastic limits the answer is that of exactly rigid bricks; the bed takes over
 where tension or shear exceeds what the mortar holds (`seqopt.engines.discrete._system`). With
 a `BedStiffness` the bed alone is the joint, as in the discrete-element models of Bruun et al.
-(section 3.2.3). Every grip holds its node, or pinches its brick between two pads.
+(section 3.2.3). Every grip holds its node and lets its brick turn.
 
 One grip set at a time: Newton's method with the exact tangent, the load in steps once a bond
 breaks. What it finds is an equilibrium within all limits, reached from rest with grips that only
@@ -14,9 +14,6 @@ react. `seqopt.stability` asks less: that forces exist, whatever brings them abo
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from enum import IntEnum
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -32,44 +29,10 @@ from seqopt.engines.discrete._system import System, build_system
 from seqopt.engines.interface import Fields
 from seqopt.engines.rigid._mechanism import mechanism_error, require_resistance
 from seqopt.engines.rigid._mixed import Solution, respond
-from seqopt.errors import SceneError, SeqoptError, SolverError
+from seqopt.errors import SeqoptError, SolverError
 from seqopt.network._mechanics import build_statics, node_motion, point_motion
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
-
-
-class Across(IntEnum):
-    """Which way two pads press on a brick: along its width or its thickness."""
-
-    WIDTH = 1
-    THICKNESS = 2
-
-
-@dataclass(frozen=True)
-class Pinch:
-    """Two square pads that hold a brick on either side of its node and do not slip.
-
-    ``stiffness``: of the pads; ``side``: of a pad, m.
-    """
-
-    across: Across
-    stiffness: BedStiffness
-    side: float
-
-
-def _pad_stiffness(network: Network, index: int, node: Floats, pinch: Pinch) -> Floats:
-    """Return the stiffness (6, 6) with which two pads beside a node hold a brick's twists."""
-    brick = network.scene.placed[index]
-    out, sides = brick.frame[pinch.across], np.delete(brick.frame, pinch.across, axis=0)
-    moduli = pinch.stiffness.tangential * np.eye(3)
-    moduli += (pinch.stiffness.normal - pinch.stiffness.tangential) * np.outer(out, out)
-    total = np.zeros((6, 6))
-    reach = pinch.side / np.sqrt(12)  # four points here have a square's second moments
-    for sign, a, b in product((-0.5, 0.5), (-reach, reach), (-reach, reach)):
-        point = node + sign * brick.dimensions[pinch.across] * out + a * sides[0] + b * sides[1]
-        moved = point_motion(point - network.centroid[index])
-        total += pinch.side**2 / 4 * moved.T @ moduli @ moved
-    return total
 
 
 class DiscreteEngine(OpeningEngine):
@@ -80,21 +43,14 @@ class DiscreteEngine(OpeningEngine):
     faces of a joint do not overlap.
 
     ``mortar``: what the joints hold; the epoxy of Bruun et al. by default. ``bed``: the joints
-    themselves; by default they are as stiff as the scene says. ``pinch``: how robots hold; by
-    default a grip holds its node and lets its brick turn.
+    themselves; by default they are as stiff as the scene says.
     """
 
     def __init__(
-        self,
-        network: Network | Scene,
-        mortar: Mortar = EPOXY,
-        bed: BedStiffness | None = None,
-        pinch: Pinch | None = None,
+        self, network: Network | Scene, mortar: Mortar = EPOXY, bed: BedStiffness | None = None
     ) -> None:
         super().__init__(network)
-        if pinch is not None and not self.network.scene.grip_kinds.rigid:
-            raise SceneError("pinch: pads give way as they do; leave them or the grips' stiffness")
-        self._mortar, self._bed, self._pinch = mortar, bed, pinch
+        self._mortar, self._bed = mortar, bed
         self._systems: dict[int, System] = {}
 
     def _answers(self, bricks: int, columns: Ints, hands: Hands | None) -> Iterable[Fields]:
@@ -107,28 +63,28 @@ class DiscreteEngine(OpeningEngine):
         return [self._solve_one(self._systems[bricks], *one) for one in each]
 
     def _solve_one(self, system: System, columns: Ints, hands: Hands | None) -> Fields:
-        network, pinch, inner = self._network, self._pinch, self._network.inner.ravel()[columns]
-        nodes = network.node_position[inner]
-        springs: list[_Spring] = []
-        if pinch is None:
-            springs = _springs(network, system, columns, nodes, hands)
-            held = _held_nodes(network, system, columns, hands, springs)
-        else:
-            far = (hands or Hands()).far(1, len(columns))[0]
-            held = _pinched(network, system, columns, far, pinch)
+        network = self._network
+        springs = _springs(network, system, columns, hands)
+        held = self._hold(system, columns, hands, springs)
         found = settle(held)
         if not found.rests:
-            raise _not_at_rest(network, held, found, inner)
+            raise _not_at_rest(network, held, found, columns)
         return _fields(network, held, found, columns, springs)
 
+    def _hold(
+        self, system: System, columns: Ints, hands: Hands | None, springs: list[_Spring]
+    ) -> Held:
+        return _held_nodes(self._network, system, columns, hands, springs)
 
-def _not_at_rest(network: Network, held: Held, found: Settled, nodes: Ints) -> SeqoptError:
+
+def _not_at_rest(network: Network, held: Held, found: Settled, columns: Ints) -> SeqoptError:
     """Return the error of a structure that did not come to rest: it went, or was not followed."""
     system = held.system
     if held.gone(found):
         moved = system.unit * held.moved(found.motion)
         said = "joints open or slip and brick {brick} becomes unstable; add a grip, a bond or "
         return mechanism_error(network, moved[: 6 * system.bricks], said + "friction")
+    nodes = network.inner.ravel()[columns]
     names = ", ".join(str(network.node_name[n]) for n in nodes) or "nothing"
     return SolverError(
         f"{system.bricks} bricks held at {names}: the discrete elements neither came to rest nor "
@@ -156,13 +112,12 @@ class _Spring(NamedTuple):
         return np.asarray(self.stiffness @ (self.far - self.motion @ twist))
 
 
-def _springs(
-    network: Network, system: System, columns: Ints, nodes: Floats, hands: Hands | None
-) -> list[_Spring]:
-    """Return the hands of one set that give way; nodes are at (r, 3)."""
+def _springs(network: Network, system: System, columns: Ints, hands: Hands | None) -> list[_Spring]:
+    """Return the soft grips of one set as springs."""
     if hands is None or hands.give is None:
         return []
     grips, out = len(columns), []
+    nodes = network.node_position[network.inner.ravel()[columns]]
     soft, turns = hands.soft(1, grips)[0], hands.each_turns(1, grips)[0]
     give, far = hands.each_give(1, grips)[0], hands.far(1, grips)[0]
     scale = np.repeat([1.0, hands.lever], 3)
@@ -184,7 +139,7 @@ def _springs(
 def _held_nodes(
     network: Network, system: System, columns: Ints, hands: Hands | None, springs: list[_Spring]
 ) -> Held:
-    """Return a system whose nodes are held: rigidly, and by springs where hands give way."""
+    """Return a system whose nodes are held: rigidly, or by springs of soft grips."""
     count, hands = len(system.load) // 6, hands or Hands()
     blocks, taken = [np.eye(6)] * count, np.zeros_like(system.load)
     pads, pull = [sparse.csr_array((6, 6))] * count, np.zeros_like(system.load)
@@ -194,8 +149,9 @@ def _held_nodes(
         mine = rigid & (columns // 2 == body)
         moved = point_motion(nodes[mine] - network.centroid[body]).reshape(-1, 6)
         moved *= system.unit[:6]
+        own = slice(6 * body, 6 * body + 6)
         blocks[body] = linalg.null_space(moved)
-        taken[6 * body : 6 * body + 6] = np.linalg.lstsq(moved, far[mine].ravel(), rcond=None)[0]
+        taken[own] = np.linalg.lstsq(moved, far[mine].ravel(), rcond=None)[0]
     for spring in springs:
         own = slice(6 * spring.body, 6 * spring.body + 6)
         pads[spring.body] = pads[spring.body] + sparse.csr_array(spring.pads)
@@ -204,28 +160,13 @@ def _held_nodes(
     return Held(system, free, sparse.csr_array(sparse.block_diag(pads)), taken, pull)
 
 
-def _pinched(network: Network, system: System, columns: Ints, far: Floats, pinch: Pinch) -> Held:
-    """Return a system whose held bricks are pinched between pads, which are moved (r, 3)."""
-    blocks = [sparse.csr_array((6, 6))] * (len(system.load) // 6)
-    units, pull = np.outer(system.unit[:6], system.unit[:6]), np.zeros_like(system.load)
-    inner = network.node_position[network.inner.ravel()]
-    for column, moved in zip(columns, far, strict=True):
-        body = column // 2
-        pads = _pad_stiffness(network, body, inner[column], pinch) * units
-        blocks[body] = blocks[body] + sparse.csr_array(pads)
-        pull[6 * body : 6 * body + 6] += pads[:, :3] @ (moved / system.unit[:3])
-    every = sparse.eye_array(len(system.load), format="csr")
-    pads_of = sparse.csr_array(sparse.block_diag(blocks, format="csr"))
-    return Held(system, every, pads_of, np.zeros_like(pull), pull)
-
-
 def _fields(
     network: Network, held: Held, found: Settled, columns: Ints, springs: list[_Spring]
 ) -> Fields:
     """Return the fields of one grip set.
 
-    Two rigid grips on one brick share so that their forces are as small as can be; what pads exert
-    beside a force, a moment, belongs to no node.
+    Two rigid grips on one brick share so that their forces are as small as can be; a moment on a
+    brick that pads exert belongs to no node.
     """
     system, moved = held.system, held.moved(found.motion)
     wrench = np.zeros((len(network.springs.since), 6))

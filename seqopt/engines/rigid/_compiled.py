@@ -140,34 +140,20 @@ def share_pairs(
                     continue
                 idle[s, pairs] = edge[brick]
                 pairs += 1
-                carried = _sum_of(mean, brick, index, s, own)
+                carried = mean[len(mean) - 1, brick]
+                for k in range(len(own)):
+                    carried += own[k] * mean[index[s, k], brick]
                 carried *= 1.0 - 2.0 * (node % 2)  # the axis leads to the second node
                 for i in range(width):
                     own[width * first + i] += carried * axis[brick, i]
                     own[width * second + i] -= carried * axis[brick, i]
         for k in range(pairs, idle.shape[1]):
             idle[s, k] = -1
-        _measure(own, size, s)
-
-
-@_compiled()
-def _sum_of(mean: Floats, column: int, index: Ints, s: int, force: Floats) -> float:
-    """Return what the weight, the last row, and forces (k,) at the loads of a set mean."""
-    out = mean[len(mean) - 1, column]
-    for k in range(len(force)):
-        out += force[k] * mean[index[s, k], column]
-    return float(out)
-
-
-@_compiled()
-def _measure(force: Floats, size: Floats, s: int) -> None:
-    """Find how large the forces (r, d) of a set are."""
-    width = len(force) // max(1, size.shape[1])
-    for grip in range(size.shape[1]):
-        squared = 0.0
-        for i in range(width * grip, width * grip + width):
-            squared += force[i] * force[i]
-        size[s, grip] = np.sqrt(squared)
+        for grip in range(size.shape[1]):
+            squared = 0.0
+            for i in range(width * grip, width * grip + width):
+                squared += own[i] * own[i]
+            size[s, grip] = np.sqrt(squared)
 
 
 @_compiled()
@@ -176,7 +162,9 @@ def _eliminate(low: Floats, pivots: Floats) -> None:
     count = len(low)
     row = np.empty((count, _SIDE_BY_SIDE))
     for j in range(count):
-        _pick_row(low, pivots, j, row)
+        for k in range(j):  # a row of the factors, left of the diagonal, times the pivots
+            for s in range(_SIDE_BY_SIDE):
+                row[k, s] = low[j, k, s] * pivots[k, s]
         for i in range(j, count):
             for k in range(j):
                 for s in range(_SIDE_BY_SIDE):
@@ -187,14 +175,6 @@ def _eliminate(low: Floats, pivots: Floats) -> None:
         for i in range(j + 1, count):
             for s in range(_SIDE_BY_SIDE):
                 low[i, j, s] *= low[j, j, s]
-
-
-@_compiled()
-def _pick_row(low: Floats, pivots: Floats, j: int, row: Floats) -> None:
-    """Find a row of the factors, left of the diagonal, times the pivots."""
-    for k in range(j):
-        for s in range(_SIDE_BY_SIDE):
-            row[k, s] = low[j, k, s] * pivots[k, s]
 
 
 @_compiled()

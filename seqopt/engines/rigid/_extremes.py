@@ -12,10 +12,10 @@ second, so it is left to those who ask for it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache
 from importlib.util import find_spec
 from math import prod
+from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
@@ -72,22 +72,13 @@ def rows_of(operator: ComplianceOperator, want: Want) -> ExtremeRows:
 
 
 def _made_rows(operator: ComplianceOperator, asked: frozenset[str]) -> ExtremeRows:
-    """Return the same of named fields."""
-    loads, sizes = len(operator.twist), []
-    for name, size in _OF.items():
-        sizes.append(operator.maps.count(name) // size if name in asked else 0)
+    loads, maps = len(operator.twist), operator.maps
+    sizes = [maps.count(name) // size if name in asked else 0 for name, size in _OF.items()]
     total = sizes[0] + 3 * (sizes[1] + sizes[2])
     parts = max(1, min(total * loads // _PART, total // _LEAST))
     edges, nodes, ends = (-(-size // parts) for size in sizes)
-    counts = edges, nodes, ends
-    return ExtremeRows(_by_part(operator, parts, counts), counts, sizes[0])
-
-
-def _by_part(operator: ComplianceOperator, parts: int, counts: tuple[int, int, int]) -> Floats:
-    """Return the rows of an operator as of `ExtremeRows`."""
-    width = counts[0] + 3 * (counts[1] + counts[2])
-    rows, first = _in_lines(parts, len(operator.twist), width), 0
-    for count, (name, size) in zip(counts, _OF.items(), strict=True):
+    rows, first = _in_lines(parts, loads, edges + 3 * (nodes + ends)), 0
+    for count, (name, size) in zip((edges, nodes, ends), _OF.items(), strict=True):
         if not count:
             continue
         found = operator.mean(name)
@@ -98,7 +89,7 @@ def _by_part(operator: ComplianceOperator, parts: int, counts: tuple[int, int, i
                 here = slice(first + axis * count, first + axis * count + count)
                 rows[part, :, here] = field[:, axis, start : start + count]
         first += count * field.shape[1]
-    return rows
+    return ExtremeRows(rows, (edges, nodes, ends), sizes[0])
 
 
 def _in_lines(parts: int, loads: int, width: int) -> Floats:
@@ -153,20 +144,12 @@ def can_compile() -> bool:
     return find_spec("numba") is not None
 
 
-class _Loops(NamedTuple):
-    """The compiled functions."""
-
-    solve_grips: Callable[..., None]
-    share_pairs: Callable[..., None]
-    reduce_rows: Callable[..., None]
-
-
 @cache
-def _loops() -> _Loops:
+def _loops() -> ModuleType:
     """Return the compiled functions; loading them takes half a second."""
     from seqopt.engines.rigid import _compiled  # noqa: PLC0415  # numba is an extra
 
-    return _Loops(_compiled.solve_grips, _compiled.share_pairs, _compiled.reduce_rows)
+    return _compiled
 
 
 class Solved(NamedTuple):
@@ -194,12 +177,10 @@ def solve_compiled(operator: ComplianceOperator, columns: Ints, index: Ints) -> 
     )
     flexibility, dead, held = operator.flexibility, operator.dead_displacement, (columns, index)
     loops.solve_grips(flexibility, dead, axis, held, found.force, found.pivot)
-    mean = operator.made("inner edges", lambda: _inner(operator))
-    inner = operator.inner_edge, mean
+    edge = operator.inner_edge
+    mean = operator.made(
+        "inner edges", lambda: np.ascontiguousarray(operator.mean("edge_force")[:, edge])
+    )
+    inner = edge, mean
     loops.share_pairs(axis, inner, held, found.force, found.size, found.idle)
     return found
-
-
-def _inner(operator: ComplianceOperator) -> Floats:
-    """Return what every load means to the inner edges of bricks, (l + 1, b)."""
-    return np.ascontiguousarray(operator.mean("edge_force")[:, operator.inner_edge])

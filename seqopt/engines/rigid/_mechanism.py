@@ -20,7 +20,7 @@ from seqopt.network._mechanics import (
     spread,
     spring_maps,
 )
-from seqopt.network.network import Network, Springs
+from seqopt.network.network import Network
 from seqopt.work._threads import one_thread
 
 
@@ -98,6 +98,8 @@ def ungripped_system(network: Network, bricks: int, shared: Shared | None = None
     inner: sparse.csr_array = sparse.csr_array(nodes, shape=(size, size))
     weight = network.inner_weight[: 2 * bricks].ravel()
     applied = network.applied(bricks).ravel()
+    shift = np.einsum("sij,shj->shi", springs.axes, springs.movement.reshape(-1, 2, 3))[acting]
+    row = stiffness / np.maximum(1.0, stiffness)
     return Ungripped(
         network=network,
         bricks=bricks,
@@ -107,19 +109,12 @@ def ungripped_system(network: Network, bricks: int, shared: Shared | None = None
         stiffness=stiffness,
         matrix=_side_by_side(gap, stiffness),
         load=inner.T @ weight / unit + applied * twist_unit / unit,
-        moved=_moved(springs, acting, stiffness, lever),
+        moved=row * (shift.reshape(-1, 6) * lever).ravel(),
         acting=acting,
         twist_unit=twist_unit,
         wrench_unit=unit * np.tile(lever, len(acting)),
         unit=unit,
     )
-
-
-def _moved(springs: Springs, acting: Ints, stiffness: Floats, lever: Floats) -> Floats:
-    """Return what acting springs would bear if the ground alone moved, scaled as their rows."""
-    own = np.einsum("sij,shj->shi", springs.axes, springs.movement.reshape(-1, 2, 3))[acting]
-    row = stiffness / np.maximum(1.0, stiffness)
-    return np.asarray(row * (own.reshape(-1, 6) * lever).ravel())
 
 
 def _scaled_gap(shared: Shared, acting: Ints, unit: Floats, lever: Floats) -> sparse.csr_array:

@@ -10,8 +10,6 @@ of the joints, the equilibrium of the bricks and the stillness of the grips make
 
 (wrenches :math:`s`, stiffnesses :math:`C`, twists :math:`u`, grip forces :math:`\lambda`) whose
 condition does not grow with the length of a chain as its stiffness does.
-
-`solve_dense` solves directly, one grip set at a time: the general case, mechanisms included.
 """
 
 from __future__ import annotations
@@ -27,15 +25,7 @@ from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines._hands import Hands
 from seqopt.engines._twice import add_products
 from seqopt.engines.interface import Fields, join_sets, no_sets
-from seqopt.engines.rigid._mechanism import (
-    RigidStructure,
-    Ungripped,
-    lost_to_rounding,
-    require_resistance,
-    resisting_modes,
-    rigid_structure,
-    ungripped_system,
-)
+from seqopt.engines.rigid._mechanism import Ungripped, require_resistance, ungripped_system
 from seqopt.errors import SolverError
 from seqopt.network._mechanics import Statics
 from seqopt.network.network import Network
@@ -373,51 +363,3 @@ def _sizes(parts: Ungripped, states: Floats) -> Floats:
     both = np.split(states, [len(parts.wrench_unit)], axis=1)
     kinds = [part.reshape(len(states), part.shape[1] // 6, 2, 3) for part in both]
     return np.hstack([np.abs(part).max(axis=(1, 3), initial=0.0) for part in kinds])
-
-
-_BACKWARD = 1e-10  # largest backward error of an accepted solution
-
-
-def solve_dense(network: Network, bricks: int, columns: Ints, hands: Hands | None = None) -> Fields:
-    """Return the fields of grip sets from the stiffness matrix of each.
-
-    Raises `MechanismError` if nothing resists a motion; `SolverError` if a motion is resisted too
-    little for the assembled stiffness to tell, or the backward error is larger than `_BACKWARD`.
-    """
-    parts = rigid_structure(network, bricks)
-    if hands is not None and hands.give is not None:
-        raise SolverError("direct solve: it holds rigidly; take another engine for soft grips")
-    far = (hands or Hands()).far(*columns.shape)
-    each = zip(columns, far, strict=True)
-    answers = [_solve_one_dense(network, parts, *one) for one in each]
-    return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])
-
-
-def _solve_one_dense(network: Network, parts: RigidStructure, grips: Ints, far: Floats) -> Fields:
-    """Return the fields of one grip set, whose nodes are moved (r, 3)."""
-    bricks = len(parts.matrix) // 6
-    pull = parts.inner_motion.T @ network.inner_weight[: 2 * bricks].ravel()
-    pull += network.applied(bricks).ravel()
-    moved = network.springs.movement[parts.acting]
-    pull += np.einsum("sij,sik,sk->j", parts.gap, parts.stiffness, moved)
-    forbidden = parts.forbidden(grips)
-    values, vectors, motions = resisting_modes(parts.matrix, forbidden)
-    if lost_to_rounding(values):
-        require_resistance(network, bricks, grips)
-        raise SolverError(f"direct solve of {bricks} bricks: too close to a mechanism")
-    taken = np.zeros_like(pull)
-    if far.any():
-        taken = np.asarray(np.linalg.lstsq(forbidden, far.ravel(), rcond=None)[0])
-    target = motions.T @ (pull - parts.matrix @ taken)
-    answer = vectors @ (vectors.T @ target / values)
-    residual = np.abs(motions.T @ (parts.matrix @ (motions @ answer)) - target).max()
-    if not residual <= _BACKWARD * (values[-1] * np.abs(answer).max() + np.abs(target).max()):
-        raise SolverError(f"direct solve of {bricks} bricks: backward error too large")
-    twist = motions @ answer + taken
-    wrench = np.zeros((len(network.springs.since), 6))
-    wrench[parts.acting] = -np.einsum("sij,sjk,k->si", parts.stiffness, parts.gap, twist)
-    wrench[parts.acting] += np.einsum("sij,sj->si", parts.stiffness, moved)
-    missing = parts.matrix @ twist - pull
-    force = np.asarray(np.linalg.lstsq(forbidden.T, missing, rcond=None)[0].reshape(-1, 3))
-    solution = Solution(twist[None], wrench[None], force[None])
-    return respond(network, parts.statics, parts.motion, grips[None], solution)

@@ -32,7 +32,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.engines._hands import Hands, _lever_of
 from seqopt.engines.interface import SPACE, Basis, Fields, join_sets, merge_sets, no_sets
-from seqopt.engines.rigid._grip_equations import grip_forces, still_forces
+from seqopt.engines.rigid._grip_equations import _by_grip, grip_forces, still_forces
 from seqopt.engines.rigid._hanging import Hanging, HangingSystem
 from seqopt.engines.rigid._mechanism import (
     Shared,
@@ -53,7 +53,6 @@ from seqopt.engines.rigid._mixed import (
     unscaled,
 )
 from seqopt.engines.rigid._operator import ComplianceOperator, load_rows
-from seqopt.engines.rigid._pairs import _by_grip
 from seqopt.engines.rigid._response_maps import ResponseMaps, inner_edges, scene_maps
 from seqopt.errors import SolverError
 from seqopt.network._mechanics import point_motion
@@ -245,16 +244,15 @@ class Refinement:
         tied: bool = False,
         hanging: Hanging | None = None,
     ) -> None:
-        self.network, self.bricks, self._hanging = network, bricks, hanging
+        self.network, self.bricks = network, bricks
         self.parts = ungripped_system(network, bricks, shared)
-        self.held = self._system(tied=tied)
+        self.held: _HeldSystem | HangingSystem
+        firm = tied and bool((self.parts.stiffness >= _SOFT).all())
+        if hanging is not None and firm and bricks <= hanging.bricks:
+            self.held = HangingSystem(self.parts, hanging)
+        else:
+            self.held = _hold_loose(self.parts, tied=tied)
         self.inner = _loaded(self.parts)
-
-    def _system(self, *, tied: bool) -> _HeldSystem | HangingSystem:
-        hanging, firm = self._hanging, tied and bool((self.parts.stiffness >= _SOFT).all())
-        if hanging is not None and firm and self.bricks <= hanging.bricks:
-            return HangingSystem(self.parts, hanging)
-        return _hold_loose(self.parts, tied=tied)
 
     @cached_property
     def own(self) -> ComplianceOperator:
@@ -308,15 +306,11 @@ def _loaded(parts: Ungripped) -> sparse.csr_array:
     if not network.scene.grip_kinds.turns.any():
         return parts.inner
     turned = np.zeros((3 * parts.bricks, size))
-    turned[np.arange(3 * parts.bricks), _turns(parts.bricks)] = _lever_of(network)
+    turns = (6 * np.arange(parts.bricks)[:, None] + np.arange(3, 6)).ravel()
+    turned[np.arange(3 * parts.bricks), turns] = _lever_of(network)
     both = sparse.vstack([parts.inner, sparse.csr_array(turned * parts.twist_unit)], format="csr")
     each = np.hstack([np.arange(size).reshape(-1, 6), size + np.arange(size // 2).reshape(-1, 3)])
     return sparse.csr_array(both[each.ravel()])
-
-
-def _turns(bricks: int) -> Ints:
-    """Return which of their twists (6b,) are turns."""
-    return (6 * np.arange(bricks)[:, None] + np.arange(3, 6)).ravel()
 
 
 class _Asked(NamedTuple):

@@ -43,10 +43,17 @@ from seqopt.engines.rigid._extremes import (
     rows_of,
     solve_compiled,
 )
-from seqopt.engines.rigid._grip_equations import _GripForces, grip_forces, share_pairs, trusted
+from seqopt.engines.rigid._grip_equations import (
+    Pairs,
+    _by_grip,
+    _GripForces,
+    grip_forces,
+    pairs_of,
+    share_pairs,
+    trusted,
+)
 from seqopt.engines.rigid._growth import grow_tree
 from seqopt.engines.rigid._operator import ComplianceOperator, OperatorBuilder, are_few, load_rows
-from seqopt.engines.rigid._pairs import Pairs, _by_grip, pairs_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.work._threads import one_thread

@@ -10,7 +10,6 @@ import pytest
 import seqopt
 from seqopt.contact.faces import _face_distance, bare_assembly
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.rigid._mixed import solve_dense
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
@@ -27,6 +26,7 @@ from seqopt.scene.scene_file import (
 )
 from seqopt.sequence.schedule import islands
 from tests.builders import first, largest_difference
+from tests.direct_solve import solve_dense
 
 PRINTED = (2.670, 4.350)  # m; sides of the plan, section 3.1 of Bruun et al.
 NARROWEST, WIDEST = 0.0015, 0.0265  # m; between the faces of bricks that touch

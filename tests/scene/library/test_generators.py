@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from seqopt.contact.faces import bare_assembly
 from seqopt.engines.frame import FrameEngine
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.engines.rigid._mixed import solve_dense
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network
@@ -36,6 +35,7 @@ from seqopt.sequence.schedule import islands
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.sequence.two_robots import cantilever, sequential
 from tests.builders import largest_difference, small_arch
+from tests.direct_solve import solve_dense
 
 
 def even_arch(count):

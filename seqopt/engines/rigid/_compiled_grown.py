@@ -9,7 +9,7 @@ import numpy as np
 
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.rigid._compiled import _SIDE_BY_SIDE, _brace, _compiled, _undo
-from seqopt.engines.rigid._grown_maps import Edges, Ends, Grown, Kept, Motion, Part
+from seqopt.engines.rigid._grown import Edges, Ends, Grown, Kept, Motion, Part
 
 _ROUNDED = 1 + 1e-9  # a bound is as much larger than what rounding may leave
 
