@@ -22,7 +22,7 @@ from seqopt.graph.states._visits import FreeStates, ScenarioSums, explore, move_
 from seqopt.graph.states.states import States
 from seqopt.network.build import build_network
 from seqopt.problem.problem import LARGEST, Measure, Orders
-from seqopt.responses._blocks import Shipment, engine_of, pack
+from seqopt.responses._blocks import packed, unpacked
 from seqopt.scene.scene import Order, Scene
 from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence._rule_space import sort_entries
@@ -398,7 +398,7 @@ def trying(problem: AllOrders, *, elsewhere: bool) -> Callable[[Trial], float]:
     free = replace(problem.states, resources=problem.states.resources.alone())
     sent = ("engine", "scenarios")
     rest = {f.name: getattr(free, f.name) for f in fields(free) if f.name not in sent}
-    others = tuple(map(pack, free.scenarios))
+    others = tuple(map(packed, free.scenarios))
     try:
         content = pickle.dumps((rest, others, problem.among))
     except Exception as error:  # whatever objects of others may raise
@@ -406,10 +406,10 @@ def trying(problem: AllOrders, *, elsewhere: bool) -> Callable[[Trial], float]:
             f"criterion {free.criterion.name}: it cannot be sent to other processes ({error}); "
             "define it in a module, or let this process work alone"
         ) from error
-    return partial(_sent, pack(free.engine), content)
+    return partial(_sent, packed(free.engine), content)
 
 
-def _sent(shipment: Shipment, content: bytes, trial: Trial) -> float:
+def _sent(shipment: bytes, content: bytes, trial: Trial) -> float:
     rest, others, among = pickle.loads(content)  # our own, from `trying`
-    rest["scenarios"] = tuple(map(engine_of, others))
-    return order_value(AllOrders(States(engine=engine_of(shipment), **rest), among), trial)
+    rest["scenarios"] = tuple(map(unpacked, others))
+    return order_value(AllOrders(States(engine=unpacked(shipment), **rest), among), trial)

@@ -19,7 +19,7 @@ from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.graph.solution import Selection
 from seqopt.network.network import Network
 from seqopt.problem.problem import Aim
-from seqopt.responses._blocks import pack
+from seqopt.responses._blocks import packed, remade
 from seqopt.responses._choices import Evaluation
 from seqopt.responses.quantities import CHOSEN_BY
 
@@ -46,7 +46,7 @@ def _require_anew(
         replace(move, candidates=(move.candidates[i],))
         for move, i in zip(schedule.moves, choice, strict=True)
     )
-    engine = pack(problem.engine).unpack()
+    engine = remade(packed(problem.engine))
     anew = Evaluation(engine, replace(schedule, moves=chosen), evaluation.wanted)
     found = dict(_met(anew, [0] * len(chosen)))
     kept: dict[int, Mapping[str, float]] = {}

@@ -21,10 +21,10 @@ import math
 import pickle
 import threading
 import time
-from collections import Counter, OrderedDict
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
-from functools import cached_property, partial, reduce
+from functools import cached_property, lru_cache, reduce
 from itertools import groupby
 from operator import or_
 from pathlib import Path
@@ -136,36 +136,19 @@ def tally_of(engine: Engine) -> dict[object, int]:
     return found if isinstance(found, dict) else {}
 
 
-_HELD = 2  # engines that a process keeps between tasks: of the run before, and of this one
-Blocks = Sequence[Block]
+def packed(engine: Engine) -> bytes:
+    """Return an engine as it is sent: how to make it, or itself where nobody knows.
 
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Shipment:
-    """An engine as it is sent: how to make it, or itself where nobody knows."""
-
-    key: str  # its content, condensed
-    content: bytes
-
-    def unpack(self) -> Engine:
-        """Return the engine, newly made."""
-        found: Recipe | Engine = pickle.loads(self.content)  # our own, from `pack`
-        if isinstance(found, Recipe):
-            return found.make()
-        return found
-
-
-def pack(engine: Engine) -> Shipment:
-    """Return an engine as it is sent. Raises `SceneError` if it is one's own and cannot be."""
+    Raises `SceneError` if it is one's own and cannot be sent.
+    """
     recipe = _known_recipe(engine)
     try:
-        content = pickle.dumps(engine if recipe is None else recipe)
+        return pickle.dumps(engine if recipe is None else recipe)
     except Exception as error:  # whatever objects of others may raise
         raise SceneError(
             f"engine {type(engine).__name__}: it cannot be sent to other processes ({error}); take "
             "one of seqopt.make_engine, or let this process work alone"
         ) from error
-    return Shipment(hashlib.sha256(content).hexdigest(), content)
 
 
 def _known_recipe(engine: Engine) -> Recipe | None:
@@ -174,40 +157,29 @@ def _known_recipe(engine: Engine) -> Recipe | None:
     return recipe if recipe is not None and recipe.network == engine.network else None
 
 
-def worker_for(engine: Engine, *, elsewhere: bool) -> Callable[[Blocks], list[Answers]]:
-    """Return the function that answers blocks. ``elsewhere``: whether in other processes."""
-    return partial(_answer_all, pack(engine) if elsewhere else engine)
+def remade(content: bytes) -> Engine:
+    """Return an engine that was `packed`, newly made."""
+    found: Recipe | Engine = pickle.loads(content)  # our own, of `packed`
+    return found.make() if isinstance(found, Recipe) else found
 
 
-def _answer_all(engine: Engine | Shipment, blocks: Blocks) -> list[Answers]:
-    return [answer(engine_of(engine), block) for block in blocks]
-
-
-class _Shelf(threading.local):
-    """The engines that a worker made, the last few by content.
+class _Made(threading.local):
+    """The engines that each thread of a worker makes, the last two: of one run and the next.
 
     An executor of others offers no place for what its workers keep between tasks; without one
-    each task would make its engine, and grow it, anew. Every thread has its own.
+    each task would make its engine, and grow it, anew.
     """
 
     def __init__(self) -> None:
-        self.engines: OrderedDict[str, Engine] = OrderedDict()
+        self.engine = lru_cache(maxsize=2)(remade)
 
 
-_shelf = _Shelf()
+_OF_THREAD = _Made()
 
 
-def engine_of(engine: Engine | Shipment) -> Engine:
-    """Return an engine, one that was sent newly made; a worker keeps the last few."""
-    if not isinstance(engine, Shipment):
-        return engine
-    kept = _shelf.engines
-    if engine.key not in kept:
-        while len(kept) >= _HELD:
-            kept.popitem(last=False)
-        kept[engine.key] = engine.unpack()
-    kept.move_to_end(engine.key)
-    return kept[engine.key]
+def unpacked(engine: Engine | bytes) -> Engine:
+    """Return an engine, or what was `packed` made by this worker."""
+    return _OF_THREAD.engine(engine) if isinstance(engine, bytes) else engine
 
 
 _LEFT = 3600.0  # s after which a file that is not complete is one that was given up

@@ -12,14 +12,15 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import chain, count, islice, zip_longest
-from typing import TypeVar
+from itertools import chain, islice
+from typing import NamedTuple, cast
 
 import numpy as np
+import pandas as pd
 
 from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
@@ -29,46 +30,45 @@ from seqopt.responses._blocks import (
     Answers,
     Batch,
     Block,
-    Blocks,
     StepChoices,
     Store,
     Wanted,
     _grip_rows,
+    answer,
     batch_of,
     choices_of,
     combinations,
     distinct,
     no_node_twice,
     open_store,
+    packed,
     require_memory,
     steps_of_batches,
     tally_of,
+    unpacked,
     work,
-    worker_for,
 )
-from seqopt.responses._given_steps import GivenSteps
+from seqopt.responses._tolerance import is_tolerance, with_tolerances
 from seqopt.responses.resources import HERE, Resources
+from seqopt.responses.table import analyze
 from seqopt.sequence.schedule import OpenGrip, OpenStep, Schedule
-from seqopt.work._workers import Crew, Lanes, hire, map_ordered
+from seqopt.sequence.steps import Grips, Step
+from seqopt.work._workers import hire, map_ordered
 from seqopt.work.progress import Progress
 
 CHOICE_RESPONSES = ("T_max", "M_sup", "D_max", "C_max", "F_move", "F_largest")  # and one per robot
 
 __all__ = ["CHOICE_RESPONSES", "Evaluation", "StepChoices", "Wanted", "evaluate_choices"]
 
-_Each = TypeVar("_Each")
 _SEVERAL = 4  # portions' work that states of one brick count may be before they are parted
-_PREPARED = 0.15  # of all work, that every process does for itself on the vault of 338 bricks
 _PORTIONS = 32  # tasks for every worker: one that is slow, or dies, leaves little to the others
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class _Portion:
-    """Blocks that are answered together."""
+class _Portion(NamedTuple):
+    """Blocks that are answered together, and their answers if they are stored."""
 
     blocks: tuple[Block, ...]
-    stored: list[Answers] | None = None  # their answers, if they are known
-    lane: int = 0  # which of several processes is to answer them
+    stored: list[Answers] | None = None
 
     @property
     def work(self) -> float:
@@ -77,67 +77,48 @@ class _Portion:
 
 
 def _answer_blocks(
-    engine: Engine, blocks: Iterable[Block], total: float, resources: Resources, *, apart: bool
+    engine: Engine, blocks: Iterable[Block], total: float, resources: Resources
 ) -> Generator[Answers, None, None]:
     """Return the answers to blocks of states, in their order.
 
-    Each process of our own prepares every brick count up to the last that it is asked for. Apart,
-    it gets neighboring ones only, and answers to later ones wait for those to earlier ones.
-
-    ``blocks``: taken as they are needed; ``total``: about how much work they are; ``apart``:
-    whether there is room for all answers, and no hurry for the next one.
+    ``blocks``: taken as they are needed; ``total``: about how much work they are.
     """
-    store = open_store(resources.cache, engine)
+    store, tally = open_store(resources.cache, engine), tally_of(engine)
     progress = Progress("responses", total, resources.progress)
-    with hire(resources.executor, resources.workers, lanes=apart) as crew:
-        elsewhere = crew is not None
-        course = _Course(engine, store, progress, elsewhere)
-        places: Iterable[int] = count()
-        portions = _share_out(blocks, store, total, crew)
-        if isinstance(crew, Lanes):
-            places, portions = _take_turns([*portions], crew.workers)
-        work = partial(_answer_portion, worker_for(engine, elsewhere=elsewhere))
-        with closing(map_ordered(work, portions, crew, course.stored, course.done)) as results:
-            for answers in _in_places(places, results):
+
+    def count(answers: list[Answers]) -> None:
+        for what, sets in chain.from_iterable(found.tally for found in answers):
+            tally[what] = tally.get(what, 0) + sets
+
+    def stored(portion: _Portion) -> list[Answers] | None:
+        if portion.stored is not None:
+            count(portion.stored)
+            progress.add(portion.work)
+        return portion.stored
+
+    def done(portion: _Portion, answers: list[Answers]) -> None:
+        if store is not None:
+            for block, found in zip(portion.blocks, answers, strict=True):
+                store.keep(block, found)
+        if crew is not None:  # else the engine itself has counted
+            count(answers)
+        progress.add(portion.work)
+
+    with hire(resources.executor, resources.workers) as crew:
+        task = partial(_answer_all, engine if crew is None else packed(engine))
+        enough = None if crew is None else total / (_PORTIONS * crew.workers)
+        portions = _share_out(blocks, store, enough)
+        with closing(map_ordered(task, portions, crew, stored, done)) as results:
+            for answers in results:
                 yield from answers
 
 
-def _take_turns(
-    portions: Sequence[_Portion], lanes: int
-) -> tuple[Iterator[int], Iterator[_Portion]]:
-    """Return portions with their lanes, which take turns, and the places where they stood.
-
-    ``lanes``: each gets neighboring ones. Later lanes get fewer, since they prepare all that comes
-    before them too: with a share f of the work they end together where lane i ends at the share (1
-    - q^i) / (1 - q^n) with q = 1 / (1 + f).
-    """
-    before = 1 - (1 + _PREPARED) ** -np.arange(1.0, lanes + 1)
-    work = np.array([portion.work for portion in portions])
-    middle = (np.cumsum(work) - work / 2) / max(float(work.sum()), 1.0)
-    lane_of = np.searchsorted(before[:-1] / before[-1], middle).tolist()
-    mine: list[list[tuple[int, _Portion]]] = [[] for _ in range(lanes)]
-    for place, (portion, lane) in enumerate(zip(portions, lane_of, strict=True)):
-        mine[lane].append((place, replace(portion, lane=lane)))
-    turns = [pair for turn in zip_longest(*mine) for pair in turn if pair is not None]
-    return iter([place for place, _ in turns]), iter([portion for _, portion in turns])
-
-
-def _in_places(places: Iterable[int], results: Iterable[_Each]) -> Iterator[_Each]:
-    """Yield results in the order of their places, each as soon as those before it are there.
-
-    ``places``: from 0, each once, in the order of the results.
-    """
-    waiting: dict[int, _Each] = {}
-    following = 0
-    for result, place in zip(results, places, strict=False):
-        waiting[place] = result
-        while following in waiting:
-            yield waiting.pop(following)
-            following += 1
+def _answer_all(engine: Engine | bytes, portion: _Portion) -> list[Answers]:
+    return [answer(unpacked(engine), block) for block in portion.blocks]
 
 
 def _share_out(
-    blocks: Iterable[Block], store: Store | None, total: float, crew: Crew | None
+    blocks: Iterable[Block], store: Store | None, enough: float | None
 ) -> Iterator[_Portion]:
     """Return portions of about equal work, each of neighboring blocks; stored ones apart.
 
@@ -145,58 +126,47 @@ def _share_out(
     one share they prepare once: portions keep the order of the blocks, and end between brick counts
     unless one has several portions' work.
 
-    ``total``: about how much work they are; ``crew``: without one each block is a portion.
+    ``enough``: work of a portion; None where each block is one.
     """
-    enough = 0.0 if crew is None else total / (_PORTIONS * crew.workers)
     mine: list[Block] = []
     for block in blocks:
         found = None if store is None else store.find(block)
-        if mine:
+        if mine and enough is not None:
             several = 1 if block.bricks != mine[-1].bricks else _SEVERAL
             if found is not None or sum(each.work for each in mine) >= several * enough:
                 yield _Portion(tuple(mine))
                 mine = []
-        if found is not None:
-            yield _Portion((block,), [found])
-        elif crew is None:
-            yield _Portion((block,))
+        if found is not None or enough is None:
+            yield _Portion((block,), None if found is None else [found])
         else:
             mine.append(block)
     if mine:
         yield _Portion(tuple(mine))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class _Course:
-    """What happens to answers as soon as they are there: kept, counted, told of."""
+@dataclass(frozen=True, repr=False)
+class GivenSteps(Terse):
+    """Steps without an open grip, in which bricks stand; their responses are computed once."""
 
     engine: Engine
-    store: Store | None
-    progress: Progress
-    elsewhere: bool
+    schedule: Schedule
 
-    def stored(self, portion: _Portion) -> list[Answers] | None:
-        if portion.stored is not None:
-            self._count(portion.stored)
-            self.progress.add(portion.work)
-        return portion.stored
+    @cached_property
+    def steps(self) -> tuple[Step, ...]:
+        """The steps, in order."""
+        some = (step for step in self.schedule.steps if not step.moves and step.bricks)
+        return tuple(Step(s.number, s.kind, s.bricks, cast(Grips, s.grips)) for s in some)
 
-    def done(self, portion: _Portion, answers: list[Answers]) -> None:
-        if self.store is not None:
-            for block, found in zip(portion.blocks, answers, strict=True):
-                self.store.keep(block, found)
-        if self.elsewhere:  # here the engine itself has counted
-            self._count(answers)
-        self.progress.add(portion.work)
+    @cached_property
+    def _table(self) -> pd.DataFrame:
+        return analyze(self.engine, self.steps)
 
-    def _count(self, answers: list[Answers]) -> None:
-        tally = tally_of(self.engine)
-        for what, sets in chain.from_iterable(found.tally for found in answers):
-            tally[what] = tally.get(what, 0) + sets
-
-
-def _answer_portion(answer: Callable[[Blocks], list[Answers]], portion: _Portion) -> list[Answers]:
-    return answer(portion.blocks)
+    def table(self, names: Iterable[str] = ()) -> pd.DataFrame:
+        """Return their table of `seqopt.analyze`, with the tolerances among some responses."""
+        table = self._table
+        for name in {*filter(is_tolerance, names)}:
+            table = with_tolerances(self.engine, self.steps, table, name)
+        return table
 
 
 @dataclass(frozen=True, repr=False)
@@ -255,13 +225,11 @@ class Evaluation(Terse):
             )
         return self._found.steps
 
-    def levels(self, *, soon: bool = False) -> Generator[Sequence[StepChoices], None, None]:
+    def levels(self) -> Generator[Sequence[StepChoices], None, None]:
         """Return all open steps, in order, those of one brick count after the other.
 
         They are computed as they are taken, and kept for the next time where there is memory.
 
-        ``soon``: whether there is much to do with each: several processes then work on the next
-        ones together. Else each works on a part of the build of its own, which takes less time.
         Raises `MechanismError`, `SolverError`, `WorkerError` as the engine does, and the workers;
         `MemoryShortError` if there is not the memory.
         """
@@ -271,7 +239,7 @@ class Evaluation(Terse):
             return
         steps: list[StepChoices] = []
         models, seconds, start = 0, 0.0, time.perf_counter()
-        with closing(_by_level(self, apart=keep and not soon)) as levels:
+        with closing(_by_level(self)) as levels:
             for found, count in levels:
                 models += count
                 seconds += time.perf_counter() - start
@@ -315,9 +283,7 @@ def evaluate_choices(
     return evaluation.steps, evaluation.models
 
 
-def _by_level(
-    evaluation: Evaluation, *, apart: bool
-) -> Generator[tuple[list[StepChoices], int], None, None]:
+def _by_level(evaluation: Evaluation) -> Generator[tuple[list[StepChoices], int], None, None]:
     """Yield the steps with one brick count after the other, and how many models they have."""
     schedule = evaluation.schedule
     levels = steps_of_batches(schedule)
@@ -332,7 +298,7 @@ def _by_level(
 
     total = evaluation.work
     engine, resources = evaluation.engine, evaluation.resources
-    with closing(_answer_blocks(engine, blocks(), total, resources, apart=apart)) as answers:
+    with closing(_answer_blocks(engine, blocks(), total, resources)) as answers:
         for first in answers:  # blocks, and so `under_way`, are taken no earlier
             groups, here = under_way.popleft(), chain([first], answers)
             yield (  # in no variable: what is not kept is free while the next ones are computed

@@ -20,12 +20,11 @@ from seqopt.responses._blocks import (
     COMPILED,
     Answers,
     Block,
-    Shipment,
     Store,
     answer,
-    engine_of,
     open_store,
-    pack,
+    packed,
+    unpacked,
     work,
 )
 from seqopt.responses.resources import HERE, Resources
@@ -189,15 +188,15 @@ def solve_sets(
             store.keep(part, Answers(values, rows[:, len(values) :]))
 
     with hire(*workers) as crew:
-        solved = partial(_solved, engine if crew is None else pack(engine))
+        solved = partial(_solved, engine if crew is None else packed(engine))
         rows = [*map_ordered(solved, parts, crew, known, done)]
     return np.concatenate([np.zeros((0, len(sets.names) + grips.shape[1])), *rows])
 
 
-def _solved(engine: Engine | Shipment, part: Block) -> Floats:
+def _solved(engine: Engine | bytes, part: Block) -> Floats:
     """Return what is known of a few sets; those that leave something loose are found by halving."""
     try:
-        return _columns(part, answer(engine_of(engine), part))
+        return _columns(part, answer(unpacked(engine), part))
     except MechanismError:
         count = len(part.grips)
         if count == 1:

@@ -133,32 +133,6 @@ class _Processes:
         self._started = []
 
 
-class Lanes(_Processes):
-    """Processes that get the tasks of one lane each; see `seqopt.work._workers.Crew`.
-
-    For tasks of which neighbors share what a process prepares for one of them.
-    """
-
-    def __init__(self, workers: int) -> None:
-        super().__init__(workers)
-        self._lanes = [_Processes(1) for _ in range(workers)]
-
-    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Give a call out; see `Crew`. ``*arguments``: the last one has a ``lane``."""
-        lane: int = arguments[-1].lane
-        return self._lanes[lane].submit(function, *arguments)
-
-    def look_after(self) -> None:
-        """End processes if one has died while it sent an answer; see `Crew`."""
-        for lane in self._lanes:
-            lane.look_after()
-
-    def end(self, *, now: bool) -> None:
-        """End the processes; see `_Processes`."""
-        for lane in self._lanes:
-            lane.end(now=now)
-
-
 @contextmanager
 def _deaf() -> Iterator[None]:
     """Let processes that start here hear no interrupt: it is their master's."""
@@ -264,7 +238,7 @@ class _Given:
 
 @contextmanager
 def hire(
-    executor: Executor | None = None, workers: int = 1, *, lanes: bool = False, beside: bool = False
+    executor: Executor | None = None, workers: int = 1, *, beside: bool = False
 ) -> Iterator[Crew | None]:
     """Hire workers for the duration of a with block.
 
@@ -274,8 +248,6 @@ def hire(
         Any; by default processes of our own.
     workers : int, optional
         How many processes, or how many tasks the executor works on at once if it does not say.
-    lanes : bool, optional
-        Whether tasks have a ``lane``: each process of our own then gets those of one.
     beside : bool, optional
         Whether this process works as well, so that one of our own less is hired.
 
@@ -285,14 +257,14 @@ def hire(
         None where there is but this process.
     """
     kept = _KEPT.get()
-    if kept is not None and not lanes:
+    if kept is not None:
         yield kept
     elif executor is not None:
         known = getattr(executor, "_max_workers", None)
         most = known if isinstance(known, int) else 16  # where it does not say
         yield _Given(executor, workers if workers > 1 else most)
     elif workers > 1:
-        processes = Lanes(workers) if lanes else _Processes(workers - beside)
+        processes = _Processes(workers - beside)
         try:
             yield processes
         except BaseException:
@@ -308,7 +280,7 @@ _KEPT: ContextVar[Crew | None] = ContextVar("_KEPT", default=None)
 
 @contextmanager
 def keep(executor: Executor | None = None, workers: int = 1) -> Iterator[None]:
-    """Hire workers once for all who `hire` some within a with block, without lanes."""
+    """Hire workers once for all who `hire` some within a with block."""
     with hire(executor, workers) as crew:
         before = _KEPT.set(crew)
         try:

@@ -16,7 +16,7 @@ from seqopt.engines.interface import Want
 from seqopt.engines.registry import _chooser_of, make_engine, provenance, recipe_of, simplest
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.scenarios import engine_for
-from seqopt.responses._blocks import pack
+from seqopt.responses._blocks import packed, unpacked
 from seqopt.responses.table import OUTSIDE, LinearRange
 from seqopt.scene.scene_file import load_scene, save_scene
 from tests.builders import about_vertical, moved, small_arch
@@ -76,7 +76,7 @@ def test_it_chooses_anew_where_it_is_made_anew():
     )
     assert find_level(seqopt.build_network(bent)).level is Level.RIGID
     assert type(engine_for(level, bent)) is ComplianceEngine
-    assert isinstance(pack(level).unpack(), FlatEngine)
+    assert isinstance(unpacked(packed(level)), FlatEngine)
     planar, rigid = (recipe_of(make_engine(name, WALL)).key for name in ("planar", "compliance"))
     assert recipe_of(level).key == planar != rigid
 

@@ -6,6 +6,7 @@ import itertools
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -21,13 +22,12 @@ from seqopt.network.build import build_network
 from seqopt.plan.solving import solve
 from seqopt.responses import _blocks as batches
 from seqopt.responses import _choices as division
-from seqopt.responses._blocks import Block, answer, pack, worker_for
-from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation
+from seqopt.responses._blocks import Block, answer, packed
+from seqopt.responses._choices import CHOICE_RESPONSES, Evaluation, _answer_all, _Portion
 from seqopt.responses.resources import Resources
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import CRITERIA, EQUATIONS
-from seqopt.work._workers import _Processes
 
 
 def everything(_):
@@ -74,13 +74,12 @@ def test_results_are_the_same_however_work_is_shared(small_blocks, loop25, porti
 def test_what_states_of_a_brick_count_share_is_prepared_once(loop25, portions, monkeypatch):
     """Blocks of one brick count go to one worker unless they are several portions' work."""
     monkeypatch.setattr(batches, "BLOCK", 5)
-    monkeypatch.setattr(division, "_PORTIONS", portions)
     single = replace(loop25, steps=tuple(s for s in loop25.steps if len(s.moves) == 1))
     levels = batches.steps_of_batches(single)
     groups = [batches.batch_of(single, steps, everything) for level in levels for steps in level]
     every = [block for group in groups for block in group.blocks()]
     total = sum(block.work for block in every)
-    shared = [*division._share_out(every, None, total, _Processes(2))]
+    shared = [*division._share_out(every, None, total / (2 * portions))]
     assert [block for portion in shared for block in portion.blocks] == every
     assert portions / 2 < len(shared) <= 2 * portions
     if portions == 3:
@@ -88,7 +87,7 @@ def test_what_states_of_a_brick_count_share_is_prepared_once(loop25, portions, m
         assert all(a.isdisjoint(b) for a, b in itertools.pairwise(counts))
     most = division._SEVERAL * total / (2 * portions) + max(block.work for block in every)
     assert all(portion.work <= most for portion in shared)
-    alone = [*division._share_out(every, None, total, None)]
+    alone = [*division._share_out(every, None, None)]
     assert [len(portion.blocks) for portion in alone] == [1] * len(every)
 
 
@@ -144,23 +143,24 @@ def test_an_engine_that_remembers_is_seen():
 
 def test_the_scene_is_sent_and_no_operators(loop25):
     engine = make_engine("compliance", loop25.scene)
-    before = len(pack(engine).content)
+    before = len(packed(engine))
     assert evaluation(engine, loop25).models == 8642  # operators of all brick counts
-    assert len(pack(engine).content) == before < 2 * len(pickle.dumps(loop25.scene))
+    assert len(packed(engine)) == before < 2 * len(pickle.dumps(loop25.scene))
     assert len(pickle.dumps(engine)) > 20 * before
 
 
 def test_an_engine_is_made_once_for_a_worker(small_blocks, loop25, monkeypatch):
     made = []
     engine = make_engine("compliance", loop25.scene)
-    send = worker_for(engine, elsewhere=True)
+    send = partial(_answer_all, packed(engine))
     monkeypatch.setattr(
         "seqopt.engines.registry.make_engine",
         lambda *given, **named: made.append(given) or make_engine(*given, **named),
     )
     with ThreadPoolExecutor(1) as executor:
         for block in blocks()[:3]:
-            sent = executor.submit(send, [Block(1, np.array([[1]]), block.names)]).result()
+            asked = _Portion((Block(1, np.array([[1]]), block.names),))
+            sent = executor.submit(send, asked).result()
             assert len(sent) == 1
     assert len(made) == 1
 

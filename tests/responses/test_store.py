@@ -47,7 +47,7 @@ def asked(monkeypatch):
         calls.append(block.key)
         return plain(engine, block)
 
-    monkeypatch.setattr("seqopt.responses._blocks.answer", counted)
+    monkeypatch.setattr("seqopt.responses._choices.answer", counted)
     return calls
 
 

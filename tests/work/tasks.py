@@ -69,11 +69,3 @@ def own_error(number):
         """One that cannot be sent."""
 
     raise OddError(number)
-
-
-class Task(int):
-    """A number that belongs to a lane."""
-
-    @property
-    def lane(self):
-        return int(self) % 2

@@ -18,29 +18,19 @@ from seqopt.errors import SolverError, WorkerError
 from seqopt.work import Progress, hire, map_ordered
 from seqopt.work._workers import _Processes
 from tests.builders import ROOT
-from tests.work.tasks import (
-    Task,
-    die,
-    die_once,
-    die_while_sending,
-    own_error,
-    square,
-    square_or_fail,
-)
+from tests.work.tasks import die, die_once, die_while_sending, own_error, square, square_or_fail
 
-TASKS = [Task(number) for number in range(12)]
+TASKS = range(12)
 WANTED = [number * number for number in range(12)]
-whoever = pytest.mark.parametrize("lanes", [False, True])  # has the tasks: all, or each his own
 
 
 @pytest.mark.slow
 def test_results_come_in_order_whoever_works():
     assert list(map_ordered(square, range(12))) == WANTED
-    for lanes in (False, True):
-        with hire(workers=2, lanes=lanes) as crew:
-            assert crew.workers == 2
-            for _ in range(2):  # again, on the same processes
-                assert list(map_ordered(square, TASKS, crew)) == WANTED
+    with hire(workers=2) as crew:
+        assert crew.workers == 2
+        for _ in range(2):  # again, on the same processes
+            assert list(map_ordered(square, TASKS, crew)) == WANTED
     assert multiprocessing.active_children() == []
     for kind in (ThreadPoolExecutor, ProcessPoolExecutor):
         with kind(2) as executor, hire(executor) as crew:
@@ -74,36 +64,33 @@ def test_what_is_known_is_not_worked_on():
 
 
 def test_the_first_error_is_raised_whoever_works():
-    for workers, lanes in ((1, False), (2, False), (2, True)):
-        found, crew = [], hire(workers=workers, lanes=lanes)
+    for workers in (1, 2):
+        found, crew = [], hire(workers=workers)
         with pytest.raises(SolverError, match="no square of 3"), crew as hired:
             found.extend(map_ordered(square_or_fail, TASKS[:9], hired))
     assert multiprocessing.active_children() == []
 
 
 @pytest.mark.slow
-@whoever
-def test_a_worker_that_dies_is_replaced_and_nothing_is_lost(tmp_path, lanes):
-    with hire(workers=2, lanes=lanes) as crew:
+def test_a_worker_that_dies_is_replaced_and_nothing_is_lost(tmp_path):
+    with hire(workers=2) as crew:
         assert list(map_ordered(partial(die_once, tmp_path), TASKS, crew)) == WANTED
     assert len(list(tmp_path.iterdir())) == 2  # they did die
 
 
 @pytest.mark.slow
-@whoever
-def test_a_worker_that_dies_while_it_sends_keeps_nobody_waiting(tmp_path, lanes):
+def test_a_worker_that_dies_while_it_sends_keeps_nobody_waiting(tmp_path):
     """The rest of its answer was waited for without end."""
-    with hire(workers=2, lanes=lanes) as crew:
+    with hire(workers=2) as crew:
         answers = map_ordered(partial(die_while_sending, tmp_path), TASKS[:3], crew)
         assert [float(answer.max()) for answer in answers] == [0.0, 1.0, 2.0]
     assert len(list(tmp_path.iterdir())) == 1
 
 
 @pytest.mark.slow
-@whoever
-def test_workers_that_always_die_end_in_a_line(lanes):
+def test_workers_that_always_die_end_in_a_line():
     wanted = pytest.raises(WorkerError, match=r"workers ended 4 times .*BrokenProcessPool")
-    with wanted as caught, hire(workers=2, lanes=lanes) as crew:
+    with wanted as caught, hire(workers=2) as crew:
         list(map_ordered(die, TASKS[:3], crew))
     assert "\n" not in str(caught.value)
     assert multiprocessing.active_children() == []

@@ -92,7 +92,7 @@ def search_windows(
     """
     walk = _Walk(problem)
     try:
-        with closing(walk.alone.evaluation.levels(soon=True)) as levels:
+        with closing(walk.alone.evaluation.levels()) as levels:
             for steps in levels:
                 if watch is not None and watch.over:
                     raise TimeUpError(f"{watch.seconds:.3g} s: {walk.so_far()}; give more")
