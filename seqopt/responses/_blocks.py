@@ -353,7 +353,11 @@ class Batch(FrozenValue):
             by_robot = np.argsort(np.argsort(self.rows[part], axis=1), axis=1)
             found = {name: answer[index] for name, answer in values.items() if name in mine}
             held = np.take_along_axis(forces[index], by_robot, axis=1)
-            found |= _robot_forces(self.schedule, step, held)
+            scene, moves = self.schedule.scene, self.schedule.moves
+            robots = [robot_response(scene.robots[i].name) for i in _robots_holding(step)]
+            found |= {name: held[:, i] for i, name in enumerate(robots)}
+            found["F_move"] = found[robot_response(moves[step.moves[-1]].robot)]
+            found["F_largest"] = held.max(axis=1)
             shaped = {}
             for name in sorted(mine):  # NaN for what is impossible and for a robot that holds none
                 spread = np.full(ok.shape, np.nan)
@@ -442,15 +446,6 @@ def _grip_rows(schedule: Schedule, step: OpenStep, nodes: Ints) -> Ints:
 def no_node_twice(rows: Ints) -> Bools:
     """Return which rows name no node twice. ``rows`` (P, r). Result (P,)."""
     return np.asarray((np.diff(np.sort(rows, axis=1), axis=1) > 0).all(axis=1))
-
-
-def _robot_forces(schedule: Schedule, step: OpenStep, forces: Floats) -> dict[str, Floats]:
-    """Return the forces by robot, of the robot whose move decides the step, and the largest."""
-    robots = [schedule.scene.robots[i].name for i in _robots_holding(step)]
-    out = {robot_response(name): forces[:, i] for i, name in enumerate(robots)}
-    out["F_move"] = out[robot_response(schedule.moves[step.moves[-1]].robot)]
-    out["F_largest"] = forces.max(axis=1)
-    return out
 
 
 _NUMBER = 8  # bytes

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Bools, Floats, Terse
+from seqopt.arrays import Floats, Terse
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
@@ -144,7 +144,7 @@ def _displacement(network: Network, shift: float, turn: float) -> float:
 
 
 def _judged(logs: Floats, errors: Floats, share: Floats, table: pd.DataFrame) -> StiffnessFit:
-    """Return a fit with what it is worth, by its errors and shares of turning."""
+    """Return the fit with its quality, by its errors and shares of turning."""
     middle, spread, tests = float(share.mean()), float(share.std()), len(share)
     apart = spread > _ALIKE and tests > 1
     rows = np.stack([1 - share, share], axis=1)
@@ -164,16 +164,12 @@ def _judged(logs: Floats, errors: Floats, share: Floats, table: pd.DataFrame) ->
     first, second = zip(lowest.tolist(), highest.tolist(), strict=True)
     shift, turn = np.exp(logs).tolist()
     both = float(np.exp(logs @ [1 - middle, middle])), middle, float(np.exp(most))
-    said = _said(closed, apart=apart, sure=tests > 1 + apart)
-    return StiffnessFit(shift, turn, (first, second), both, table, said)
-
-
-def _said(closed: Bools, *, apart: bool, sure: bool) -> str:
-    """Return which factors are fixed, those that are closed, and why others are not."""
     names = np.array(["translational", "rotational"])
     said = f"fixed: {' and '.join(names[closed]) or 'neither alone'}"
     if not closed.all():
         said += f"; not fixed: {' and '.join(names[~closed])}"
     if not apart:
         said += "; joints turn for the same share of every displacement"
-    return said if sure else f"{said}; as many numbers as tests, so nothing says how sure"
+    if tests <= 1 + apart:
+        said += "; as many numbers as tests, so nothing says how sure"
+    return StiffnessFit(shift, turn, (first, second), both, table, said)

@@ -16,7 +16,6 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.responses._tolerance import each_tolerance, is_linear, is_tied
 from seqopt.responses.quantities import RESPONSES, _plain, length_text
 from seqopt.responses.table import LinearRange, _Columns, _node, force_column, held_in_table
-from seqopt.scene.scene import Scene
 
 _FEW = 100  # bricks up to which tolerances take less than a second
 _KNOWN = ChoosingEngine, FlatEngine, ComplianceEngine, OpeningEngine
@@ -128,7 +127,12 @@ def _off(within: LinearRange, builds: Mapping[str, _Columns]) -> str:
     Nothing where that is not linear, takes long, or a payload is exceeded wherever they are.
     """
     scene = within.engine.network.scene
-    if not is_linear(within.engine) or len(scene.bricks) > _FEW or _overloaded(scene, builds):
+    if not is_linear(within.engine) or len(scene.bricks) > _FEW:
+        return ""
+    carried = (
+        (robot, table[force_column(robot)]) for table in builds.values() for robot in scene.robots
+    )
+    if any((np.abs(np.asarray(force)) > robot.payload).any() for robot, force in carried):
         return ""
     held = {name: held_in_table(scene, table) for name, table in builds.items()}
     every = [*chain.from_iterable(held.values())]
@@ -141,12 +145,3 @@ def _off(within: LinearRange, builds: Mapping[str, _Columns]) -> str:
     places = [(name, step) for name, steps in held.items() for step, *_ in steps]
     where = f"step {places[at][1]}{f' of {places[at][0]}' if len(builds) > 1 else ''}"
     return f" (rigid grips {length_text(found[at])} off exceed a payload: {where})"
-
-
-def _overloaded(scene: Scene, builds: Mapping[str, _Columns]) -> bool:
-    """Return whether a robot carries more than its payload in a step of some builds."""
-    return any(
-        bool((np.abs(np.asarray(table[force_column(robot)])) > robot.payload).any())
-        for table in builds.values()
-        for robot in scene.robots
-    )

@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, groupby
@@ -126,25 +126,22 @@ class LinearRange:
         steps = np.asarray(table["step"], dtype=int)
         within = f", more than {length_text(far)}, a tenth of the smallest side of a brick"
         deformed = f"{{:.3g}} times its thickness, more than {_STRAIN:g} times".format
+        mortar = self.mortar
+        strength = (
+            f"{{:.3g}} MPa beyond what {_mortar_name(mortar)} holds, "
+            f"{mortar.tensile_strength / 1e6:g} MPa in tension, {mortar.cohesion / 1e6:g} MPa and "
+            "friction in shear"
+        ).format
         found = (
             (FAR_OFF, moved, far, lambda most: length_text(most) + within),
             ("rotation", turned, _TURN, f"{{:.3g}} rad, more than {_TURN:g} rad".format),
             ("deformation of a joint", strained, _STRAIN, deformed),
-            ("stress in a joint", stressed, 0.0, self._stressed),
+            ("stress in a joint", stressed, 0.0, lambda most: strength(most / 1e6)),
         )
         return tuple(
             Departure(what, say(float(values[over].max())), tuple(steps[over].tolist()))
             for what, values, most, say in found
             if (over := ~(values <= most)).any()  # what is not a number is not within
-        )
-
-    def _stressed(self, most: float) -> str:
-        """Return by how much stress is beyond the elastic limits of joints, Pa, in words."""
-        mortar = self.mortar
-        return (
-            f"{most / 1e6:.3g} MPa beyond what {_mortar_name(mortar)} holds, "
-            f"{mortar.tensile_strength / 1e6:g} MPa in tension, {mortar.cohesion / 1e6:g} MPa and "
-            "friction in shear"
         )
 
     def keeps_limits(self, steps: Sequence[Step]) -> bool:
@@ -216,21 +213,16 @@ class LinearRange:
         return [(b, held) for _, b, held in held_in_table(self._network.scene, table)]
 
     def _ask(self, keys: Iterable[_Key]) -> None:
-        """Measure what is not known: all with as many bricks and grips at once."""
+        """Measure what is not known."""
         if isinstance(self._engine, OpeningEngine):
             return
-        alike = defaultdict[tuple[int, int], dict[_Key, None]](dict)
-        for key in keys:
-            if key not in self._known:
-                alike[key[0], len(key[1])][key] = None
         asked, found = list[_Key](), list[Fields]()
-        for (bricks, count), new in sorted(alike.items()):  # in order: engines grow with the build
-            if bricks:
-                sets = np.array([held for _, held in new], dtype=np.int64).reshape(len(new), count)
-                found.append(self._engine.solve(bricks, sets, _MEASURED))
-                asked += new
-            else:
-                self._known |= dict.fromkeys(new, np.array([0.0, 0.0, -np.inf, 0.0]))
+        for key in (new := [key for key in keys if key not in self._known]):
+            if not key[0]:  # nothing stands
+                self._known[key] = np.array([0.0, 0.0, -np.inf, 0.0])
+        for alike, fields in _solved_alike(self._engine, new, _MEASURED):
+            asked += alike
+            found.append(fields)
         if asked:
             self._known.update(zip(asked, self._of(*found), strict=True))
 
@@ -441,29 +433,33 @@ def _each_fields(
 
     Steps that follow each other with as many bricks are solved together, equal ones once.
     """
+    scene = engine.network.scene
     for bricks, same in groupby(steps, attrgetter("bricks")):
         near = [*same]
-        try:
-            found = _fields_by_grips(engine, bricks, near, want) if bricks else {}
-        except (MechanismError, SolverError):  # which step it is, each alone says
-            found = {}
-        yield from (found.get(step.grips) or step_fields(engine, step, want) for step in near)
+        keys = [(bricks, scene.grip_numbers(step.grips, bricks)) for step in near]
+        found = dict[_Key, Fields]()
+        with suppress(MechanismError, SolverError):  # which step it is, each alone says
+            for alike, fields in _solved_alike(engine, keys, want):
+                rows = (select_sets(fields, np.array([i])) for i in range(len(alike)))
+                found |= zip(alike, rows, strict=True)
+        for key, step in zip(keys, near, strict=True):
+            yield found.get(key) or step_fields(engine, step, want)
 
 
-def _fields_by_grips(
-    engine: Engine, bricks: int, steps: Sequence[Step], want: Want
-) -> dict[Grips, Fields]:
-    """Return the fields of steps with as many bricks, by who holds which node."""
-    scene, found = engine.network.scene, dict[Grips, Fields]()
-    alike = defaultdict[int, dict[Grips, tuple[int, ...]]](dict)
-    for step in steps:
-        numbers = scene.grip_numbers(step.grips, bricks)
-        alike[len(numbers)][step.grips] = numbers
-    for count, held in alike.items():
-        sets = np.array([*held.values()], dtype=np.int64).reshape(len(held), count)
-        fields = engine.solve(bricks, sets, want)
-        found |= {grips: select_sets(fields, np.array([i])) for i, grips in enumerate(held)}
-    return found
+def _solved_alike(
+    engine: Engine, keys: Iterable[_Key], want: Want
+) -> Iterator[tuple[list[_Key], Fields]]:
+    """Yield states with as many bricks and grips, each once, and their fields, solved at once.
+
+    By ascending brick counts: engines grow with the build. Where nothing stands, nothing is solved.
+    """
+    same = defaultdict[tuple[int, int], dict[_Key, None]](dict)
+    for key in keys:
+        if key[0]:
+            same[key[0], len(key[1])][key] = None
+    for (bricks, count), alike in sorted(same.items()):
+        sets = np.array([held for _, held in alike], dtype=np.int64).reshape(len(alike), count)
+        yield [*alike], engine.solve(bricks, sets, want)
 
 
 def _grips_of(scene: Scene, step: Step) -> Ints:
@@ -525,20 +521,16 @@ def _with_faults(
         rows[row["step"]] = {str(name): cell for name, cell in row.items()}
     for step in (step for step in steps if step.number in faults):
         rows[step.number] = _held_cells(scene, step)
-        rows[step.number]["finding"] = _finding(faults[step.number])
+        rows[step.number]["finding"] = "not solved"
+        if isinstance(fault := faults[step.number], MechanismError):
+            sizes = {brick: max(map(abs, motion)) for brick, motion in fault.mode}
+            most = f" (brick {max(sizes, key=sizes.__getitem__)})" if sizes else ""
+            rows[step.number]["finding"] = f"mechanism{most}"
     names = dict.fromkeys(
         ("step", "type", "bricks", "finding", *chain.from_iterable(rows.values()))
     )
     ordered = [rows[number] for number in sorted(rows)]
     return _table_of({name: [row.get(name, np.nan) for row in ordered] for name in names})
-
-
-def _finding(fault: SeqoptError) -> str:
-    """Return what a fault says of a step, in a cell."""
-    if not isinstance(fault, MechanismError):
-        return "not solved"
-    sizes = {brick: max(map(abs, motion)) for brick, motion in fault.mode}
-    return f"mechanism (brick {max(sizes, key=sizes.__getitem__)})" if sizes else "mechanism"
 
 
 def _held_cells(scene: Scene, step: Step) -> dict[str, object]:
