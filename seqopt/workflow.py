@@ -8,7 +8,6 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from seqopt.arms.reach import find_postures
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import DEFAULT, make_engine
 from seqopt.errors import ProblemError
@@ -21,6 +20,7 @@ from seqopt.problem.criteria import WORST_OVER_METHODS
 from seqopt.problem.problem import WORST_PEAK, Orders, Problem
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.responses.resources import Resources
+from seqopt.scene._armed import find_postures
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene, in_order
 from seqopt.scene.scene_file import load_scene

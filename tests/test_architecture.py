@@ -25,7 +25,7 @@ ROOMS = (
     {"_registry"},
     {"_showing"},
     {"scene"},
-    {"network", "arms"},
+    {"network"},
     {"sequence", "contact"},
     {"engines", "stability"},
     {"responses"},
@@ -34,13 +34,13 @@ ROOMS = (
     {"judge"},
     {"plan"},
     {"study"},
-    {"workflow"},
+    {"arms", "workflow"},
     {"exchange", "times"},
     {"report"},
     {"_cli"},
     {"__init__", "__main__"},
 )  # a room imports from rooms above it in this list only
-OUTER = {"exchange", "times", "report", "_cli"}  # plug in; the inner rooms do without them
+OUTER = {"arms", "exchange", "times", "report", "_cli"}  # the inner rooms do without them
 TOP = {"workflow", "__init__", "__main__"}  # open inner and outer rooms
 SOLVERS = {"cvxpy", "clarabel", "highspy"}
 SOLVER_HOME = "formulations"

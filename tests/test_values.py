@@ -30,6 +30,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.exchange.contacts import flat_face, touching_faces
 from seqopt.network._mechanics import build_statics
 from seqopt.network.build import build_network
+from seqopt.scene._armed import HeldPostures
 from seqopt.scene._overlaps import _faces
 from seqopt.scene.boxes import boxes
 from seqopt.scene.library.common import _overlaps
@@ -75,6 +76,7 @@ def values(arch25):
         *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),
         *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, EPOXY)),
         *(load_factor(assembly, EPOXY), arch25.grip_kinds),
+        HeldPostures(np.array([0]), np.array([1]), np.array([[0]]), (np.ones((1, 6, 2)),)),
         read_hands(network, grips[None], [[2]], np.ones((1, 1, 3))),
         *_Known(assembly, bonded(assembly, DRY)).motions_of(-np.ones((2, 6))),
         *(_HoldingForces(0.0, np.zeros(1)), first_directions(4, 1)),

@@ -11,6 +11,7 @@ from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import asked_standing, mortar_word, parse_grips, parse_payload, parse_robots
 from seqopt._cli.words.given import given_scene, given_steps
 from seqopt._cli.words.props import parse_props
+from seqopt.arms._plan_postures import arm_faults
 from seqopt.arms.reach import find_postures
 from seqopt.contact.mortar import Mortar
 from seqopt.engines._kinds import ChoosingEngine, Level
@@ -19,7 +20,6 @@ from seqopt.engines.registry import DEFAULT, LIMITED, _chooser_of, make_engine, 
 from seqopt.errors import ExtraError, ProblemError, SceneError, StepError
 from seqopt.network.network import Network
 from seqopt.plan.build import ShownBuild
-from seqopt.problem._arms import arm_faults
 from seqopt.problem.requirements import _carrying_excesses, _prop_faults, overloads
 from seqopt.responses.table import OUTSIDE, REMEDY, _Columns
 from seqopt.scene.scene import Scene, in_order

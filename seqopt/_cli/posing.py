@@ -108,7 +108,7 @@ def asked_problem(options: argparse.Namespace) -> Asked:
     if getattr(options, "bases", None) is not None:
         if options.schedule != FREE or options.order is not None or sought:
             raise ProblemError(f"--bases: it goes with --schedule {FREE} in the scene's own order")
-        from seqopt.plan._studies.bases import without_arms  # noqa: PLC0415  # few ask for bases
+        from seqopt.arms._bases import without_arms  # noqa: PLC0415  # few ask for bases
 
         scene = without_arms(scene)  # bases are chosen afterwards
     scene, begin, end = _asked_ends(options, scene)

@@ -8,14 +8,11 @@ often it is in the way of those of other arms, and, where that leaves a choice, 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from seqopt.arms.reach import find_postures
+from seqopt.scene._armed import HeldPostures
 from seqopt.scene.arm import Arm
 from seqopt.scene.scene import Scene
-
-if TYPE_CHECKING:
-    from seqopt.arms._postures import HeldPostures
 
 _KEY = "_held_postures"
 
@@ -35,14 +32,6 @@ def held_postures(scene: Scene) -> HeldPostures | None:
         vars(scene)[_KEY] = held_by(scene, table)
     found: HeldPostures = vars(scene)[_KEY]
     return found
-
-
-def can_hold(scene: Scene, kind: int, node: int) -> bool:
-    """Return whether it is known how grips of a kind give way at a node."""
-    held = held_postures(scene)
-    if held is None or not scene.grip_kinds.arms[kind]:
-        return True
-    return held.row([*scene.grip_kinds.of_robot].index(kind), node) != -1
 
 
 def hold_alike(nominal: Scene, scene: Scene) -> Scene:

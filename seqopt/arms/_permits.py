@@ -18,7 +18,6 @@ from seqopt.arms._held import held_postures
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
 from seqopt.errors import SceneError
-from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -90,16 +89,11 @@ class Permits(FrozenValue):
         return np.asarray(ways.any(axis=1))
 
 
-def permits(scene: Scene) -> Permits | None:
-    """Return what arms allow in the build order of a scene; None if no robot has one."""
-    return _permits(scene) if scene.has_arms else None
-
-
 @lru_cache(maxsize=_SCENES)
-def _permits(scene: Scene) -> Permits:
-    table = find_postures(scene)
-    assert table is not None
-    nodes = _placed_nodes(scene)
+def permits(scene: Scene) -> Permits:
+    """Return what arms allow in the build order of a scene in which a robot has one."""
+    table = find_table(scene)
+    nodes = scene.placed_nodes
     place = {node: i for i, node in enumerate(nodes, start=1)}
     since = np.array([scene.since[name] for name in table.bricks], dtype=float)
     ends = np.where(table.hits, since, np.inf).min(axis=1, initial=np.inf)
@@ -137,39 +131,6 @@ def _chosen(table: PostureTable, at: Ints, ends: Floats, nodes: int) -> Ints:
     return choose(whose, usable, table.collide, together, len(table.robots))
 
 
-def _placed_nodes(scene: Scene) -> tuple[int, ...]:
-    return tuple(node for brick in scene.placed for node in brick.nodes)
-
-
-def within_reach(scene: Scene, robot: Robot) -> tuple[tuple[int, ...], ...]:
-    """Return the nodes, not blocked, that a robot reaches, brick by brick in build order.
-
-    That of an arm is in reach if a posture of it is possible when the brick is placed.
-    """
-    own = scene.within_reach(robot)
-    if robot.arm is None:
-        return own
-    found = permits(scene)
-    assert found is not None
-    until = found.until[scene.robots.index(robot)]
-    return tuple(
-        tuple(n for i, n in enumerate(b.nodes) if n in nodes and until[2 * k + i + 1] > k + 1)
-        for k, (b, nodes) in enumerate(zip(scene.placed, own, strict=True))
-    )
-
-
-def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
-    """Return the nodes of the first bricks that a robot may hold while these stand, in order."""
-    nodes = [node for brick in within_reach(scene, robot)[:bricks] for node in brick]
-    if robot.arm is None:
-        return tuple(nodes)
-    found = permits(scene)
-    assert found is not None
-    until = found.until[scene.robots.index(robot)]
-    place = {node: i for i, node in enumerate(_placed_nodes(scene), start=1)}
-    return tuple(node for node in nodes if until[place[node]] > bricks)
-
-
 def reach_table(scene: Scene) -> pd.DataFrame:
     """Return which robot reaches which node, with how many postures, and how long.
 
@@ -181,11 +142,10 @@ def reach_table(scene: Scene) -> pd.DataFrame:
     where ``to_bricks`` is zero. Raises `SceneError` if no robot has an arm.
     """
     table, allowed = find_table(scene), permits(scene)
-    assert allowed is not None
     rows = []
     for r, name in enumerate(table.robots):
         own = next(i for i, robot in enumerate(scene.robots) if robot.name == name)
-        for place, node in enumerate(n for brick in scene.placed for n in brick.nodes):
+        for place, node in enumerate(scene.placed_nodes):
             mine, used = table.rows(name, node), allowed.rows[own, place + 1]
             last = min(len(scene.bricks), allowed.until[own, place + 1] - 1)
             standing = np.isin(table.bricks, scene.build_order[: place // 2 + 1])

@@ -1,4 +1,4 @@
-"""Postures of arms as values: the table of all, and the ones in which arms hold."""
+"""The table of all postures of arms, and the choice of one for every robot and place."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from seqopt.arms._model import SAYS
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
-from seqopt.scene.scene import Scene
 
 _SWEEPS = 50  # over all robots and nodes, each given its best posture beside those of the others
 
@@ -118,38 +117,6 @@ class PostureTable(FrozenValue):
         for row, key in enumerate(keys):
             out.setdefault(key, []).append(row)
         return {key: np.array(rows) for key, rows in out.items()}
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class HeldPostures(FrozenValue):
-    """The postures of A arms whose joints give way, at N nodes, one of each arm at each node.
-
-    ``robots`` (A,): indices of the scene's robots; ``nodes`` (N,): ascending; ``rows`` (A, N):
-    postures of the table, -1 for none; ``jacobians``: by arm (N, 6, J), how a node moves with
-    joints, m and rad, in the axes of the scene; NaN where there is no posture.
-    """
-
-    robots: Ints
-    nodes: Ints
-    rows: Ints
-    jacobians: tuple[Floats, ...]
-
-    def row(self, robot: int, node: int) -> int | None:
-        """Return the posture of a robot at a node, -1 if there is none; None if any will do."""
-        own = np.flatnonzero(self.robots == robot)
-        if not len(own):
-            return None
-        return int(self.rows[own[0], np.searchsorted(self.nodes, node)])
-
-    def compliance(self, scene: Scene) -> Floats:
-        """Return how grips give way by the joints alone, (A, N, 6, 6); m and rad, N and N m."""
-        out = []
-        for robot, jacobian in zip(self.robots.tolist(), self.jacobians, strict=True):
-            arm = scene.robots[robot].arm
-            assert arm is not None
-            stiffness = np.array(arm.joint_stiffness)
-            out.append(np.einsum("nij,nkj->nik", jacobian / stiffness, jacobian))
-        return np.array(out)
 
 
 def choose(

@@ -18,11 +18,12 @@ from seqopt._archives import Archive
 from seqopt._files import make_folder, read_bytes, write_bytes
 from seqopt.arms._collisions import collide_pairs
 from seqopt.arms._model import UP, ArmModel
-from seqopt.arms._postures import HeldPostures, PostureTable, choose
+from seqopt.arms._postures import PostureTable, choose
 from seqopt.arms._reached import Reached, Site, beside_others, reached_alone
 from seqopt.arms._urdf import model_path, shape_notes
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SceneError, SceneWarning
+from seqopt.scene._armed import HeldPostures
 from seqopt.scene.arm import MOST, Arm
 from seqopt.scene.scene import Scene
 from seqopt.work.progress import Tell

@@ -14,10 +14,10 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from seqopt.arms._held import held_postures
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.errors import GripError
 from seqopt.network.network import Network
+from seqopt.scene._armed import held_postures
 from seqopt.scene.scene import Scene
 
 _Number = TypeVar("_Number", np.float64, np.bool_)

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 import scipy
 
-from seqopt.arms._held import held_postures
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.engines._kinds import ChoosingEngine
 from seqopt.engines.interface import Engine
@@ -27,6 +26,7 @@ from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SceneError
 from seqopt.network.build import build_network, network_of
 from seqopt.network.network import Network
+from seqopt.scene._armed import held_postures
 from seqopt.scene.scene import Scene
 from seqopt.scene.scene_file import scene_to_dict
 

@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt._files import csv_text
+from seqopt.arms._plan_postures import plan_postures
 from seqopt.arms._postures import PostureTable
 from seqopt.arrays import Floats
 from seqopt.errors import StepError
@@ -30,11 +31,11 @@ from seqopt.exchange._grip_frames import (
     mesh_data,
     typed,
 )
+from seqopt.scene._armed import PlanPostures
 from seqopt.scene._checks import finite, positive, rows, short
 from seqopt.scene.boxes import as_vector, vertices_of
 from seqopt.scene.parts import Brick, Robot, Sphere
 from seqopt.scene.scene import Scene
-from seqopt.sequence._postures import PlanPostures, plan_postures
 from seqopt.sequence.steps import Grips, Step, StepKind
 
 Postures = Mapping[tuple[str, int], Sequence[float]]

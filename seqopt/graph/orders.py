@@ -11,7 +11,6 @@ from itertools import combinations
 import numpy as np
 
 from seqopt._showing import Shown
-from seqopt.arms._held import can_hold
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import recipe_of
@@ -23,6 +22,7 @@ from seqopt.graph.states.states import States
 from seqopt.network.build import build_network
 from seqopt.problem.problem import LARGEST, Measure, Orders
 from seqopt.responses._blocks import packed, unpacked
+from seqopt.scene._armed import can_hold
 from seqopt.scene.scene import Order, Scene
 from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence._rule_space import sort_entries

@@ -12,7 +12,6 @@ from functools import cached_property
 import numpy as np
 
 from seqopt._showing import Shown
-from seqopt.arms._held import hold_alike
 from seqopt.arrays import Bools, Floats, FrozenValue
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import Recipe, recipe_of
@@ -29,6 +28,7 @@ from seqopt.problem.problem import Aim, RobustAim
 from seqopt.problem.requirements import ResponsesAsked
 from seqopt.responses._choices import Evaluation
 from seqopt.responses.resources import Resources
+from seqopt.scene._armed import hold_alike
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Schedule

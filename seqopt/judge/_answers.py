@@ -9,7 +9,7 @@ import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.states.states import States
-from seqopt.judge._posture_rules import props_that_hold
+from seqopt.judge._prop_rules import props_that_hold
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import LARGEST, Goal, Measure
 from seqopt.problem.requirements import state_costs

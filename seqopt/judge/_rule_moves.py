@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.judge._posture_rules import PostureRules
 from seqopt.network.network import Network
+from seqopt.scene._armed import posture_rules
 from seqopt.scene.scene import Scene
 from seqopt.sequence._rule_check import RuleBook, unbearable
 from seqopt.sequence.rules import Ending, Newest
@@ -75,7 +75,7 @@ class RuleTables:
         self._least = self._rules.fewest_grips(scene)
         holders = [prop.node for prop in book.network.scene.props]
         self._propped = np.isin(self.nodes, holders)  # of places; none of a node that is none
-        self._postures = PostureRules(book.network.scene, book.team)
+        self._postures = posture_rules(book.network.scene, book.team)
         self._known: dict[int, _Places] = {}
 
     def _of(self, bricks: int) -> _Places:
@@ -328,7 +328,7 @@ class ScheduleTables:
         at = [scene.node_position(node) for node in self.nodes[1:].tolist()]
         self._at = np.array([[np.nan] * 3, *at])
         self._place = {node: i for i, node in enumerate(self.nodes.tolist())}
-        self._postures = PostureRules(scene, self.team)
+        self._postures = posture_rules(scene, self.team)
         self._holds = {
             (hold.robot, number): hold
             for hold in holds(scene, schedule.steps)

@@ -11,7 +11,7 @@ import numpy as np
 
 from seqopt.engines.interface import Engine, Want
 from seqopt.errors import SolverError
-from seqopt.judge._posture_rules import props_that_hold
+from seqopt.judge._prop_rules import props_that_hold
 from seqopt.problem.requirements import LINEAR_RANGE, Limit
 from seqopt.sequence.steps import Step
 

@@ -18,8 +18,8 @@ import numpy as np
 from seqopt.errors import SolverError, StepError
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
-from seqopt.judge._posture_rules import check_postures, check_props
 from seqopt.judge._proof import BELOW, Hint, Proof
+from seqopt.judge._prop_rules import check_props
 from seqopt.judge._shape_rules import check_shape
 from seqopt.judge._standing_proof import proven_margins, require_margin
 from seqopt.judge._twin import Twin, twin_of
@@ -30,6 +30,7 @@ from seqopt.responses._props import EXCESS_COLUMN
 from seqopt.responses._tolerance import COLUMN, is_tolerance, misfits_along, tolerances_along
 from seqopt.responses.quantities import CHOSEN_BY, PROP_EXCESS
 from seqopt.responses.table import _analyzed, _Columns, force_column
+from seqopt.scene._armed import check_postures
 from seqopt.sequence._rule_check import check_carried, check_free
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind

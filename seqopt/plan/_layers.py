@@ -23,7 +23,6 @@ from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers, _require_carried, steps_over, travel
 from seqopt.graph.scenarios import ScenarioLayers, engine_for
 from seqopt.graph.solution import Selection
-from seqopt.judge._posture_rules import check_postures
 from seqopt.judge._shape_rules import check_shape
 from seqopt.judge.certificate import Certificate, _require_anew, certify_partial, judge
 from seqopt.plan._guard import readable, require_fit, require_proof, require_time, select
@@ -31,6 +30,7 @@ from seqopt.plan.plan import Plan
 from seqopt.problem.criteria import Among
 from seqopt.problem.problem import Aim, AskedBudget
 from seqopt.problem.requirements import LINEAR_RANGE
+from seqopt.scene._armed import check_postures
 from seqopt.sequence._rule_check import check_carried
 from seqopt.sequence.steps import Step
 from seqopt.work._clock import INTERRUPT

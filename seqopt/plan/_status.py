@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
@@ -10,13 +11,12 @@ from typing import TYPE_CHECKING, Any
 from seqopt.arrays import Terse
 from seqopt.graph.formulation import End
 from seqopt.judge.certificate import TOLERANCE, _known_gap
-from seqopt.problem._arms import faults_in_words
 from seqopt.responses._tolerance import is_tolerance
-from seqopt.responses.quantities import length_text
+from seqopt.responses.quantities import _steps_in_words, length_text
+from seqopt.scene._armed import PlanPostures
 
 if TYPE_CHECKING:
     from seqopt.graph.orders import AllOrders, OrderSelection
-    from seqopt.sequence._postures import PlanPostures
 
 ENDS = {"": End.DONE, "interrupt": End.INTERRUPTED}  # of searches over states
 
@@ -105,6 +105,14 @@ class FoundOrder:
         if is_tolerance(goal.response):  # of which more is better
             return f"no order above {length_text(goal.shown(self.selection.bound))}{claimed}"
         return f"no order below {self.selection.bound:.6g}{claimed}"
+
+
+def faults_in_words(found: PlanPostures) -> tuple[str, ...]:
+    """Return why arms cannot be in steps, each reason with its steps."""
+    steps = defaultdict[str, list[int]](list)
+    for each in found.unreached:
+        steps[each.why].append(each.step)
+    return tuple(f"{why} ({_steps_in_words(numbers)})" for why, numbers in steps.items())
 
 
 @dataclass(frozen=True, repr=False)

@@ -41,6 +41,7 @@ from seqopt.problem.problem import (
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing
 from seqopt.responses.resources import HERE, Resources
+from seqopt.scene._armed import PlanPostures, plan_postures
 from seqopt.scene.scenarios import Scenarios
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import FreeRules
@@ -49,7 +50,6 @@ from seqopt.sequence.schedule import Schedule
 if TYPE_CHECKING:
     from seqopt.graph.instances.instance import Instance
     from seqopt.graph.orders import AllOrders
-    from seqopt.sequence._postures import PlanPostures
     from seqopt.sequence._rule_space import FreeSpace
     from seqopt.sequence._schedule_space import ScheduleSpace
 
@@ -85,8 +85,6 @@ def _with_postures(problem: Problem, plan: Plan, solved: Callable[[Problem], Pla
 
 
 def _found(plan: Plan) -> PlanPostures:
-    from seqopt.sequence._postures import plan_postures  # noqa: PLC0415  # few scenes have arms
-
     found = plan_postures(plan.engine.network.scene, plan.steps)
     assert found is not None
     return found

@@ -11,13 +11,13 @@ from pathlib import Path
 import pandas as pd
 
 from seqopt._showing import Page, display
+from seqopt.arms._plan_postures import arm_faults
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine
 from seqopt.errors import ExtraError, FileError, ProblemError, SeqoptError
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.front import Front
 from seqopt.plan.plan import Plan
-from seqopt.problem._arms import arm_faults
 from seqopt.problem.requirements import overloads
 from seqopt.report._robots import _known_arms
 from seqopt.report._speed._table import SpeedTable

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from seqopt.arms._model import PosedArm, idle_arm
+from seqopt.arms._plan_postures import plan_postures
 from seqopt.arrays import Floats
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.exchange._grip_frames import hold
@@ -19,7 +20,6 @@ from seqopt.scene._props import Prop
 from seqopt.scene.boxes import vertices_of
 from seqopt.scene.parts import Robot, Side, Sphere
 from seqopt.scene.scene import Scene
-from seqopt.sequence._postures import plan_postures
 from seqopt.sequence.steps import Step
 
 ROBOT_COLORS = ("#0b7a75", "#7b2d8b", "#ad5600", "#444444", "#1f5fa8")

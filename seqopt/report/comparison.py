@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from seqopt._files import csv_text
+from seqopt.arms._plan_postures import arm_faults
 from seqopt.arrays import Terse
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import simplest
@@ -24,7 +25,6 @@ from seqopt.plan._layers import on_the_way
 from seqopt.plan._range import keeping
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import pose, solve
-from seqopt.problem._arms import arm_faults
 from seqopt.problem.criteria import WORST_OVER_METHODS, RankSum, WorstRatio
 from seqopt.problem.problem import Aim, Problem
 from seqopt.problem.requirements import LINEAR_RANGE, Criterion, Limit, _prop_faults, overloads

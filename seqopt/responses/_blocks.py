@@ -39,7 +39,7 @@ from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import Recipe, recipe_of
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import FileError, MemoryShortError, SceneError
-from seqopt.responses._arms import for_arms
+from seqopt.responses._possible import for_arms
 from seqopt.responses._props import excess_of, with_props
 from seqopt.responses._tolerance import allowed_by, is_tolerance, misfits
 from seqopt.responses.quantities import (

@@ -272,6 +272,11 @@ class Scene(Shown):
         return tuple(by_name[name] for name in self.build_order)
 
     @cached_property
+    def placed_nodes(self) -> tuple[int, ...]:
+        """The inner nodes in build order: of every brick both."""
+        return tuple(node for brick in self.placed for node in brick.nodes)
+
+    @cached_property
     def since(self) -> dict[int, int]:
         """From which brick count on each brick stands, by name."""
         return {name: count for count, name in enumerate(self.build_order, start=1)}

@@ -9,10 +9,10 @@ from itertools import chain
 
 import numpy as np
 
-from seqopt.arms._permits import within_reach
 from seqopt.arrays import Bools, FrozenValue
 from seqopt.errors import StepError
 from seqopt.network.network import Network
+from seqopt.scene._armed import within_reach
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.sequence._carrying import can_carry

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import hypot
 
-from seqopt.arms._permits import reachable
 from seqopt.errors import StepError
 from seqopt.network.network import Network
+from seqopt.scene._armed import reachable
 from seqopt.scene.scene import Scene
 from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload
 from seqopt.sequence.schedule import Schedule, islands

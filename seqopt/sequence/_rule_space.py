@@ -18,10 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from seqopt.arms._permits import Permits, permits
 from seqopt.arrays import Bools, Floats, Ints, Terse, frozen
 from seqopt.errors import StepError
 from seqopt.network.network import Network
+from seqopt.scene._armed import go_together
 from seqopt.scene.scene import Scene
 from seqopt.sequence._robot_kinds import RobotKind, node_numbers, sort_robots
 from seqopt.sequence.rules import Ending, FreeRules, Newest
@@ -69,17 +69,11 @@ class StateRows(Terse):
         """First column of every kind, and the one after its last."""
         return tuple(pairwise(np.cumsum([0, *(len(kind.robots) for kind in self.kinds)]).tolist()))
 
-    @cached_property
-    def _permits(self) -> Permits | None:
-        return permits(self.network.scene)
-
     def for_arms(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) arms can be in while so many bricks stand, (n,)."""
-        if self._permits is None:
-            return np.ones(len(states), dtype=bool)
         held = np.zeros((len(states), len(self.network.scene.robots)), dtype=np.int64)
         held[:, [r for kind in self.kinds for r in kind.robots]] = states[:, : self.robots]
-        return self._permits.allowed(bricks, held)
+        return go_together(self.network.scene, bricks, held)
 
     def codes(self, states: Ints) -> Ints:
         """Return a number (n,) for every state (n, c) that no other one of its level has."""

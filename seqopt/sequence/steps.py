@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from enum import Enum
 from numbers import Integral
 
-from seqopt.arms._permits import reachable
 from seqopt.errors import StepError
+from seqopt.scene._armed import reachable
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from seqopt.arms._permits import reachable
 from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
+from seqopt.scene._armed import reachable
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Move, OpenGrip, OpenStep, Schedule, check_support
 from seqopt.sequence.steps import Step, StepKind

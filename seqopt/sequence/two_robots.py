@@ -17,11 +17,11 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
-from seqopt.arms._permits import within_reach
 from seqopt.arrays import Bools
 from seqopt.errors import StepError, did_you_mean
 from seqopt.network.build import build_network, network_of
 from seqopt.network.network import Network, PartKind
+from seqopt.scene._armed import within_reach
 from seqopt.scene.parts import Brick, Reach, Robot, Side, Sphere
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import acting_bodies, check_support

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from seqopt.arms import _held
-from seqopt.arms._postures import HeldPostures
+from seqopt.scene._armed import HeldPostures
 from seqopt.scene.arm import Arm
 from seqopt.scene.parts import Robot
 

@@ -9,10 +9,10 @@ import pytest
 
 import seqopt
 from seqopt.arms._held import held_postures
+from seqopt.arms._plan_postures import plan_postures
 from seqopt.engines.registry import make_engine
 from seqopt.responses.table import force_column
 from seqopt.scene.arm import Arm
-from seqopt.sequence._postures import plan_postures
 from seqopt.study.published import published_plan
 from tests.arms.scenes import NORTH, SOUTH, TOOL
 

@@ -10,8 +10,8 @@ import pytest
 
 import seqopt
 from seqopt._cli.main import main
+from seqopt.arms._bases import choose_bases, facing, grid, without_arms
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.plan._studies.bases import choose_bases, facing, grid, without_arms
 from seqopt.sequence.schedule_file import read_plan
 from tests.arms.scenes import beside, two_arms
 

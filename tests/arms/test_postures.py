@@ -9,13 +9,14 @@ import pytest
 
 import seqopt
 from seqopt.arms import find_postures
-from seqopt.arms._permits import permits, reach_table, reachable, within_reach
+from seqopt.arms._judge import PostureRules, check_postures
+from seqopt.arms._permits import permits, reach_table
+from seqopt.arms._plan_postures import plan_postures
 from seqopt.arms._reached import Site, reached_alone
 from seqopt.arms._tables import _compute_table, _stored_table
 from seqopt.errors import InfeasibleError, SceneError, StepError
-from seqopt.judge._posture_rules import PostureRules, check_postures
+from seqopt.scene._armed import reachable, within_reach
 from seqopt.scene.scene import in_order
-from seqopt.sequence._postures import plan_postures
 from seqopt.sequence._rule_space import StateRows
 from tests.arms.scenes import beside, two_arms
 

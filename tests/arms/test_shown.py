@@ -18,11 +18,11 @@ import seqopt
 from seqopt._cli.main import main
 from seqopt._cli.outputs import _task_files
 from seqopt._files import csv_text
+from seqopt.arms._bases import without_arms
 from seqopt.arms._model import ArmModel, idle_arm
 from seqopt.errors import ExtraError, ProblemError, SceneError
 from seqopt.exchange._tasks import Action, _in_postures, plan_tasks, tasks_json
 from seqopt.exchange.exports import export_plan, read_folder
-from seqopt.plan._studies.bases import without_arms
 from seqopt.report._film import Film
 from seqopt.report._pictures import VIEW, steps_picture
 from seqopt.report._robots import _known_arms

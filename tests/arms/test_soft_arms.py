@@ -12,11 +12,11 @@ import pytest
 import seqopt
 from seqopt.arms import _held, find_postures
 from seqopt.arms._held import held_postures
+from seqopt.arms._judge import check_postures
 from seqopt.arms._model import ArmModel
 from seqopt.arms._permits import permits
 from seqopt.engines.registry import make_engine
 from seqopt.errors import GripError, StepError
-from seqopt.judge._posture_rules import check_postures
 from seqopt.plan.solving import layers_of
 from seqopt.problem.criteria import WorstRatio
 from seqopt.report.softness import held_softly

@@ -12,10 +12,10 @@ import seqopt
 from seqopt._cli.main import main
 from seqopt.arms import find_postures
 from seqopt.arms._permits import reach_table
+from seqopt.arms._plan_postures import plan_postures
 from seqopt.arms._reached import Site
 from seqopt.arms._tables import _stored_table
 from seqopt.scene.parts import Sphere
-from seqopt.sequence._postures import plan_postures
 from seqopt.sequence.steps import Step, StepKind
 from tests.arms.boxes import beside_a_wall, boxes
 

@@ -10,7 +10,6 @@ import pytest
 
 import seqopt
 from seqopt.arms import _held
-from seqopt.arms._held import can_hold, held_postures
 from seqopt.engines.interface import Want
 from seqopt.engines.registry import Recipe, make_engine
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -18,6 +17,7 @@ from seqopt.errors import GripError
 from seqopt.graph.scenarios import engine_for
 from seqopt.network.build import build_network
 from seqopt.responses._tolerance import misfits
+from seqopt.scene._armed import can_hold, held_postures
 from tests.arms.joints import compliances, with_joints
 from tests.builders import block, six_bricks
 from tests.limit_scenes import softened

@@ -12,8 +12,8 @@ import pytest
 import seqopt
 from seqopt import Prop
 from seqopt.errors import InfeasibleError, SolverError, StepError
-from seqopt.judge._posture_rules import check_props, props_that_hold
 from seqopt.judge._proof import Proof
+from seqopt.judge._prop_rules import check_props, props_that_hold
 from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._studies.fewest_props import fewest_props
 from seqopt.plan.solving import states_of

@@ -11,9 +11,9 @@ from seqopt._cli.options import POSTURES, WRITTEN, declare, form_options
 from seqopt._cli.screens import question
 from seqopt._cli.words.given import plan_folder
 from seqopt._files import require_apart, write_text
+from seqopt.arms._plan_postures import arm_faults
 from seqopt.exchange._tasks import Postures
 from seqopt.exchange.exports import EXPORTS, LOST, TASKS, export_plan, read_folder
-from seqopt.problem._arms import arm_faults
 from seqopt.problem._limit_words import number_word
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step

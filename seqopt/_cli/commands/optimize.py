@@ -91,9 +91,9 @@ from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.plan._levels import at_sufficient_level
 from seqopt.plan._softer import _payload_advice
+from seqopt.plan._status import faults_in_words
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _solve_run, usual
-from seqopt.problem._arms import faults_in_words
 from seqopt.problem.problem import Problem
 from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, OWN, overloads
 from seqopt.responses._tolerance import value_text
@@ -106,7 +106,7 @@ from seqopt.work._clock import Clock
 from seqopt.work.progress import within
 
 if TYPE_CHECKING:
-    from seqopt.plan._studies.bases import FoundBases
+    from seqopt.arms._bases import FoundBases
     from seqopt.plan._studies.fewest_props import FoundProps
     from seqopt.plan.out_of_sample import Trial
 
@@ -368,7 +368,7 @@ def _bases(
     if options.no_proof:
         raise ProblemError("--no-proof: bases are compared by proven plans; leave it out")
     from seqopt._cli.words.bases import asked_places  # noqa: PLC0415  # few ask for it
-    from seqopt.plan._studies.bases import choose_bases  # noqa: PLC0415
+    from seqopt.arms._bases import choose_bases  # noqa: PLC0415
 
     scene = in_seconds(options, asked_scene(options))
     places = asked_places(scene, options.bases)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from seqopt._files import read_table, read_text
+from seqopt.arms._bases import Base, facing, grid, level_axis
 from seqopt.errors import ProblemError, did_you_mean
-from seqopt.plan._studies.bases import Base, facing, grid, level_axis
 from seqopt.problem._limit_words import number_word
 from seqopt.scene._checks import LARGEST_NUMBER
 from seqopt.scene.scene import Scene

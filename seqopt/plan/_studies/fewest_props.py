@@ -20,7 +20,7 @@ from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError
 from seqopt.judge._proof import Proof
 from seqopt.plan._range import best_of_several
-from seqopt.plan._studies.bases import Tried
+from seqopt.plan._studies._tried import Tried
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _moved, states_of
 from seqopt.problem.problem import Measure, Problem

@@ -1,9 +1,8 @@
-"""Which states arms and props can be in, as a judge sees them: looked up, one by one.
+"""Which states arms can be in, as a judge sees them: looked up, one by one.
 
-A second route to what `seqopt.arms.reach.Permits` says: it takes from there with which postures
+A second route to what `seqopt.arms._permits.Permits` says: it takes from there with which postures
 plans are made, and asks the table itself what these hit. How grips give way by the joints of arms
-is found by moving every joint a little, from places of the flange, without the Jacobian. Of what
-props hold and bear nothing is shared but the engine.
+is found by moving every joint a little, from places of the flange, without the Jacobian.
 """
 
 from __future__ import annotations
@@ -14,59 +13,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from seqopt.arms._held import held_postures
-from seqopt.arms._permits import permits
-from seqopt.arms.reach import find_postures
+from seqopt.arms._permits import find_table, permits
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.engines.interface import Engine, Want
-from seqopt.errors import SolverError, StepError
-from seqopt.scene._props import Prop
+from seqopt.errors import StepError
 from seqopt.scene.scene import Scene
 from seqopt.sequence.steps import Step
 
 if TYPE_CHECKING:
     from seqopt.arms._model import ArmModel
-
-_UNFELT = 1e-3  # of the mean weight of a brick, far more than forces err
-
-
-def props_that_hold(scene: Scene, bricks: int, robots: int) -> list[tuple[int, Prop]]:
-    """Return props by the numbers of their grips, with so many bricks and robots that hold."""
-    if not robots and bricks >= len(scene.build_order):
-        return []
-    kinds, first, out = scene.grip_kinds, len(scene.robots), []
-    stand = {node for brick in scene.placed[:bricks] for node in brick.nodes}
-    for i, prop in enumerate(scene.props):
-        if prop.node in stand:
-            kind = int(kinds.of_robot[first + i]) if len(kinds.turns) > 1 else 0
-            out.append((prop.node + kinds.span * kind, prop))
-    return out
-
-
-def check_props(engine: Engine, steps: Sequence[Step]) -> None:
-    """Raise a `SolverError` if a prop pulls that may only push, or bears more than it may."""
-    scene = engine.network.scene
-    if not any(prop.direction or prop.capacity for prop in scene.props):
-        return
-    weight = float(np.linalg.norm(engine.network.weight, axis=1).mean())
-    for step in steps:
-        held = scene.grip_numbers(step.grips)
-        props = props_that_hold(scene, step.bricks, len(held))
-        if not props:  # as on the empty site, where a take-down ends
-            continue
-        grips = np.array([[*held, *(number for number, _ in props)]], dtype=np.int64)
-        force = engine.solve(step.bricks, grips, Want(0)).grip_force[0, len(held) :]
-        for own, (_, prop) in zip(force, props, strict=True):
-            _check(prop, own, _UNFELT * (weight or 1.0), step.number)
-
-
-def _check(prop: Prop, force: np.ndarray, little: float, number: int) -> None:
-    size = float(np.linalg.norm(force))
-    if prop.capacity is not None and size > prop.capacity + little:
-        raise SolverError(
-            f"step {number}: the {prop.label} bears {size:.4g} N of {prop.capacity:g} N"
-        )
-    if prop.direction is not None and np.dot(force, prop.direction) < -little:
-        raise SolverError(f"step {number}: the {prop.label} pulls, and may only push")
 
 
 class PostureRules:
@@ -76,23 +30,19 @@ class PostureRules:
     """
 
     def __init__(self, scene: Scene, team: Sequence[int]) -> None:
-        self._table, found = find_postures(scene), permits(scene)
+        self._table, self._rows = find_table(scene), permits(scene).rows
         self._armed = [(c, r) for c, r in enumerate(team) if scene.robots[r].arm is not None]
         self._known: dict[tuple[int, ...], bool] = {}
         self._options: dict[tuple[int, int, int], int] = {}
-        if self._table is not None and found is not None:
-            self._rows = found.rows
-            column = {name: i for i, name in enumerate(self._table.bricks)}
-            self._placed = [column[name] for name in scene.build_order]
-            self._apart = [_bits(~np.array(row)) for row in self._table.collide]
+        column = {name: i for i, name in enumerate(self._table.bricks)}
+        self._placed = [column[name] for name in scene.build_order]
+        self._apart = [_bits(~np.array(row)) for row in self._table.collide]
 
     def allow(self, bricks: int, states: Ints) -> Bools:
         """Return which states have postures that go together while so many bricks stand, (n,).
 
         ``states`` (n, c): places in build order of the nodes held, from 1; none above 0 is free.
         """
-        if self._table is None or not self._armed:
-            return np.ones(len(states), dtype=bool)
         held = states[:, [column for column, _ in self._armed]].clip(min=0)
         return np.array([self._allows(bricks, row) for row in held.tolist()], dtype=bool)
 
@@ -108,7 +58,6 @@ class PostureRules:
         """Return the postures of a robot at a place that hit nothing, as bits of a number."""
         key = (bricks, robot, place)
         if key not in self._options:
-            assert self._table is not None
             standing = self._placed[:bricks]
             rows = [row for row in self._rows[robot, place].tolist() if row >= 0]
             clear = (row for row in rows if not self._table.hits[row, standing].any())
@@ -140,8 +89,7 @@ def check_postures(scene: Scene, steps: Sequence[Step]) -> None:
     Or if their grips give way in another way than their joints do.
     """
     rules = PostureRules(scene, range(len(scene.robots)))
-    nodes = [node for brick in scene.placed for node in brick.nodes]
-    place = {None: 0} | {node: i for i, node in enumerate(nodes, start=1)}
+    place = {None: 0} | {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
     for step in steps:
         held = np.array([[place[node] for node in step.grips]])
         if not rules.allow(step.bricks, held)[0]:
@@ -159,8 +107,8 @@ def _check_grips(scene: Scene) -> None:
 
     Or if an arm is not at its node. A proof uses all nodes, so all are looked at.
     """
-    held, table = held_postures(scene), find_postures(scene)
-    if held is None or table is None:
+    held, table = held_postures(scene), find_table(scene)
+    if held is None:
         return
     from seqopt.arms._model import ArmModel  # noqa: PLC0415  # few scenes have arms
 

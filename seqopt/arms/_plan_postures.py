@@ -9,7 +9,6 @@ one alone in which it is known how.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -17,7 +16,9 @@ import numpy as np
 
 from seqopt.arms._held import held_postures
 from seqopt.arms.reach import find_postures
-from seqopt.arrays import Bools, Ints, Terse
+from seqopt.arrays import Bools, Ints
+from seqopt.plan._status import faults_in_words
+from seqopt.scene._armed import PlanPostures, Unreached
 from seqopt.scene.scene import Scene
 from seqopt.sequence.schedule import Hold, holds
 from seqopt.sequence.steps import Step
@@ -29,32 +30,16 @@ _Way = tuple[int, ...]  # a posture for every hold of a step, as rows of the tab
 _MOST_WAYS = 20_000  # of one step that are kept
 
 
-@dataclass(frozen=True)
-class Unreached:
-    """A step that arms cannot be in: its number, which robots hold what, and why in words."""
-
-    step: int
-    why: str
-
-
-@dataclass(frozen=True, repr=False)
-class PlanPostures(Terse):
-    """The postures of a plan.
-
-    ``steps``: by step, which row of ``table`` each robot of the scene is in; None for a robot that
-    holds nothing or has no arm, and for all where there is no way. ``unreached``: the steps that
-    arms cannot be in, or not without changing a posture while they hold.
-    """
-
-    table: PostureTable
-    steps: tuple[tuple[int | None, ...], ...]
-    unreached: tuple[Unreached, ...]
-
-
 def plan_postures(scene: Scene, steps: Sequence[Step]) -> PlanPostures | None:
     """Return the postures of a plan, or the steps that have none; None if no robot has an arm."""
     table = find_postures(scene)
     return None if table is None else _Search(scene, table, steps).found()
+
+
+def arm_faults(scene: Scene, steps: Sequence[Step]) -> tuple[str, ...]:
+    """Return why arms cannot be in steps of a build, a line for each reason; none without arms."""
+    found = plan_postures(scene, steps)
+    return () if found is None else faults_in_words(found)
 
 
 class _Search:

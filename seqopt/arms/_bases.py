@@ -18,21 +18,21 @@ from math import inf
 import numpy as np
 import pandas as pd
 
-from seqopt.arms._permits import permits, within_reach
+from seqopt.arms._permits import permits
 from seqopt.arms.reach import find_postures
 from seqopt.arrays import Terse, Vector
-from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SceneError, TimeUpError
-from seqopt.graph.formulation import End
+from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SceneError
 from seqopt.plan._range import best_of_several
+from seqopt.plan._studies._tried import Tried, bound_of, is_below
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _moved
 from seqopt.problem.problem import Problem
+from seqopt.scene._armed import within_reach
 from seqopt.scene.arm import Arm
 from seqopt.scene.parts import Robot
 from seqopt.scene.scene import Scene
 from seqopt.work.progress import Tell
 
-_SAME = 1e-9  # over the size of a value
 _ROUND, _NEAR, _FAR = 0.35, 0.25, 0.7  # of the reach: spacing, and distances from the bricks
 _MOST = 5_000  # sets of bases
 
@@ -213,65 +213,6 @@ def _with_arms(scene: Scene, change: Callable[[Arm], Arm | None]) -> Scene:
     )
 
 
-_Outcome = tuple[str, tuple[float, ...]]  # of a problem, in words, and its values or bounds
-
-
-class Tried:
-    """The best plan so far of problems that are alike, and what became of each."""
-
-    def __init__(self, problem: Problem, solved: Callable[[Problem], Plan], tell: Tell) -> None:
-        self._problem, self._solved, self._tell = problem, solved, tell
-        self._best: tuple[float, ...] = ()
-        self._plan: Plan | None = None
-        self._of: Problem | None = None
-        self._rows: list[dict[str, object]] = []
-        self._left: list[tuple[float, ...]] = []  # bounds of sets whose best plan is not proven
-        self._over = False  # whether somebody ended it before all were looked at
-
-    def _none(self, why: str) -> InfeasibleError | NothingFoundError:
-        """Return the error that says why there is no plan, or that none was found."""
-        return (
-            NothingFoundError(f"{why} as far as is known") if self._left else InfeasibleError(why)
-        )
-
-    def _open(self, error: NothingFoundError) -> tuple[str, tuple[float, ...]]:
-        """Return what to say of a problem of which no plan was found: it may have any."""
-        self._left.append((-inf,))
-        return f"no plan was found: {error}", (-inf,)
-
-    @property
-    def _proven(self) -> bool:
-        """Whether no set that was looked at allows a better plan."""
-        return not (self._over or any(_is_below(bound, self._best) for bound in self._left))
-
-    def _in_time(self, outcome: Callable[[], _Outcome]) -> _Outcome | None:
-        """Return what became of a problem; None if somebody ended it, and a plan is there by then.
-
-        What is ended is the rest too.
-        """
-        try:
-            return outcome()
-        except (TimeUpError, KeyboardInterrupt):
-            if self._plan is None:
-                raise
-            self._over = True
-            return None
-
-    def _kept(self, problem: Problem, plan: Plan) -> tuple[str, tuple[float, ...]]:
-        """Take a plan that is better than those before; return what to say of it."""
-        value, bound = _value(plan), _bound(plan)
-        self._over |= plan.ended is End.INTERRUPTED
-        if _is_below(bound, value):
-            self._left.append(bound)
-        if self._plan is None or _is_below(value, self._best):
-            self._plan, self._of, self._best = plan, problem, value
-        return "solved", value
-
-    def _named(self, bound: tuple[float, ...]) -> dict[str, float]:
-        pairs = zip(self._problem.goals, bound, strict=False)
-        return {str(goal): goal.shown(value) for goal, value in pairs}
-
-
 class _Search(Tried):
     """Looks at sets of bases, the most promising first, and keeps the best plan so far."""
 
@@ -280,10 +221,10 @@ class _Search(Tried):
     def found(self, sets: Sequence[tuple[dict[str, Base], Scene]]) -> FoundBases:
         """Return the best plan of sets of bases."""
         soft = any(scene.grip_kinds.arms.any() for _, scene in sets)
-        floor = (-inf,) if soft else _bound(self._solved(self._problem))  # of robots without arms
+        floor = (-inf,) if soft else bound_of(self._solved(self._problem))  # of robots without arms
         for number, (_, bases, scene) in enumerate(self._by_promise(sets), start=1):
             self._tell(f"bases, set {number} of {len(sets)}")
-            if self._plan is not None and not _is_below(floor, self._best):
+            if self._plan is not None and not is_below(floor, self._best):
                 outcome, bound = "skipped: no robots do better", floor
             else:
                 found = self._in_time(partial(self._outcome, scene))
@@ -322,7 +263,6 @@ class _Search(Tried):
             found = permits(apart)
         except SceneError:  # a base stands in a brick
             return -1.0
-        assert found is not None
         return float(np.minimum(found.until[:, 1:], len(scene.bricks) + 1).mean())
 
     def _outcome(self, scene: Scene) -> tuple[str, tuple[float, ...]]:
@@ -333,8 +273,8 @@ class _Search(Tried):
             lacking = _lacking(apart)
             if lacking is not None:
                 return self._without(f"nobody reaches brick {lacking}")
-            alone = (-inf,) if soft else _bound(self._solved(_moved(self._problem, apart)))
-            if self._plan is not None and not _is_below(alone, self._best):
+            alone = (-inf,) if soft else bound_of(self._solved(_moved(self._problem, apart)))
+            if self._plan is not None and not is_below(alone, self._best):
                 return "skipped: by reach alone no better", alone
             find_postures(scene, self._problem.resources.cache, self._tell)
             problem = _moved(self._problem, scene)
@@ -344,7 +284,7 @@ class _Search(Tried):
         except (InfeasibleError, SceneError) as error:
             return self._without(str(error))
         if plan.arms is not None and plan.arms.postures.unreached:
-            self._left.append(bound := _bound(plan))
+            self._left.append(bound := bound_of(plan))
             return "no plan that keeps postures was found", bound
         return self._kept(problem, plan)
 
@@ -356,23 +296,3 @@ def _lacking(scene: Scene) -> int | None:
         if not any(nodes[k] for nodes in reached):
             return brick.name
     return None
-
-
-def _value(plan: Plan) -> tuple[float, ...]:
-    proof = plan.certificate
-    return () if proof is None else proof.values  # noqa: PD011  # no table
-
-
-def _bound(plan: Plan) -> tuple[float, ...]:
-    """Return what no plan stays below: of arms with any posture of the table."""
-    if plan.arms is not None and plan.arms.bounds:
-        return plan.arms.bounds
-    return () if plan.certificate is None else plan.certificate.bounds
-
-
-def _is_below(one: Sequence[float], other: Sequence[float]) -> bool:
-    """Return whether values are better, the first that differs counts."""
-    for a, b in zip(one, other, strict=False):
-        if a != b and not abs(a - b) <= _SAME * max(abs(a), abs(b), _SAME) < inf:
-            return a < b
-    return False

@@ -1,0 +1,200 @@
+"""What arms of robots allow, and how their grips give way by the joints.
+
+A room of its own works it out and offers it in `seqopt._registry`: no other one imports it. Nobody
+is asked where robots have no arms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from seqopt._registry import offered
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints, Terse
+from seqopt.errors import ExtraError
+from seqopt.scene.parts import Robot
+from seqopt.scene.scene import Scene
+from seqopt.work.progress import Tell
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HeldPostures(FrozenValue):
+    """The postures of A arms whose joints give way, at N nodes, one of each arm at each node.
+
+    ``robots`` (A,): indices of the scene's robots; ``nodes`` (N,): ascending; ``rows`` (A, N):
+    postures of the table, -1 for none; ``jacobians``: by arm (N, 6, J), how a node moves with
+    joints, m and rad, in the axes of the scene; NaN where there is no posture.
+    """
+
+    robots: Ints
+    nodes: Ints
+    rows: Ints
+    jacobians: tuple[Floats, ...]
+
+    def row(self, robot: int, node: int) -> int | None:
+        """Return the posture of a robot at a node, -1 if there is none; None if any will do."""
+        own = np.flatnonzero(self.robots == robot)
+        if not len(own):
+            return None
+        return int(self.rows[own[0], np.searchsorted(self.nodes, node)])
+
+    def compliance(self, scene: Scene) -> Floats:
+        """Return how grips give way by the joints alone, (A, N, 6, 6); m and rad, N and N m."""
+        out = []
+        for robot, jacobian in zip(self.robots.tolist(), self.jacobians, strict=True):
+            arm = scene.robots[robot].arm
+            assert arm is not None
+            stiffness = np.array(arm.joint_stiffness)
+            out.append(np.einsum("nij,nkj->nik", jacobian / stiffness, jacobian))
+        return np.array(out)
+
+
+@dataclass(frozen=True)
+class Unreached:
+    """A step that arms cannot be in: its number, which robots hold what, and why in words."""
+
+    step: int
+    why: str
+
+
+@dataclass(frozen=True, repr=False)
+class PlanPostures(Terse):
+    """The postures of a plan.
+
+    ``steps``: by step, which row of ``table`` each robot of the scene is in; None for a robot that
+    holds nothing or has no arm, and for all where there is no way. ``unreached``: the steps that
+    arms cannot be in, or not without changing a posture while they hold.
+    """
+
+    table: Any  # a `seqopt.arms.PostureTable`
+    steps: tuple[tuple[int | None, ...], ...]
+    unreached: tuple[Unreached, ...]
+
+
+def _asked(name: str) -> Any:
+    """Return what the room of arms offers under a name. Raises `ExtraError` if there is none."""
+    found = offered(name)
+    if found is None:
+        raise ExtraError(
+            "robots have arms, and the room seqopt.arms, which knows their reach, is not there: "
+            "install seqopt anew, or leave out the arms"
+        )
+    return found
+
+
+def find_postures(scene: Scene, cache: Path | str | None = None, tell: Tell | None = None) -> None:
+    """Compute the postures of arms, or read them from a folder, before they are asked for."""
+    if scene.has_arms:
+        _asked("find_postures")(scene, cache, tell)
+
+
+def within_reach(scene: Scene, robot: Robot) -> tuple[tuple[int, ...], ...]:
+    """Return the nodes, not blocked, that a robot reaches, brick by brick in build order.
+
+    That of an arm is in reach if a posture of it is possible when the brick is placed.
+    """
+    own = scene.within_reach(robot)
+    if robot.arm is None:
+        return own
+    until = _until(scene, robot)
+    return tuple(
+        tuple(n for i, n in enumerate(b.nodes) if n in nodes and until[2 * k + i + 1] > k + 1)
+        for k, (b, nodes) in enumerate(zip(scene.placed, own, strict=True))
+    )
+
+
+def reachable(scene: Scene, robot: Robot, bricks: int) -> tuple[int, ...]:
+    """Return the nodes of the first bricks that a robot may hold while these stand, in order."""
+    nodes = [node for brick in within_reach(scene, robot)[:bricks] for node in brick]
+    if robot.arm is None:
+        return tuple(nodes)
+    until = _until(scene, robot)
+    place = {node: i for i, node in enumerate(scene.placed_nodes, start=1)}
+    return tuple(node for node in nodes if until[place[node]] > bricks)
+
+
+def _until(scene: Scene, robot: Robot) -> Floats:
+    """Return from which brick count on a robot cannot hold each place, (2B + 1,)."""
+    until: Floats = _asked("permits")(scene).until[scene.robots.index(robot)]
+    return until
+
+
+def go_together(scene: Scene, bricks: int, held: Ints) -> Bools:
+    """Return which states (n,) have postures that go together while so many bricks stand.
+
+    ``held`` (n, R): places in build order that robots hold, from 1; none above 0 is a free robot.
+    """
+    if not scene.has_arms:
+        return np.ones(len(held), dtype=bool)
+    out: Bools = _asked("permits")(scene).allowed(bricks, held)
+    return out
+
+
+def held_postures(scene: Scene) -> HeldPostures | None:
+    """Return the postures in which arms hold whose joints give way; None if there are no such arms.
+
+    They are computed once, and go along with a scene to other processes.
+    """
+    found: HeldPostures | None = None
+    if scene.grip_kinds.arms.any():
+        found = _asked("held_postures")(scene)
+    return found
+
+
+def can_hold(scene: Scene, kind: int, node: int) -> bool:
+    """Return whether it is known how grips of a kind give way at a node."""
+    held = held_postures(scene)
+    if held is None or not scene.grip_kinds.arms[kind]:
+        return True
+    return held.row([*scene.grip_kinds.of_robot].index(kind), node) != -1
+
+
+def hold_alike(nominal: Scene, scene: Scene) -> Scene:
+    """Return a variation of a scene in which robots hold in the postures of the nominal one.
+
+    It is as it was where it has other arms: joints may have other stiffnesses.
+    """
+    alike: Scene = scene
+    if nominal.grip_kinds.arms.any():
+        alike = _asked("hold_alike")(nominal, scene)
+    return alike
+
+
+def plan_postures(scene: Scene, steps: Sequence[object]) -> PlanPostures | None:
+    """Return the postures of a plan, or the steps that have none; None if no robot has an arm."""
+    found: PlanPostures | None = _asked("plan_postures")(scene, steps) if scene.has_arms else None
+    return found
+
+
+class _Rules(Protocol):
+    """Which states arms can be in, by a second way for the judge."""
+
+    def allow(self, bricks: int, states: Ints) -> Bools:
+        """Return which states (n, c) of places have postures that go together, (n,)."""
+
+
+class _NoRules:
+    """What robots without arms ask of a state."""
+
+    def allow(self, bricks: int, states: Ints) -> Bools:
+        """Return that all states will do."""
+        return np.ones(len(states), dtype=bool)
+
+
+def posture_rules(scene: Scene, team: Sequence[int]) -> _Rules:
+    """Return the judge's rules of arms; ``team``: robots of the columns of states, by index."""
+    rules: _Rules = _asked("PostureRules")(scene, team) if scene.has_arms else _NoRules()
+    return rules
+
+
+def check_postures(scene: Scene, steps: Sequence[object]) -> None:
+    """Raise a `StepError` if arms have no postures that go together in a step.
+
+    Or if their grips give way in another way than their joints do.
+    """
+    if scene.has_arms:
+        _asked("check_postures")(scene, steps)
