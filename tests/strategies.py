@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 from hypothesis import strategies as st
+from seqopt.graph.layers.interface import CostProblem
 
 from experiments.harness.scenes import running_bond
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.scene._props import Prop
 from seqopt.scene.arch import ArchShape, arch_scene
 from seqopt.scene.boxes import as_vectors, vertices_of

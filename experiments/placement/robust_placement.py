@@ -26,19 +26,18 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from formulations.scenarios.scenario_program import _solve_program
 from matplotlib.figure import Figure
 
 from experiments.harness.charts import subplots, ticks
 from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
 from experiments.harness.results import drawn, stored
 from experiments.harness.scenes import half_circle
-from formulations.scenarios.scenario_program import _solve_program
 from seqopt import Plan, Scene, build_network, load_scene, make_engine, scenarios, solve
 from seqopt.graph.formulation import Watch
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.scenarios import Choice, ScenarioLayers, in_scenarios
 from seqopt.plan.out_of_sample import judge_unseen
-from seqopt.plan.search.in_order import least_quantile, solve_in_order
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar
 from seqopt.problem.requirements import Criterion
 from seqopt.report._style import BLUE, GRAY, VERMILION, dress, styled
@@ -119,10 +118,10 @@ def plans(scene: Scene, count: int) -> dict[str, Choice]:
     ranks, total, worst = (posed(scene, c) for c in (EQUATIONS, WEIGHTED, WORST_RATIO))
     peaks, totals = (over_draws(problem, count, 0) for problem in (worst, total))
     return {
-        "rank": solve(ranks, "overlap_dp").selection.choice,
-        "sum": solve(total, "overlap_dp").selection.choice,
-        "worst": solve(worst, "minimax").selection.choice,
-        "worst, then sum": solve_in_order([(worst, Aim.PEAK), (total, Aim.SUM)]).choice,
+        "rank": solve(ranks, "overlap_dp").choice,
+        "sum": solve(total, "overlap_dp").choice,
+        "worst": solve(worst, "minimax").choice,
+        "worst, then sum": solve_in_order([(worst.peaks, Aim.PEAK), (total.sums, Aim.SUM)]).choice,
         "all but a tenth of the steps": least_quantile(worst, 0.1).choice,
         "robust, worst peak": solve(peaks).choice,
         "robust, worst total": solve(totals.under(WORST_TOTAL)).choice,

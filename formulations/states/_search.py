@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from itertools import pairwise
 from operator import le
 
 import numpy as np
 
-from formulations.states._totals import least_total
+from formulations.on_graph import Choice, Choose
+from formulations.states._totals import StopError, cheapest_by, least_total
 from seqopt._interrupts import answered
 from seqopt.arrays import Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SeqoptError, TimeUpError
@@ -26,7 +26,7 @@ from seqopt.graph.orders import (
     Trial,
     order_value,
 )
-from seqopt.graph.paths import Best, distances, lexicographic, reached, tied
+from seqopt.graph.paths import Best, distances, lexicographic, path_values, reached, tied
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import FreeStates, ScenarioSums, explore
 from seqopt.graph.states.states import States
@@ -39,17 +39,12 @@ WIDTH = 50  # new states of a brick count from which the narrow search goes on
 COPIES = 2.0  # of what is kept, that are needed at once while it grows
 GROWN = 1.1  # times as much is kept before it is asked again how much memory is free
 
-_Choose = Callable[[Graph, Watch], tuple[tuple[int, ...], tuple[float, ...], bool]]
 Watching = Callable[[Explorer], None]
 Search = Callable[[States], StatePath]
 
 
-class StopError(Exception):
-    """Time or memory that was given is used up; says which."""
-
-
 def best_order(
-    problem: AllOrders, choose: _Choose, watch: Watch, tell: Watching, width: int | None = None
+    problem: AllOrders, choose: Choose, watch: Watch, tell: Watching, width: int | None = None
 ) -> OrderSelection:
     """Return the order of the path that is chosen through the states of all orders at once.
 
@@ -73,7 +68,7 @@ def best_order(
 
 
 def _order_of_path(
-    problem: AllOrders, choose: _Choose, watch: Watch, tell: Watching, width: int | None
+    problem: AllOrders, choose: Choose, watch: Watch, tell: Watching, width: int | None
 ) -> OrderSelection:
     """Return the order of a path that is chosen by a first goal that is no margin."""
     states, order = problem.states, problem.scene.build_order
@@ -89,13 +84,13 @@ def _order_of_path(
         return _order_within(found, problem, len(space.parts) - 1)
     found.refine()
     visited = found.graph()
-    path, bounds, early = choose(_on_paths(visited.graph), watch)
-    value, stopped = own, "time" * early
+    chosen_ = choose(_on_paths(visited.graph), watch)
+    path, value, stopped = chosen_.path, own, "time" * chosen_.stopped
     if path and path_values(visited.graph, path)[0] < own:
         value, order = path_values(visited.graph, path)[0], problem.order_of(visited.of(path))
     if not np.isfinite(value):
         raise TimeUpError("no order with a plan was found yet; give more")
-    bound = min(bounds[0] if bounds else -np.inf, value)
+    bound = min(chosen_.bounds[0] if chosen_.bounds else -np.inf, value)
     return OrderSelection(order, value, bound, len(space.parts) - 1, stopped)
 
 
@@ -137,37 +132,25 @@ def _order_within(found: Explorer, problem: AllOrders, evaluated: int) -> OrderS
 
 
 def _order_of_total(
-    found: Explorer, problem: AllOrders, choose: _Choose, watch: Watch
+    found: Explorer, problem: AllOrders, choose: Choose, watch: Watch
 ) -> OrderSelection:
     """Return the order of the path of least total over scenarios."""
     visited = found.graph()
     best = least_total(
-        _on_paths(visited.graph), problem.states.over, _cheapest(choose, watch), watch
+        _on_paths(visited.graph), problem.states.over, cheapest_by(choose, watch), watch
     )
     stopped, parts = "time" * watch.over, len({part for _, part, _ in visited.states})
     order, weights = problem.order_of(visited.of(best.path)), tuple(best.weights.tolist())
     return OrderSelection(order, best.value, best.bound, parts - 1, stopped, weights)
 
 
-def _cheapest(choose: _Choose, watch: Watch) -> Callable[[Graph], tuple[tuple[int, ...], float]]:
-    """Return what finds the path of least sum, and what none stays below."""
-
-    def cheapest(graph: Graph) -> tuple[tuple[int, ...], float]:
-        path, bounds, _ = choose(graph, watch)
-        if not path:
-            raise StopError("time")
-        return path, bounds[0] if bounds else -np.inf
-
-    return cheapest
-
-
-def shortest(graph: Graph, _: Watch) -> tuple[tuple[int, ...], tuple[float, ...], bool]:
+def shortest(graph: Graph, _: Watch) -> Choice:
     """Return the path that is best in one goal after the other, by shortest paths."""
-    return (*lexicographic(graph), False)
+    return Choice(*lexicographic(graph))
 
 
 def best_total(
-    problem: States, choose: _Choose, watch: Watch, tell: Watching, width: int | None = None
+    problem: States, choose: Choose, watch: Watch, tell: Watching, width: int | None = None
 ) -> StatePath:
     """Return the plan of least total over scenarios.
 
@@ -182,7 +165,9 @@ def best_total(
                 return best_total(problem, choose, watch, tell)
             raise found.without_plan("no plan is allowed")
         visited = found.graph()
-        best = least_total(_on_paths(visited.graph), problem.over, _cheapest(choose, watch), watch)
+        best = least_total(
+            _on_paths(visited.graph), problem.over, cheapest_by(choose, watch), watch
+        )
     except StopError as stop:
         raise _too_little(stop) from None
     plan = _selection(visited, Best(best.path, (best.value,)))
@@ -190,7 +175,7 @@ def best_total(
     return replace(plan, bound=bound, prices=prices, stopped="time" * watch.over)
 
 
-def chosen(problem: States, choose: _Choose, watch: Watch, tell: Watching) -> StatePath:
+def chosen(problem: States, choose: Choose, watch: Watch, tell: Watching) -> StatePath:
     """Return the plan of a choice; where time was over, the better one of it and a first plan."""
     first = None
     try:
@@ -200,32 +185,26 @@ def chosen(problem: States, choose: _Choose, watch: Watch, tell: Watching) -> St
             raise wide.without_plan("no plan is allowed")
         wide.refine()
         graph, states = wide.graph()
+        graph = replace(graph, caps=problem.budgets)
         with answered(watch.interrupt):
-            path, known, early = choose(_on_paths(graph), watch)
+            best = choose(_on_paths(graph), watch)
     except (StopError, KeyboardInterrupt) as stop:
         return plan_by_then(first, stop)
-    stopped = ("interrupt" if watch.interrupted else "time") * early
-    if path:
-        values = path_values(graph, path)
-        found = _selection(Visited(graph, states), Best(path, values))
-    if not path or (first and early and first.objective < values):
+    stopped = ("interrupt" if watch.interrupted else "time") * best.stopped
+    if best.path:
+        values = path_values(graph, best.path)
+        found = _selection(Visited(graph, states), Best(best.path, values))
+    if not best.path or (first and best.stopped and first.objective < values):
         found = plan_by_then(first, KeyboardInterrupt() if watch.interrupted else StopError("time"))
-    bounds = (*known, *[-np.inf] * len(graph.peaks))
-    bound = tuple(map(min, found.objective, bounds))
-    return replace(found, bound=bound, stopped=stopped)
+    known = (*best.bounds, *[-np.inf] * (graph.goals - len(best.bounds)))
+    bound = tuple(map(min, found.objective, (*known, *found.objective[graph.goals :])))
+    return replace(found, bound=bound, stopped=stopped, prices=best.prices)
 
 
 def _on_paths(graph: Graph) -> Graph:
     """Return the graph with the moves that are on paths from the start to an end."""
     to_end = np.isfinite(distances(graph, np.ones(len(graph.source)), back=True))
     return graph.only(reached(graph)[graph.source] & to_end[graph.target])
-
-
-def path_values(graph: Graph, path: Sequence[int]) -> tuple[float, ...]:
-    """Return what every goal takes of a path."""
-    moves = [a * graph.states + b for a, b in pairwise((0, *path))]
-    kept = np.isin(graph.source.astype(np.int64) * graph.states + graph.target, moves)
-    return lexicographic(graph.only(kept)).values
 
 
 def watched(problem: States, watch: Watch, most: float, progress: Tell) -> Watching:

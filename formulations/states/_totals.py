@@ -2,7 +2,7 @@ r"""The path of least worst or tail total over scenarios: weights, then labels t
 
 A path :math:`p` has a total :math:`c_s(p)` in every scenario, and the aim makes
 :math:`\max_{w \in W} \sum_s w_s \, c_s(p)` of them, with the weights of
-`formulations.scenarios.scenario_search`. At fixed weights the cheapest path is what a formulation
+`formulations._weights`. At fixed weights the cheapest path is what a formulation
 finds for a single sum, and a bound on all. What the best weights leave open is closed by labels,
 vectors of totals: with the least from every state on, under each of some weights, a label has a
 bound, and the one with the lowest is continued first. Labels whose bound is not below the best path
@@ -19,15 +19,31 @@ from typing import NamedTuple
 import numpy as np
 
 from formulations._weights import CLOSE, Weighed, best_weights, provers
+from formulations.on_graph import Choose
 from seqopt.arrays import Floats, Ints
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import distances
+from seqopt.graph.paths import distances, moves_along
 from seqopt.problem.problem import RobustAim
 
+_Cheapest = Callable[[Graph], tuple[tuple[int, ...], float]]
 LABELS = 50_000  # that are continued at most
 
-_Cheapest = Callable[[Graph], tuple[tuple[int, ...], float]]
+
+class StopError(Exception):
+    """Time or memory that was given is used up; says which."""
+
+
+def cheapest_by(choose: Choose, watch: Watch) -> _Cheapest:
+    """Return what finds the path of least sum by a formulation, and what none stays below."""
+
+    def cheapest(graph: Graph) -> tuple[tuple[int, ...], float]:
+        found = choose(graph, watch)
+        if not found.path:
+            raise StopError("time")
+        return found.path, found.bounds[0] if found.bounds else -np.inf
+
+    return cheapest
 
 
 class LeastTotal(NamedTuple):
@@ -72,9 +88,7 @@ class _Paths:
         return self.best(Graph(graph.source, graph.target, sums, (False,), graph.ends))
 
     def totals(self, choice: tuple[int, ...]) -> Floats:
-        codes = self.graph.source.astype(np.int64) * self.graph.states + self.graph.target
-        moves = [a * self.graph.states + b for a, b in zip((0, *choice), choice, strict=False)]
-        return np.asarray(self.graph.amounts[np.searchsorted(codes, moves)].sum(axis=0))
+        return np.asarray(self.graph.amounts[moves_along(self.graph, choice)].sum(axis=0))
 
 
 def _below(value: float) -> float:

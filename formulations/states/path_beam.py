@@ -19,6 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from formulations.on_graph import Choice
 from formulations.states._search import (
     StopError,
     after_margins,
@@ -30,7 +31,6 @@ from formulations.states._search import (
     shortest,
     watched,
 )
-from formulations.states.on_graph import Choice
 from seqopt.errors import ProblemError
 from seqopt.graph._explore import Explorer
 from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch

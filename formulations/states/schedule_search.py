@@ -49,6 +49,8 @@ from operator import itemgetter, le
 
 import numpy as np
 
+from formulations.labels import relaxed
+from formulations.on_graph import path_of_instance
 from formulations.states._search import (
     WIDTH,
     StopError,
@@ -61,13 +63,12 @@ from formulations.states._search import (
     shortest,
     watched,
 )
-from formulations.states.on_graph import _path_of_instance
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph._budgets import is_beyond
 from seqopt.graph._explore import Explorer
 from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
-from seqopt.graph.instances.instance import Instance
-from seqopt.graph.paths import distances, lexicographic, strictly_below, tied
+from seqopt.graph.instance import Instance
+from seqopt.graph.paths import distances, strictly_below, tied
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import FreeStates, floors_of_goals
 from seqopt.graph.states.states import States
@@ -102,7 +103,7 @@ def solve(
             "number above 1"
         )
     if isinstance(problem, Instance):
-        return _path_of_instance(problem, lambda g, _: (*lexicographic(g), False), Watch(seconds))
+        return path_of_instance(problem, relaxed, Watch(seconds))
     tell = watched(problem, Watch(seconds), max_memory, progress)
     if problem.totals:
         return best_total(problem, shortest, Watch(seconds), tell)

@@ -27,7 +27,7 @@ from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch
-from seqopt.graph.instances.instance import PEAK, TIME, Instance
+from seqopt.graph.instance import PEAK, TIME, Instance
 from seqopt.graph.paths import tied
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import FreeStates, steps_of

@@ -7,15 +7,13 @@ gap between a path and its bound, except that one budget alone is decided exactl
 
 A path within the budgets is sought first, at no cost: whether there is one, one budget alone
 decides exactly. Several can leave it open, where mixtures of paths keep them and no path was met
-that does. Then it is sought by labels, vectors of what beginnings of paths take, as far as they may
-become one.
+that does. Then it is sought by labels, vectors of what beginnings of paths take (`_labels`); these
+also close the gap of a sum, where they are asked to.
 """
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
-from heapq import heappop, heappush
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,14 +21,17 @@ from scipy.sparse.csgraph import dijkstra
 
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import InfeasibleError, NothingFoundError, SolverError
+from seqopt.graph._labels import LabelSearch, cheapest_within, ground
 from seqopt.graph.duality import ROUNDING, least_sum
+from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import TIED, distances, tied
+from seqopt.graph.paths import TIED, tied
 
 ROUNDS = 60  # of cutting planes
 CLOSED = 1e-9  # share of a value to which prices are the best
 DEAREST = 1e6  # largest price, over what a path takes per unit of the budget
-LABELS = 20_000  # that are continued at most
+LABELS = 20_000  # that are kept at a time at most
+NONE = LabelSearch(None, np.inf, -np.inf)
 
 
 class Within(NamedTuple):
@@ -58,20 +59,28 @@ class _Path(NamedTuple):
     amounts: Floats  # of its moves
 
 
-def within_budgets(graph: Graph, caps: Sequence[float]) -> Within:
+def within_budgets(
+    graph: Graph, caps: Sequence[float], watch: Watch | None = None, most: int = 0
+) -> Within:
     """Return a path that is good in one goal after the other, its last columns within caps.
+
+    ``most``: how many labels may close what multipliers leave open of a sum; ``watch``: says when
+    to stop, and is told the values and bounds of the first goal.
 
     Raises `InfeasibleError` if prices prove that no path is within all caps; `NothingFoundError` if
     that is open, and none was found.
     """
-    goals = len(graph.peaks) - len(caps)
+    watch, goals = watch or Watch(), len(graph.peaks) - len(caps)
     limited = [*zip(range(goals, len(graph.peaks)), caps, strict=True)]
     bounds, prices, best = [], [], _some_path(graph, caps)
     for goal in range(goals):
         if graph.peaks[goal]:
             bound, price, way = _least_worst(graph, goal, limited)
         else:
-            found = _least_sum(graph, graph.amounts[:, goal], limited)
+            told = watch if not goal else None
+            found = _least_sum(graph, graph.amounts[:, goal], limited, told)
+            if most:
+                found = _by_labels(graph, goal, limited, found, told or Watch(watch.left), most)
             bound, price, way = found.bound, found.prices, _path(graph, found.moves)
         best = _better(graph, goal, way, best)
         taken = _taken(graph, best)[goal]
@@ -97,53 +106,34 @@ def _some_path(graph: Graph, caps: Sequence[float]) -> _Path:
     if path is not None:
         return path
     if found.bound <= _rounding(graph, found.prices, caps):
-        path = _path(graph, _by_labels(graph, limited, found.prices))
+        nothing, most = np.zeros(len(graph.source)), [tied(cap) for cap in caps]
+        asked = ground(graph, nothing, graph.amounts[:, goals:], most, found.prices)
+        met = cheapest_within(asked, NONE, Watch(), LABELS, any_path=True)
+        path = _path(graph, met.moves)
+        if path is None and np.isfinite(met.bound):
+            raise NothingFoundError(
+                "mixtures of plans are within all budgets, and no plan was found that is; raise one"
+            )
     if path is None:
         raise InfeasibleError("no path is within all budgets")
     return path
 
 
-def _by_labels(graph: Graph, limited: Sequence[tuple[int, float]], prices: Floats) -> Ints | None:
-    """Return the moves of a path within caps, that of least price first; None if there is none.
-
-    Raises `NothingFoundError` if it ends before that is known.
-    """
-    amounts = graph.amounts[:, [c for c, _ in limited]]
-    caps, priced = np.array([tied(cap) for _, cap in limited]), amounts @ prices
-    left = np.column_stack([distances(graph, costs, back=True) for costs in amounts.T])
-    to_go = distances(graph, priced, back=True)
-    starts = np.searchsorted(graph.source, np.arange(graph.states + 1))
-    count, kept = itertools.count(), dict[int, Floats]()
-    heap = [(to_go[0], next(count), 0, -1, -1, np.zeros(len(caps)))]
-    labels = list[tuple[int, int]]()  # which one each continues, and by which move
-    while heap and len(labels) < LABELS:
-        least, _, state, before, move, taken = heappop(heap)
-        others = kept.get(state, np.zeros((0, len(caps))))
-        if (others <= taken).all(axis=1).any():
-            continue
-        kept[state] = np.vstack([others, taken])
-        labels.append((before, move))
-        if graph.ends[state]:
-            return _moves_to(labels)
-        for onward in range(starts[state], starts[state + 1]):
-            to, then = int(graph.target[onward]), taken + amounts[onward]
-            if (then + left[to] <= caps).all():
-                bound = least - to_go[state] + priced[onward] + to_go[to]
-                heappush(heap, (bound, next(count), to, len(labels) - 1, onward, then))
-    if heap:
-        raise NothingFoundError(
-            "mixtures of plans are within all budgets, and no plan was found that is; raise one"
-        )
-    return None
-
-
-def _moves_to(labels: Sequence[tuple[int, int]]) -> Ints:
-    """Return the moves that lead to the last label, by which each continues another one."""
-    out, (before, move) = list[int](), labels[-1]
-    while move >= 0:
-        out.append(move)
-        before, move = labels[before]
-    return np.array(out[::-1], dtype=np.int64)
+def _by_labels(
+    graph: Graph,
+    goal: int,
+    limited: Sequence[tuple[int, float]],
+    found: _Found,
+    watch: Watch,
+    most: int,
+) -> _Found:
+    """Return what labels find beyond what multipliers prove of a sum."""
+    columns, caps = [c for c, _ in limited], [tied(cap) for _, cap in limited]
+    costs = graph.amounts[:, goal]
+    asked = ground(graph, costs, graph.amounts[:, columns], caps, found.prices)
+    known = np.inf if found.moves is None else float(costs[found.moves].sum())
+    met = cheapest_within(asked, LabelSearch(found.moves, known, found.bound), watch, most)
+    return found._replace(moves=met.moves, bound=met.bound)
 
 
 def _rounding(graph: Graph, prices: Floats, caps: Floats | Sequence[float]) -> float:
@@ -192,7 +182,9 @@ def _least_worst(
     return float(levels[min(proven, len(levels) - 1)]), prices, way
 
 
-def _least_sum(graph: Graph, costs: Floats, limited: Sequence[tuple[int, float]]) -> _Found:
+def _least_sum(
+    graph: Graph, costs: Floats, limited: Sequence[tuple[int, float]], watch: Watch | None = None
+) -> _Found:
     """Return the cheapest path within caps that prices lead to, and what they prove.
 
     Where no path is within them, a bound above that of any path says so: infinite, or positive
@@ -214,6 +206,10 @@ def _least_sum(graph: Graph, costs: Floats, limited: Sequence[tuple[int, float]]
         if (over <= 0).all() and cost < best:
             best, moves = cost, way
         planes.append((cost, over))
+        if watch is not None:
+            watch.tell(best, proven.bound)
+            if watch.over:
+                break
         prices, highest = _next_prices(planes, caps)
         if highest <= proven.bound + CLOSED * abs(proven.bound) or best <= tied(proven.bound):
             break

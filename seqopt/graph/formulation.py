@@ -215,6 +215,8 @@ class Formulation:
         What it is given: layers, states, orders, scenarios.
     also : tuple of On, optional
         What else it can be given.
+    alone : bool, optional
+        Whether it is charged by ranks among the moves from one state, `Graph.alone`.
 
     Examples
     --------
@@ -234,6 +236,7 @@ class Formulation:
     windowed: tuple[tuple[str, int | str], ...] | None = None
     on: On = On.LAYERS
     also: tuple[On, ...] = ()
+    alone: bool = False
 
     def __repr__(self) -> str:
         what = f"least {LEAST[self.aim]} of the costs" if self.aim else f"on {self.on.value}"

@@ -29,6 +29,12 @@ class Graph(FrozenValue):
         By goal: whether the largest amount on a path counts, or their sum.
     ends : (n,) bool
         The states in which a build may end.
+    caps : tuple of float, optional
+        What the sums of as many last columns may be at most.
+    alone : (m, 2) float, optional
+        What a search is charged that looks at the moves from one state alone, in two parts: what
+        depends on the next state only, and what is shared with the move before (ranks are those
+        among the moves from this state). By default the first amount.
 
     Raises
     ------
@@ -41,6 +47,8 @@ class Graph(FrozenValue):
     amounts: Floats
     peaks: tuple[bool, ...]
     ends: Bools
+    caps: tuple[float, ...] = ()
+    alone: Floats | None = None
 
     def __post_init__(self) -> None:
         sums = self.amounts[:, [not peak for peak in self.peaks]]
@@ -54,8 +62,9 @@ class Graph(FrozenValue):
         codes = self.source.astype(np.int64) * self.states + self.target
         if (np.diff(codes) < 0).any():
             order = np.argsort(codes, kind="stable")
-            for name in ("source", "target", "amounts"):
-                object.__setattr__(self, name, getattr(self, name)[order])
+            for name in ("source", "target", "amounts", "alone"):
+                if getattr(self, name) is not None:
+                    object.__setattr__(self, name, getattr(self, name)[order])
         for name in ("source", "target"):  # as csgraph wants them
             object.__setattr__(self, name, np.ascontiguousarray(getattr(self, name)))
         super().__post_init__()
@@ -72,8 +81,12 @@ class Graph(FrozenValue):
         """Return the graph with some of its moves, (m,) bool; all its states stay."""
         if kept.all():
             return self
+        alone = None if self.alone is None else self.alone[kept]
         return self._with(
-            source=self.source[kept], target=self.target[kept], amounts=self.amounts[kept]
+            source=self.source[kept],
+            target=self.target[kept],
+            amounts=self.amounts[kept],
+            alone=alone,
         )
 
     def bare(self, goal: int, states: Bools) -> Graph:
@@ -88,7 +101,19 @@ class Graph(FrozenValue):
             amounts=self.amounts[kept, goal : goal + 1],
             peaks=(self.peaks[goal],),
             ends=self.ends[states],
+            caps=(),
+            alone=None,
         )
+
+    @property
+    def goals(self) -> int:
+        """How many columns are to be made small, those with caps left out."""
+        return len(self.peaks) - len(self.caps)
+
+    def moves_from(self, state: int) -> slice:
+        """Return which moves lead from a state."""
+        first, last = np.searchsorted(self.source, np.array([state, state + 1], self.source.dtype))
+        return slice(int(first), int(last))
 
     def _with(self, **changed: object) -> Graph:
         """Return the graph with parts of what was checked: it is not checked again."""

@@ -9,7 +9,7 @@ first, and more of it each time: what is left without a path there is a cut.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -137,6 +137,28 @@ def distances(graph: Graph, costs: Floats, *, back: bool = False) -> Floats:
     if not len(ends):
         return np.full(graph.states, np.inf)
     return np.asarray(dijkstra(matrix.T.tocsr(), indices=ends, min_only=True))
+
+
+def moves_out(graph: Graph, states: Ints) -> tuple[Ints, Ints]:
+    """Return the moves that lead from states (n,): from which row each does, and its number."""
+    numbers = np.arange(graph.states + 1).astype(graph.source.dtype)
+    starts = np.searchsorted(graph.source, numbers)
+    first, count = starts[states], starts[states + 1] - starts[states]
+    row = np.repeat(np.arange(len(states)), count)
+    return row, np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + first[row]
+
+
+def moves_along(graph: Graph, path: Sequence[int]) -> Ints:
+    """Return the moves of a path, its start left out, the first ones of those side by side."""
+    codes = graph.source.astype(np.int64) * graph.states + graph.target
+    states = np.array((0, *path), dtype=np.int64)
+    return np.asarray(np.searchsorted(codes, states[:-1] * graph.states + states[1:]))
+
+
+def path_values(graph: Graph, path: Sequence[int]) -> tuple[float, ...]:
+    """Return what every column takes of a path: its sum, or its largest amount."""
+    taken = graph.amounts[moves_along(graph, path)]
+    return tuple(np.where(graph.peaks, taken.max(axis=0, initial=0.0), taken.sum(axis=0)).tolist())
 
 
 def fewest_moves(graph: Graph) -> tuple[int, ...]:

@@ -12,17 +12,11 @@ from functools import cached_property
 import numpy as np
 
 from seqopt._showing import Shown
-from seqopt.arrays import Bools, Floats, FrozenValue
+from seqopt.arrays import Floats, FrozenValue
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import Recipe, recipe_of
 from seqopt.errors import InfeasibleError, MechanismError, ProblemError, SolverError
-from seqopt.graph.layers.costs import (
-    Budget,
-    LayeredCosts,
-    _array_by_array,
-    _least_path,
-    _least_to_go,
-)
+from seqopt.graph.layers.costs import Budget, LayeredCosts, _array_by_array
 from seqopt.graph.layers.layers import Layers
 from seqopt.problem.problem import Aim, RobustAim
 from seqopt.problem.requirements import ResponsesAsked
@@ -154,88 +148,6 @@ def _require_sendable(tasks: Sequence[_ScenarioTask], crew: Crew | None) -> None
 
 
 Choice = tuple[int, ...]
-BETTER = 1e-12  # by which a value is better than another, over the size of both
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class ScenarioArcs(FrozenValue):
-    """Costs of pairs in all scenarios.
-
-    ``arcs`` (tuple of (S, C_{k-1}, C_k) float): what a pair and its later choice cost together;
-    zero where they are not allowed; ``shut`` (tuple of (C_{k-1}, C_k) bool): which pairs are not
-    allowed in some scenario.
-    """
-
-    aim: RobustAim
-    arcs: tuple[Floats, ...]
-    shut: tuple[Bools, ...]
-
-    @property
-    def scenarios(self) -> int:
-        """How many there are."""
-        return len(self.arcs[0])
-
-    def totals(self, choice: Sequence[int]) -> Floats:
-        """Return the total (S,) of an allowed choice in every scenario."""
-        before = (0, *choice[:-1])
-        parts = [arc[:, i, j] for arc, i, j in zip(self.arcs, before, choice, strict=True)]
-        return np.asarray(np.sum(parts, axis=0))
-
-    def to_go(self, weights: Floats) -> tuple[list[Floats], list[Floats]]:
-        """Return weighted costs of pairs, and the least from every candidate to the last move.
-
-        ``weights`` (S,). Results: ``costs`` (list of (C_{k-1}, C_k) float): infinite for pairs that
-        are not allowed; ``to_go`` (list of (C_{k-1},) float): one more than there are moves: of the
-        start, and after every move.
-        """
-        costs = [
-            np.where(shut, np.inf, np.tensordot(weights, arc, 1))
-            for arc, shut in zip(self.arcs, self.shut, strict=True)
-        ]
-        return costs, _least_to_go(costs)
-
-    def cheapest(self, weights: Floats) -> tuple[Choice, float]:
-        """Return the choice of least total by weights (S,), and that total."""
-        costs, rest = self.to_go(weights)
-        return _least_path(costs, rest), float(rest[0][0])
-
-    def improved(self, choice: Choice) -> tuple[Choice, float]:
-        """Return what a choice becomes by changing the one move that helps most, again and again.
-
-        ``choice``: an allowed one. Results: ``value``: what the aim makes of its totals.
-        """
-        while True:
-            totals = self.totals(choice)
-            value = self.aim.value(totals)
-            found = [self._changed(choice, totals, k) for k in range(len(choice))]
-            k = int(np.argmin([worth for _, worth in found]))
-            candidate, worth = found[k]
-            if not worth < value - BETTER * max(abs(value), abs(worth)):
-                return choice, value
-            choice = (*choice[:k], candidate, *choice[k + 1 :])
-
-    def _changed(self, choice: Choice, totals: Floats, k: int) -> tuple[int, float]:
-        """Return the best candidate of one move, the others staying, and what it is worth."""
-        before = choice[k - 1] if k else 0
-        to, shut = self.arcs[k][:, before, :], self.shut[k][before]
-        if k + 1 < len(choice):
-            to = to + self.arcs[k + 1][:, :, choice[k + 1]]
-            shut = shut | self.shut[k + 1][:, choice[k + 1]]
-        worth = self.aim.each((totals[:, None] - to[:, [choice[k]]] + to).T)
-        worth[shut] = np.inf
-        best = int(np.argmin(worth))
-        return best, float(worth[best])
-
-
-def scenario_arcs(layers: Sequence[LayeredCosts], aim: RobustAim) -> ScenarioArcs:
-    """Return the costs of pairs in all scenarios, of the same moves in each."""
-    arcs, shut = [], []
-    for k in range(len(layers[0].single)):
-        both = np.stack([each.single[k] + each.shared[k] for each in layers])
-        closed = np.asarray(~np.isfinite(both).all(axis=0))
-        arcs.append(np.where(closed, 0.0, both))
-        shut.append(closed)
-    return ScenarioArcs(aim, tuple(arcs), tuple(shut))
 
 
 @dataclass(frozen=True, repr=False)
@@ -317,10 +229,6 @@ class ScenarioLayers(Shown):
     def peaks(self) -> LayeredCosts:
         """The largest costs in any scenario: their largest over a build is that over scenarios."""
         return largest_of(self.layered(Aim.PEAK))
-
-    def conditional(self, move: int, before: int) -> Floats:
-        """Return the shared costs of a move's candidates, the choice before being made, (C_k,)."""
-        return np.asarray(self.peaks.shared[move][before])
 
     def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
         """Return the nodes that a choice stands for; see `Layers.nodes`."""

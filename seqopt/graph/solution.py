@@ -1,36 +1,12 @@
-"""What formulations return: a choice of candidates, or a path of states; claimed, not proven."""
+"""What formulations return: a path of states, and what they claim of it; nothing is proven yet."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from seqopt.arrays import Floats, FrozenValue, Ints
-from seqopt.graph.formulation import End, Finding
+from seqopt.graph.formulation import Finding
 from seqopt.graph.graph import LabelProof
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Selection(FrozenValue):
-    """A candidate per move, and what the formulation claims about it.
-
-    ``choice``: index of the chosen node among each move's candidates, from 0; ``objective``:
-    claimed value, in the unit of the criterion; ``bound``: claimed lower bound, budgets included;
-    minus infinity if none; ``prices``: dual value of each budget: the rate at which one more unit
-    would lower the bound; ``compile_seconds``: part of the time to solve that went into writing the
-    program down for a solver, s; ``end``: whether it ended early; ``trace``: what it knew at which
-    time: choices and bounds.
-    """
-
-    choice: tuple[int, ...]
-    objective: float
-    bound: float = -np.inf
-    prices: Mapping[str, float] = field(default_factory=dict)
-    compile_seconds: float = 0.0
-    end: End = End.DONE
-    trace: tuple[Finding, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,7 +25,8 @@ class StatePath(FrozenValue):
     robot of the scene holds, 0 for none; ``proofs``: of the makespan and the goals after it, of all
     goals where there are budgets; ``starts``, ``ends``: where mortar cures, when steps start, s,
     and the last one ends; ``motions``: by which labels there are a proof: states fall in them, (b,
-    6) in m and rad.
+    6) in m and rad; ``trace``: what the first goal was known to be at which time;
+    ``compile_seconds``: part of the time that went into writing a program down for a solver, s.
     """
 
     states: tuple[tuple[int, ...], ...]
@@ -63,3 +40,5 @@ class StatePath(FrozenValue):
     starts: tuple[float, ...] = ()
     ends: float = 0.0
     motions: tuple[Floats, ...] = field(default=(), repr=False)
+    trace: tuple[Finding, ...] = field(default=(), compare=False, repr=False)
+    compile_seconds: float = field(default=0.0, compare=False)

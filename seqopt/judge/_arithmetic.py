@@ -13,7 +13,7 @@ import numpy as np
 from seqopt._files import parse_json, read_text
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError, SolverError
-from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _Target, _target_sums
+from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _Target, _target_sums
 from seqopt.judge._claims import ABOVE, Claim, first_stage, next_stage, proven, within_caps
 from seqopt.judge._twin import twin_of
 from seqopt.judge.certificate import TOLERANCE, Certificate
@@ -322,7 +322,7 @@ def _bounds(
     stage, out, said = first_stage(instance), list[float](), list[float]()
     for k, (goal, value) in enumerate(zip(instance.goals, values, strict=True)):
         claim = claims[k] if k < len(claims) else Claim()
-        bound = proven(instance, stage, goal, claim)
+        bound = proven(instance, stage, goal, claim, value)
         if _lays_down(instance, claim) and bound < value - BELOW * abs(value):
             bound = max(bound, within_caps(instance, value, claim.prices))
         bare = claim.potentials is None and claim.cut is None

@@ -17,14 +17,11 @@ import numpy as np
 
 from seqopt.arrays import Floats, FrozenValue, Ints
 from seqopt.errors import SolverError
-from seqopt.graph._budgets import _least_sum, _least_worst
 from seqopt.graph.duality import ROUNDING, cut, least_sum
 from seqopt.graph.graph import Graph
-from seqopt.graph.instances.instance import PEAK, SUM, TAIL, Instance, _Target
-from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
+from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _Target
 from seqopt.graph.paths import TIED, tied
-from seqopt.judge._budget_proof import least_within
+from seqopt.judge._budget_proof import case_of, least_within
 from seqopt.judge._twin import twin_of
 from seqopt.problem.problem import Measure
 
@@ -78,8 +75,10 @@ def next_stage(stage: Stage, goal: _Target, value: float) -> Stage:
     return stage  # what is left out of account makes a bound no higher
 
 
-def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim) -> float:
+def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim, value: float) -> float:
     """Return what a claim proves of a goal, or the judge itself where it gives no proof.
+
+    ``value``: of a path; no higher bound is looked for.
 
     Raises `SolverError` where a potential, a weight or a share breaks what it has to keep.
     """
@@ -89,7 +88,7 @@ def proven(instance: Instance, stage: Stage, goal: _Target, claim: Claim) -> flo
     if goal.kind == SUM:
         costs = stage.graph.amounts[:, goal.columns[0]]
         if not claim.prices and claim.potentials is None:
-            return _own_sum(stage, goal)
+            return _own_sum(stage, goal, value)
     elif goal.kind == TAIL:
         costs = stage.graph.amounts[:, list(goal.columns)] @ _weights(goal, claim)
     else:
@@ -142,15 +141,21 @@ def _kept(graph: Graph, costs: Floats, potentials: Floats) -> float:
     return float(potentials[graph.ends].min(initial=np.inf))
 
 
-def _own_sum(stage: Stage, goal: _Target) -> float:
+def _own_sum(stage: Stage, goal: _Target, value: float) -> float:
     """Return what a sum is at least, by prices that the judge finds."""
     costs = stage.graph.amounts[:, goal.columns[0]]
     if not stage.limited:
         return least_sum(stage.graph, costs)
-    found = _least_sum(stage.graph, costs, [(c, most) for _, c, most in stage.limited])
-    prices = np.maximum(found.prices, 0.0)
+    prices = _own_prices(stage, costs, value)
     pairs = zip(prices.tolist(), stage.limited, strict=True)
     return _sum(stage, costs, Claim(), [(price, c, most) for price, (_, c, most) in pairs])
+
+
+def _own_prices(stage: Stage, costs: Floats, value: float) -> Floats:
+    """Return multipliers of what is limited whose bound on a sum is high, at most some value."""
+    case, sizes = case_of(stage.graph, costs, [(c, most) for _, c, most in stage.limited], value)
+    found = least_within(case, np.zeros(len(sizes)), laid_down=False)[1]
+    return np.asarray(found / sizes)
 
 
 def within_caps(instance: Instance, value: float, prices: Mapping[str, float]) -> float:
@@ -158,37 +163,11 @@ def within_caps(instance: Instance, value: float, prices: Mapping[str, float]) -
 
     Partial paths are laid down from the end, as where grips are chosen in layers.
     """
-    return least_within(as_layers(instance), value, prices, max(abs(value), 1e-300))
-
-
-def as_layers(instance: Instance) -> CostProblem:
-    """Return a layered instance with one goal as the costs of candidates, level by level."""
-    columns = [instance.goals[0].columns[0], *(cap.column for cap in instance.caps)]
-    levels, last = instance.levels, int(instance.levels.max())
-    first = np.searchsorted(levels, np.arange(last + 2))
-    own = levels[instance.target]
-    costs = list[list[Floats]]()
-    for k, column in enumerate(columns):
-        parts = []
-        for level in range(1, last + 1):
-            shape = first[level] - first[level - 1], first[level + 1] - first[level]
-            pair = np.full(shape, 0.0 if k else np.inf)
-            arcs = np.flatnonzero(own == level)
-            rows = instance.source[arcs] - first[level - 1]
-            pair[rows, instance.target[arcs] - first[level]] = instance.amounts[arcs, column]
-            parts.append(pair)
-        costs.append(parts)
-    single = tuple(_nothing(part, costs[0]) for part in costs[0])
-    pairs = zip(instance.caps, costs[1:], strict=True)
-    none = tuple(np.zeros(part.shape[1]) for part in costs[0])
-    caps = tuple(Budget(cap.name, none, tuple(own), cap.most) for cap, own in pairs)
-    return CostProblem(LayeredCosts(single, tuple(costs[0])), caps)
-
-
-def _nothing(part: Floats, parts: Sequence[Floats]) -> Floats:
-    """Return costs of candidates alone that add nothing, and of which none is the largest."""
-    least = min(float(each.min()) for each in parts)
-    return np.full(part.shape[1], min(0.0, least))
+    limited = [(cap.column or 0, cap.most) for cap in instance.caps]
+    costs = instance.amounts[:, instance.goals[0].columns[0]]
+    case, sizes = case_of(instance.graph, costs, limited, value)
+    begin = np.array([prices.get(cap.name, 0.0) for cap in instance.caps]) * sizes
+    return least_within(case, begin, laid_down=True)[0]
 
 
 def _peak(
@@ -204,12 +183,30 @@ def _peak(
         return claim.value if _sum(part, nothing, claim, limited) > 0 else -np.inf
     if stage.limited:
         asked = [(c, most) for _, c, most in stage.limited]
-        bound, prices, _ = _least_worst(graph, column, asked)
-        pairs = zip(np.maximum(prices, 0.0).tolist(), asked, strict=True)
+        bound, prices = _worst_within(graph, column, asked)
+        pairs = zip(prices.tolist(), asked, strict=True)
         again = [(price, c, most) for price, (c, most) in pairs]
         least = _peak(stage, goal, Claim(bound), again)
         return max(least, cut(graph, column, np.inf)[0])
     return cut(graph, column, np.inf)[0]
+
+
+def _worst_within(
+    graph: Graph, column: int, limited: Sequence[tuple[int, float]]
+) -> tuple[float, Floats]:
+    """Return the largest amount below which multipliers leave no path within caps, and these."""
+    levels, prices = np.unique(graph.amounts[:, column]), np.ones(len(limited))
+    low, high = 0, len(levels)
+    while low < high:
+        middle = (low + high) // 2
+        part = graph.only(graph.amounts[:, column] <= levels[middle])
+        case, sizes = case_of(part, np.zeros(len(part.source)), limited, 1.0)
+        bound, found = least_within(case, np.ones(len(limited)), laid_down=False)
+        if bound < 1.0:
+            high = middle
+        else:
+            low, prices = middle + 1, found / sizes
+    return float(levels[min(low, len(levels) - 1)]), prices
 
 
 def _left(graph: Graph, column: int, inside: Ints) -> float:

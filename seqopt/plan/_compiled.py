@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from importlib.metadata import version
-from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -17,13 +16,14 @@ from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph._timed import TimedGraph
 from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.graph.graph import Graph
-from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _by_goal, _Cap, _Target
+from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _by_goal, _Cap, _Target
+from seqopt.graph.layers.compiled import on_paths
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.orders import MOST_PARTS, AllOrders, OrderStates
-from seqopt.graph.paths import distances, reached
 from seqopt.graph.scenarios import ScenarioLayers
 from seqopt.graph.states._visits import FreeStates, ScenarioSums
 from seqopt.graph.states.states import States
+from seqopt.plan._layers import compiled
 from seqopt.plan.solving import graph_of, natural, usual
 from seqopt.problem.problem import Aim, Measure, Problem, RobustAim
 from seqopt.sequence._robot_kinds import node_numbers
@@ -94,42 +94,14 @@ def _usual_aim(problem: Problem) -> Aim | None:
 
 def _of_layers(name: str, graph: Layers | ScenarioLayers, aim: Aim | None) -> Instance:
     """Return the instance of candidates: a level for every move."""
-    if isinstance(graph, ScenarioLayers) and graph.aim.aim is Aim.SUM:
-        columns = [layers.arcs() for layers in graph.layered(Aim.SUM)]
-        goal = _tail(graph.aim, len(columns))
-    else:
-        aim = aim or Aim.SUM
-        costs = aim.costs(graph)
-        pairs = zip(costs.shared, costs.single, strict=True)
-        joined = np.add if aim is Aim.SUM else np.maximum
-        columns = [[joined(shared, single) for shared, single in pairs]]
-        over = f" ({graph.aim})" if isinstance(graph, ScenarioLayers) else ""
-        said, kind = ("minmax", PEAK) if aim is Aim.PEAK else ("least sum", SUM)
-        goal = _Target(f"{said}{over}", kind, (0,))
-    budgets = [budget for budget in graph.budgets if np.isfinite(budget.bound)]
-    caps = [_Cap(b.name, len(columns) + k, float(b.bound)) for k, b in enumerate(budgets)]
-    names = [f"cost {k}" if len(columns) > 1 else "cost" for k in range(len(columns))]
-    columns += [budget.amounts.arcs() for budget in budgets]
     nominal = graph.nominal if isinstance(graph, ScenarioLayers) else graph
     nominal.require_possible()
-    moves = nominal.schedule.moves
-    states = [(0, 0)] + [(k, c) for k, move in enumerate(moves, 1) for c in move.candidates]
-    firsts = [0, *accumulate((len(move.candidates) for move in moves), initial=1)]
-    sources, targets, amounts = [], [], []
-    for k in range(len(moves)):
-        every = np.stack([column[k] for column in columns])
-        before, now = np.nonzero(np.isfinite(every).all(axis=0))
-        sources.append(before + firsts[k])
-        targets.append(now + firsts[k + 1])
-        amounts.append(every[:, before, now].T)
-    ends = np.arange(len(states)) >= firsts[len(moves)]
-    flags = tuple(c in goal.columns and goal.kind == PEAK for c in range(len(columns)))
-    source, target = (np.concatenate(each).astype(np.int32) for each in (sources, targets))
-    whole = Graph(source, target, np.concatenate(amounts), flags, ends)
-    found, kept = _useful(whole)
-    names += [budget.name for budget in budgets]
-    rows = np.array(states, dtype=np.int64)[kept]
-    return _instance(name, found, (names, (goal,), tuple(caps)), rows)
+    found = compiled(graph, aim, name)
+    if found.offset:
+        raise ProblemError(
+            f"instance {name}: a cost is below zero; ask for a criterion that is never negative"
+        )
+    return found.instance
 
 
 def _tail(aim: RobustAim, count: int) -> _Target:
@@ -161,7 +133,7 @@ def _of_states(name: str, graph: States | AllOrders, below: float) -> Instance:
         every = [k for k, goal in enumerate(states.goals) if goal.measure is not Measure.MAKESPAN]
         peaks = tuple(whole.peaks[k] for k in every)
         whole = Graph(whole.source, whole.target, whole.amounts[:, every], peaks, whole.ends)
-    small, kept = _useful(whole)
+    small, kept = on_paths(whole)
     if timed is not None:
         timed = _cut(timed, whole, kept, _by_goal(small, asked[1:]))
     return _instance(name, small, asked, rows[kept], timed)
@@ -209,19 +181,6 @@ def _rows(graph: States | AllOrders, visited: Visited) -> Ints:
             named = np.where(held > 0, numbers[held.clip(min=0)], 0)
             parts.append(np.column_stack([np.full(len(held), level), named]))
     return np.concatenate(parts)
-
-
-def _useful(graph: Graph) -> tuple[Graph, Ints]:
-    """Return the graph of nodes and arcs on paths from the start to ends, and which nodes."""
-    ahead = np.isfinite(distances(graph, np.ones(len(graph.source)), back=True))
-    on = reached(graph) & ahead
-    if not on[0]:
-        raise InfeasibleError("no path leads to an end")
-    arcs = _arcs_between(graph, on)
-    number = np.cumsum(on) - 1
-    source, target = (number[each[arcs]].astype(np.int32) for each in (graph.source, graph.target))
-    kept = np.flatnonzero(on)
-    return Graph(source, target, graph.amounts[arcs], graph.peaks, graph.ends[on]), kept
 
 
 def _arcs_between(graph: Graph, on: Bools) -> Bools:

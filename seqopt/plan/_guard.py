@@ -8,27 +8,22 @@ from __future__ import annotations
 
 import hashlib
 import operator
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from functools import cached_property, partial
+from functools import cached_property
 from numbers import Real
 from typing import Any, TypeVar
 
 import numpy as np
 
-from seqopt._interrupts import answered
 from seqopt.arrays import Floats, Ints
-from seqopt.errors import InfeasibleError, ProblemError, SeqoptError, SolverError, message_of
-from seqopt.graph.formulation import WATCH, End, Formulation, Watch, as_formulation, formulations
+from seqopt.errors import ProblemError, SeqoptError, SolverError, message_of
+from seqopt.graph.formulation import Formulation, formulations
 from seqopt.graph.graph import LabelProof
-from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import PlacementProblem
-from seqopt.graph.scenarios import ScenarioLayers, largest_of
-from seqopt.graph.solution import Selection, StatePath
-from seqopt.judge.certificate import least_sum
-from seqopt.problem.problem import Aim
+from seqopt.graph.layers.costs import Budget
+from seqopt.graph.solution import StatePath
 from seqopt.scene._checks import LARGEST_NUMBER, short
 
 Result = TypeVar("Result")
@@ -170,7 +165,10 @@ def with_numbers(name: str, found: StatePath, goals: int) -> StatePath:
         starts, motions = tuple(map(float, found.starts)), tuple(map(_motion, found.motions))
         timed = starts, float(found.ends), motions
         told = (visited, prices, text(found.stopped), grips, proofs, *timed)
-        return StatePath(states, objective, bound, *told)
+        seconds = float(found.compile_seconds)
+        if not 0 <= seconds < np.inf:
+            raise ValueError(f"compile_seconds is {seconds}")
+        return StatePath(states, objective, bound, *told, compile_seconds=seconds)
 
 
 def _whole(given: object) -> int:
@@ -205,18 +203,13 @@ def _arrays(proof: LabelProof) -> LabelProof:
 
 
 def require_fit(
-    problem: PlacementProblem, formulation: Formulation | str, options: Mapping[str, object]
+    budgets: Sequence[Budget], formulation: Formulation, options: Mapping[str, object]
 ) -> None:
-    """Raise an error unless a formulation can solve a problem and has the given options.
-
-    Raises `ProblemError` if the problem has budgets that the formulation does not take, or an
-    option is not its own.
-    """
-    formulation = as_formulation(formulation)
-    if problem.budgets and not formulation.takes_budgets:
+    """Raise a `ProblemError` unless a formulation takes budgets, if any, and has given options."""
+    if budgets and not formulation.takes_budgets:
         able = [name for name, other in formulations(formulation.on).items() if other.takes_budgets]
         raise ProblemError(
-            f"{formulation.name}: the budget {problem.budgets[0].name!r} couples all moves; "
+            f"{formulation.name}: the budget {budgets[0].name!r} couples all moves; "
             f"use {' or '.join(able)}"
         )
     formulation.require_options(options)
@@ -237,79 +230,3 @@ def require_proof(proof: object) -> None:
     """Raise a `ProblemError` where a lazy search is to leave out the proof, all it is for."""
     if not proof:
         raise ProblemError("a lazy search proves what it finds; leave out lazy, or ask for a proof")
-
-
-def select(
-    formulation: Formulation, problem: PlacementProblem, watch: Watch | None = None, **options: Any
-) -> Selection:
-    """Return the selection of a formulation, with numbers where numbers belong.
-
-    ``watch``: handed to the formulation if it takes one; the trace is read from it. An interrupt is
-    then told to it, so that the formulation ends with the best choice so far. ``**options``: of the
-    formulation. Result: claimed, not proven. Raises `ProblemError`, `SolverError` as the
-    formulation does; a `SolverError` also if it raises anything else, or returns something that is
-    no selection; `KeyboardInterrupt` if it was interrupted and no choice was at hand.
-    """
-    watch = watch or Watch()
-    ends = answered(watch.interrupt) if formulation.watched else nullcontext()
-    with ends, _infeasible_confirmed(problem, formulation):
-        return _with_numbers(formulation, _called(formulation, problem, watch, options), watch)
-
-
-def _called(
-    formulation: Formulation, problem: PlacementProblem, watch: Watch, options: dict[str, Any]
-) -> Selection:
-    told = {WATCH: watch} if formulation.watched else {}
-
-    def judged() -> tuple[object, ...]:
-        return _costs(formulation, problem), problem.budgets
-
-    solve = partial(formulation.solve, problem, **told, **options)
-    try:
-        return called(formulation.name, judged, Selection, solve)
-    except SolverError as error:
-        if watch.interrupted:
-            raise KeyboardInterrupt(str(error)) from error
-        raise
-
-
-def _costs(formulation: Formulation, problem: PlacementProblem) -> tuple[LayeredCosts, ...]:
-    """Return the costs that a formulation is given, of every scenario if totals over them count."""
-    if formulation.aim is not None:
-        return (formulation.aim.costs(problem),)
-    assert isinstance(problem, ScenarioLayers)  # what is for states has no such costs
-    return problem.layered(Aim.SUM)
-
-
-def _with_numbers(formulation: Formulation, found: Selection, watch: Watch) -> Selection:
-    """Return a selection with numbers where numbers belong, or raise a `SolverError`."""
-    with readable(formulation.name):
-        seconds, objective, bound = map(
-            float, (found.compile_seconds, found.objective, found.bound)
-        )
-        if not 0 <= seconds < np.inf:
-            raise ValueError(f"compile_seconds is {seconds}")
-        watch.tell(objective, bound)  # the trace ends with what is claimed
-        choice = tuple(operator.index(index) for index in found.choice)
-        prices = {str(name): float(price) for name, price in found.prices.items()}
-        end = End.INTERRUPTED if watch.interrupted else End(found.end)
-        return Selection(choice, objective, bound, prices, seconds, end, watch.trace)
-
-
-@contextmanager
-def _infeasible_confirmed(problem: PlacementProblem, formulation: Formulation) -> Iterator[None]:
-    """Say why there is no choice where a formulation says that there is none, if that is so."""
-    try:
-        yield
-    except InfeasibleError as error:
-        every = _costs(formulation, problem)
-        costs = every[0] if formulation.aim is not None else largest_of(every)
-        if not np.isfinite(least_sum(costs)):
-            costs.continuable()  # names the move
-        if problem.budgets:
-            from seqopt.plan._infeasible import refusal  # noqa: PLC0415  # seldom needed
-
-            raise refusal(problem, formulation.name, exact=formulation.looks_at_all) from None
-        raise SolverError(
-            f"formulation {formulation.name} says that no choice is allowed, and some are: {error}"
-        ) from None

@@ -17,16 +17,15 @@ from seqopt.engines.registry import recipe_of
 from seqopt.errors import InfeasibleError, NothingFoundError, SeqoptError, SolverError
 from seqopt.graph._budgets import within_budgets
 from seqopt.graph._explore import Explorer
-from seqopt.graph.layers.costs import Budget, LayeredCosts, _array_by_array, _where_allowed
-from seqopt.graph.layers.interface import CostProblem, PlacementProblem
+from seqopt.graph.duality import least_sum
+from seqopt.graph.instance import Instance, _Cap
 from seqopt.graph.paths import distances, least_peak, tied
 from seqopt.graph.scenarios import engine_for
 from seqopt.graph.states._visits import barred, explore
 from seqopt.graph.states.states import States
-from seqopt.judge._budget_proof import is_kept, least_within, too_small
+from seqopt.judge._budget_proof import case_of, is_kept, least_within
 from seqopt.judge._proof import Proof
 from seqopt.judge._twin import twin_of
-from seqopt.judge.certificate import least_sum
 from seqopt.plan._softer import HARD, _ground_moves, _softer, _whole_load
 from seqopt.plan.search._margin_search import WORST, StandingLook, bisected, with_margin
 from seqopt.problem.problem import LARGEST, STATE_RESPONSES, Goal, Measure
@@ -53,25 +52,26 @@ if TYPE_CHECKING:
 PROVEN = 1 - 1e-6  # of a choice that costs nothing and is said to cost this much: there is none
 
 
-def smallest_conflict(problem: PlacementProblem) -> tuple[Budget, ...]:
-    """Return as few budgets as possible that no choice keeps together.
+def smallest_conflict(instance: Instance) -> tuple[_Cap, ...]:
+    """Return as few caps of an instance as possible that no path keeps together.
 
-    ``problem``: its sums say which choices are allowed. Result: empty if no set of budgets is
-    proven to conflict.
+    Result: empty if no set of caps is proven to conflict.
     """
-    counts = range(1, len(problem.budgets) + 1)
-    sets = chain.from_iterable(combinations(problem.budgets, count) for count in counts)
-    return next((some for some in sets if _conflict(problem.sums, some)), ())
+    counts = range(1, len(instance.caps) + 1)
+    sets = chain.from_iterable(combinations(instance.caps, count) for count in counts)
+    return next((some for some in sets if _conflict(instance, some)), ())
 
 
-def _conflict(costs: LayeredCosts, budgets: tuple[Budget, ...]) -> bool:
-    """Return whether it is proven that no allowed choice keeps all budgets."""
-    return least_within(_of_budgets(costs, budgets), 1.0, {}, 1.0) >= PROVEN
+def _conflict(instance: Instance, caps: tuple[_Cap, ...]) -> bool:
+    """Return whether it is proven that no path keeps all of some caps."""
+    nothing = np.zeros(instance.arcs)
+    case, sizes = case_of(instance.graph, nothing, _limited(caps), 1.0)
+    bound, _ = least_within(case, np.zeros_like(sizes), laid_down=instance.is_layered)
+    return bound >= PROVEN
 
 
-def _of_budgets(costs: LayeredCosts, budgets: tuple[Budget, ...]) -> CostProblem:
-    """Return the problem of keeping budgets, at no cost."""
-    return CostProblem(_where_allowed(costs, _array_by_array(np.zeros_like, costs)), budgets)
+def _limited(caps: Sequence[_Cap]) -> list[tuple[int, float]]:
+    return [(cap.column, cap.most) for cap in caps if cap.column is not None]
 
 
 def claimed(name: str, why: str, *, exact: bool) -> InfeasibleError | NothingFoundError:
@@ -85,23 +85,27 @@ def claimed(name: str, why: str, *, exact: bool) -> InfeasibleError | NothingFou
     return NothingFoundError(f"{name} found none, and there may be one: {why}")
 
 
-def refusal(problem: PlacementProblem, name: str, *, exact: bool) -> SeqoptError:
-    """Return the error that says which budgets no choice keeps, or that this is claimed alone.
+def refusal(instance: Instance, name: str, *, exact: bool) -> SeqoptError:
+    """Return the error that says which caps no path keeps, or that this is claimed alone.
 
-    ``problem``: some choice is allowed, and it is said that none is within all budgets; ``name``,
-    ``exact``: of the formulation that says so, as of `claimed`. Result: a `SolverError` where one
-    is.
+    ``instance``: it is said that no path is within all its caps; ``name``, ``exact``: of the
+    formulation that says so, as of `claimed`. Result: a `SolverError` where one is.
     """
-    found = smallest_conflict(problem)
-    if not found and is_kept(_of_budgets(problem.sums, problem.budgets)):
+    found = smallest_conflict(instance)
+    if not found and instance.is_layered and is_kept(instance.graph, _limited(instance.caps)):
         return SolverError(
             f"formulation {name} says that no choice is within all budgets, and some are"
         )
     if not found:
         return claimed(name, "no choice is within all budgets; raise a bound", exact=exact)
     if len(found) == 1:
-        return too_small(found[0], least_sum(_where_allowed(problem.sums, found[0])))
-    named = [f"{budget.bound:.6g} of {budget.name!r}" for budget in found]
+        (cap,) = found
+        least = least_sum(instance.graph, instance.amounts[:, cap.column or 0])
+        return InfeasibleError(
+            f"no choice is within all budgets: every choice uses at least {least:.6g} of "
+            f"{cap.name!r}, more than {cap.most:.6g}; raise that bound"
+        )
+    named = [f"{cap.most:.6g} of {cap.name!r}" for cap in found]
     fewer = "each can alone" if len(found) == 2 else "any fewer of them can"
     return InfeasibleError(
         f"no choice is within all budgets: {', '.join(named[:-1])} and {named[-1]} cannot be kept "

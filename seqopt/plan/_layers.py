@@ -18,14 +18,15 @@ from seqopt.graph.formulation import (
     formulations,
     timed,
 )
-from seqopt.graph.layers.costs import Budget
-from seqopt.graph.layers.interface import PlacementProblem
+from seqopt.graph.layers.compiled import Compiled, compile_costs, compile_totals
+from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import Layers, _require_carried, steps_over, travel
-from seqopt.graph.scenarios import ScenarioLayers, engine_for
-from seqopt.graph.solution import Selection
+from seqopt.graph.scenarios import ScenarioLayers, engine_for, largest_of
+from seqopt.graph.solution import StatePath
 from seqopt.judge._shape_rules import check_shape
-from seqopt.judge.certificate import Certificate, _require_anew, certify_partial, judge
-from seqopt.plan._guard import readable, require_fit, require_proof, require_time, select
+from seqopt.judge.certificate import _require_anew, certify_partial
+from seqopt.plan._guard import require_fit, require_proof, require_time
+from seqopt.plan._paths import find_path
 from seqopt.plan.plan import Plan
 from seqopt.problem.criteria import Among
 from seqopt.problem.problem import Aim, AskedBudget
@@ -35,8 +36,8 @@ from seqopt.sequence._rule_check import check_carried
 from seqopt.sequence.steps import Step
 from seqopt.work._clock import INTERRUPT
 
-PROOF = "the proof"  # what it is called where there was no time for it
 CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, without budgets
+Choices = Layers | ScenarioLayers
 
 
 def with_budgets(problem: Layers, asked: Sequence[AskedBudget]) -> Layers:
@@ -51,47 +52,62 @@ def with_budgets(problem: Layers, asked: Sequence[AskedBudget]) -> Layers:
         else:
             budget = travel(problem, each.bound)
         if each.share:
-            free = best_choice(problem, Aim.SUM).choice
+            free = best_choice(problem.schedule.scene.name, problem.sums, Aim.SUM)
             budget = replace(budget, bound=each.bound * budget.spent(free))
         budgets.append(budget)
     return replace(problem, budgets=tuple(budgets)) if budgets else problem
 
 
-def best_choice(problem: PlacementProblem, aim: Aim) -> Selection:
-    """Return the best choice without budgets, judged; an interrupt ends more than this.
-
-    Raises `InfeasibleError` if no choice is allowed; `KeyboardInterrupt` if it was interrupted.
-    """
-    formulation = find_formulation(CHOOSES[aim])
-    found = select(formulation, problem)
-    if found.end is End.INTERRUPTED:
-        raise KeyboardInterrupt
-    judge(problem, found, formulation)
-    return found
-
-
-def solve_layers(graph: PlacementProblem, formulation: Formulation, run: Run) -> Plan:
+def solve_layers(graph: Choices, formulation: Formulation, run: Run) -> Plan:
     """Return the plan of a formulation of candidates, of one scene or over scenarios.
 
     Raises `InfeasibleError` if no choice is allowed; `ProblemError` if graph, formulation and
     options do not fit together; `SolverError` if an answer is not what is claimed.
     """
-    if not isinstance(getattr(graph, "budgets", None), tuple):
-        raise ProblemError(
-            f"a {type(graph).__name__} is not a problem; give one that seqopt.pose made"
-        )
-    require_fit(graph, formulation, run.options)
+    require_fit(graph.budgets, formulation, run.options)
     require_time(formulation, run.time_limit)
     require_time(formulation, run.clock.left)
     if isinstance(graph, Layers):
         graph.require_possible()
-    elif isinstance(graph, ScenarioLayers) and isinstance(graph.nominal, Layers):
+    else:
         _require_carried(graph.nominal.schedule, (graph.nominal.schedule.scene, *graph.scenes))
     if run.lazy:
         require_proof(run.proof)
         return _solve_lazily(graph, formulation, run)
-    solving = _solve_all if run.proof else _solve_windows
-    return solving(graph, formulation, run)
+    return (_solve_all if run.proof else _solve_windows)(graph, formulation, run)
+
+
+def compiled(graph: Choices, aim: Aim | None, name: str = "", *, alone: bool = False) -> Compiled:
+    """Return the graph of choices, of one scene or over scenarios, whose sums or peaks count.
+
+    ``alone``: whether with what a search of one move alone is charged.
+    """
+    nominal = graph.nominal if isinstance(graph, ScenarioLayers) else graph
+    name, nodes = name or nominal.schedule.scene.name, nominal.candidates
+    if isinstance(graph, ScenarioLayers) and graph.aim.aim is Aim.SUM:
+        layers = graph.layered(Aim.SUM)
+        largest_of(layers)  # says if no choice is allowed in all scenarios
+        return compile_totals(name, layers, graph.aim, nodes)
+    aim = aim or Aim.SUM
+    alone = graph.alone if alone and isinstance(graph, Layers) else None
+    found = compile_costs(name, aim.costs(graph), aim, graph.budgets, alone, nodes)
+    if isinstance(graph, Layers):
+        return found
+    (goal,) = found.instance.goals
+    named = goal._replace(name=f"{goal.name} ({graph.aim})")
+    return found._replace(instance=replace(found.instance, goals=(named,)))
+
+
+def best_choice(name: str, costs: LayeredCosts, aim: Aim) -> tuple[int, ...]:
+    """Return the best choice without budgets, judged; an interrupt ends more than this.
+
+    Raises `InfeasibleError` if no choice is allowed; `KeyboardInterrupt` if it was interrupted.
+    """
+    found = compile_costs(name, costs, aim)
+    path = find_path(found.instance, find_formulation(CHOOSES[aim]), Run())
+    if path.selection.stopped == INTERRUPT:
+        raise KeyboardInterrupt
+    return found.choice([node for (node,) in path.selection.states])
 
 
 def on_the_way(plan: Plan) -> Plan:
@@ -104,33 +120,28 @@ def on_the_way(plan: Plan) -> Plan:
     return plan
 
 
-def _solve_all(graph: PlacementProblem, formulation: Formulation, run: Run) -> Plan:
+def _solve_all(graph: Choices, formulation: Formulation, run: Run) -> Plan:
     """Return the certified plan of a formulation that is given the costs of all choices."""
-    seconds: dict[str, float] = {}
     with run.clock.needed("computing the responses of all choices"):
         stages = graph.seconds(formulation.aim or Aim.SUM)  # of costs: solving is timed alone
-    with timed(seconds, "solve"):
-        selection = select(formulation, graph, Watch(run.left, run.progress), **run.options)
-    seconds["compile"] = selection.compile_seconds
-    seconds["solve"] -= selection.compile_seconds
-
-    def proven() -> Certificate:
-        for layers in _from_cache(graph):
-            _require_anew(layers, selection.choice)
-        return judge(graph, selection, formulation)
-
+        found = compiled(graph, formulation.aim, alone=formulation.alone)
+    path = find_path(found.instance, formulation, run, found.offset)
+    choice = found.choice([node for (node,) in path.selection.states])
+    seconds = dict(path.seconds)
     with timed(seconds, "verify"):
-        certificate = run.clock.spare(PROOF, proven, None)
-        with readable(formulation.name):
-            steps = _checked(graph.steps(selection.choice), graph)
-    if certificate is None:
-        early = run.clock.left_out[PROOF] == INTERRUPT
-        selection = replace(selection, end=End.INTERRUPTED if early else End.STOPPED)
-    stages = {**stages, **{stage: seconds[stage] for stage in ("compile", "solve", "verify")}}
-    return Plan(graph, graph, formulation, selection, certificate, steps, stages)
+        if path.certificate is not None:
+            for layers in _from_cache(graph):
+                _require_anew(layers, choice)
+        steps = _checked(graph.steps(choice), graph)
+    seconds["verify"] += path.seconds["verify"]
+    rows = tuple(map(tuple, found.instance.states[[s for (s,) in path.selection.states]].tolist()))
+    selection = replace(path.selection, states=rows)
+    return Plan(
+        graph, graph, formulation, selection, path.certificate, steps, {**stages, **seconds}
+    )
 
 
-def _solve_windows(graph: PlacementProblem, formulation: Formulation, run: Run) -> Plan:
+def _solve_windows(graph: Choices, formulation: Formulation, run: Run) -> Plan:
     """Return the plan of a search that solves only the models it meets."""
     alone = formulation.window_options
     if alone is None or run.options not in ({}, alone):
@@ -142,7 +153,7 @@ def _solve_windows(graph: PlacementProblem, formulation: Formulation, run: Run) 
             f"use {' or '.join(able)} without options, or ask for the proof"
         )
     if not isinstance(graph, Layers):
-        raise ProblemError("the costs of all choices are needed or given; ask for the proof")
+        raise ProblemError("the costs of all choices are needed; ask for the proof")
     if getattr(graph.criterion, "among", Among.ALL) is not Among.ALL:
         raise ProblemError(
             "ranks among possible candidates need all models: rank among all, or ask for the proof"
@@ -157,14 +168,14 @@ def _solve_windows(graph: PlacementProblem, formulation: Formulation, run: Run) 
         steps = _checked(graph.steps(found.choice), graph)
         _require_anew(graph, found.choice, found.met)
     stages = {"respond": respond, "rank": seconds["search"] - respond, "verify": seconds["verify"]}
-    chosen = Selection(found.choice, np.nan)
+    chosen = StatePath(graph.rows(found.choice), (np.nan,), (-np.inf,))
     return Plan(graph, graph, formulation, chosen, None, steps, stages, found)
 
 
-def _solve_lazily(graph: PlacementProblem, formulation: Formulation, run: Run) -> Plan:
+def _solve_lazily(graph: Choices, formulation: Formulation, run: Run) -> Plan:
     """Return the certified plan of a search that solves only the models that the proof needs."""
     if not isinstance(graph, Layers):
-        raise ProblemError("the costs of all choices are needed or given; leave out lazy")
+        raise ProblemError("the costs of all choices are needed; leave out lazy")
     if run.options:
         raise ProblemError(f"option {min(run.options)}: a lazy search has no options; leave it out")
     from seqopt.plan.search._window_search import search_pairs  # noqa: PLC0415  # few ask for it
@@ -175,12 +186,13 @@ def _solve_lazily(graph: PlacementProblem, formulation: Formulation, run: Run) -
     chosen, along = found.selection, found.along
     with timed(seconds, "verify"):
         certificate = certify_partial(found.costs, chosen, found.objective)
-        steps = _checked(graph.steps(chosen.choice), graph)
-        _require_anew(graph, chosen.choice, along.met)
+        steps = _checked(graph.steps(found.choice), graph)
+        _require_anew(graph, found.choice, along.met)
+    chosen = replace(chosen, states=graph.rows(found.choice))
     return Plan(graph, graph, formulation, chosen, certificate, steps, seconds, along, found.models)
 
 
-def _checked(steps: tuple[Step, ...], graph: PlacementProblem) -> tuple[Step, ...]:
+def _checked(steps: tuple[Step, ...], graph: Choices) -> tuple[Step, ...]:
     """Return steps in which arms can be, and robots bear bricks; else a `SolverError` says why."""
     nominal = graph.nominal if isinstance(graph, ScenarioLayers) else graph
     worlds = graph.scenes if isinstance(graph, ScenarioLayers) else ()
@@ -194,7 +206,7 @@ def _checked(steps: tuple[Step, ...], graph: PlacementProblem) -> tuple[Step, ..
     return steps
 
 
-def _check_shape(graph: PlacementProblem, nominal: Layers, steps: Sequence[Step]) -> None:
+def _check_shape(graph: Choices, nominal: Layers, steps: Sequence[Step]) -> None:
     """Raise a `SolverError` if steps leave the linear range in any scenario and may not."""
     if any(limit.label == LINEAR_RANGE for limit in nominal.limits):
         scenes = graph.scenes if isinstance(graph, ScenarioLayers) else ()
@@ -203,7 +215,7 @@ def _check_shape(graph: PlacementProblem, nominal: Layers, steps: Sequence[Step]
             check_shape(engine, steps, nominal.limits)
 
 
-def _from_cache(graph: PlacementProblem) -> Iterator[Layers]:
+def _from_cache(graph: Choices) -> Iterator[Layers]:
     """Return the layers whose responses may come from files."""
     if isinstance(graph, ScenarioLayers):
         return graph.from_cache

@@ -15,7 +15,6 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import InfeasibleError, SeqoptError, message_of
 from seqopt.graph.formulation import End
 from seqopt.graph.scenarios import ScenarioLayers, engine_for
-from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Problem
@@ -101,10 +100,7 @@ def measured(plan: Plan, clock: Clock) -> Plan:
 
 def interrupted(plan: Plan) -> Plan:
     """Return a plan after which somebody asked for an end."""
-    chosen = plan.selection
-    if isinstance(chosen, StatePath):
-        return replace(plan, selection=replace(chosen, stopped=INTERRUPT))
-    return replace(plan, selection=replace(chosen, end=End.INTERRUPTED))
+    return replace(plan, selection=replace(plan.selection, stopped=INTERRUPT))
 
 
 def best_within(problem: Problem, solved: Callable[[Problem], Plan], clock: Clock) -> Plan:

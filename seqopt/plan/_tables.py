@@ -12,7 +12,6 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.ranking import move_costs, rank_of, split_gap, under_both
-from seqopt.graph.solution import Selection
 from seqopt.plan.search._window_search import WindowSearch
 from seqopt.problem.problem import Aim
 from seqopt.responses._choices import StepChoices
@@ -22,7 +21,7 @@ Objectives = dict[str, dict[str, float | None] | None]
 
 def chosen_table(
     problem: Layers,
-    selection: Selection,
+    choice: tuple[int, ...],
     aim: Aim,
     search: WindowSearch | None,
     grips: pd.DataFrame,
@@ -32,8 +31,8 @@ def chosen_table(
     ``search``: what was looked at, where not all models were solved; ``grips``: of the plan.
     Result: as of `seqopt.plan.plan.Plan.table`.
     """
-    worths = pd.DataFrame([*_worths(problem, selection.choice, aim, search)])
-    return moves_table(problem, selection.choice, grips).join(worths)
+    worths = pd.DataFrame([*_worths(problem, choice, aim, search)])
+    return moves_table(problem, choice, grips).join(worths)
 
 
 def _worths(

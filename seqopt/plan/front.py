@@ -25,7 +25,7 @@ from seqopt.judge._orders import finds_better_order
 from seqopt.judge.schedules import plan_values
 from seqopt.plan._guard import called, readable, text
 from seqopt.plan._infeasible import confirmed, without_order
-from seqopt.plan._layers import PROOF
+from seqopt.plan._paths import PROOF
 from seqopt.plan._range import best_front, leaves
 from seqopt.plan._rounding import _rounded_up, _rounding_steps
 from seqopt.plan.solving import graph_of, states_of

@@ -15,7 +15,6 @@ import pandas as pd
 
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.scenarios import Choice, ScenarioCosts, ScenarioLayers, in_scenarios
 from seqopt.graph.states.states import over_scenarios
 from seqopt.judge.schedules import plan_values
@@ -78,7 +77,7 @@ def judge_unseen(plan: Plan, scenes: ScenarioLayers | Scenarios | Sequence[Scene
         raise ProblemError("the plan was not chosen over scenarios; pose with scenarios")
     nominal, aim = problem.nominal, problem.aim.aim
     known = ScenarioCosts(nominal.sums, nominal.peaks, 0, 0.0)
-    chosen = best_choice(nominal, aim).choice
+    chosen = best_choice(nominal.schedule.scene.name, aim.costs(nominal), aim)
     if not isinstance(scenes, ScenarioLayers):
         some = scenes.scenes if isinstance(scenes, Scenarios) else scenes
         scenes = in_scenarios(nominal, some, problem.aim)
@@ -111,7 +110,7 @@ def _row(
     """Return what three plans cost in a scenario."""
     aim = problem.aim.aim
     try:
-        best = best_choice(CostProblem(aim.costs(costs)), aim).choice
+        best = best_choice("scenario", aim.costs(costs), aim)
     except InfeasibleError:
         best = None
     out: dict[str, float] = {}

@@ -16,11 +16,10 @@ from seqopt.engines.interface import Engine, Want
 from seqopt.engines.registry import provenance
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import End, Finding, Formulation, FormulationKind, Reads
-from seqopt.graph.instances.instance import Instance
-from seqopt.graph.layers.interface import CostProblem, PlacementProblem
+from seqopt.graph.instance import Instance
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.scenarios import ScenarioLayers
-from seqopt.graph.solution import Selection, StatePath
+from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.plan._status import ENDS, FoundOrder, KeptPostures, Status, bare_summary
@@ -61,13 +60,13 @@ class Plan(ShownBuild):
 
     Attributes
     ----------
-    problem : Problem or PlacementProblem
+    problem : Problem
         What was asked; or the graph of choices, where that was given.
-    graph : Layers, ScenarioLayers, States, Instance or PlacementProblem
+    graph : Layers, ScenarioLayers, States or Instance
         What was chosen from.
     formulation : Formulation
         The formulation that solved it.
-    selection : Selection or StatePath
+    selection : StatePath
         What was chosen, a candidate for every move or states, and what is claimed of it.
     certificate : Certificate or None
         The checked values; None without a proof.
@@ -99,10 +98,10 @@ class Plan(ShownBuild):
     (<Status.OPTIMAL: 'optimal'>, 0)
     """
 
-    problem: Problem | PlacementProblem | States | AllOrders | Instance
-    graph: PlacementProblem | States | Instance
+    problem: Problem | Layers | ScenarioLayers | States | AllOrders | Instance
+    graph: Layers | ScenarioLayers | States | Instance
     formulation: Formulation
-    selection: Selection | StatePath
+    selection: StatePath
     certificate: Certificate | None
     steps: tuple[Step, ...]
     seconds: Mapping[str, float] = field(compare=False, hash=False)
@@ -203,12 +202,10 @@ class Plan(ShownBuild):
     @property
     def objective(self) -> dict[str, float]:
         """The value of every goal by its name; of a tilt, what is survived, in degrees."""
-        if isinstance(self.selection, StatePath):
-            return self._by_goal(self.selection.objective)
-        if self.certificate is not None:
-            return self._by_goal(self.certificate.values)
-        claimed = self.selection.objective
-        return self._by_goal((claimed,)) if isfinite(claimed) else {}
+        claimed, proof = self.selection.objective, self.certificate
+        if proof is not None and not isinstance(self.graph, States):
+            return self._by_goal(proof.values)
+        return self._by_goal(claimed) if isfinite(claimed[0]) else {}
 
     def _by_goal(self, values: Sequence[float]) -> dict[str, float]:
         """Return values of the first goals by their names, as people read them."""
@@ -220,7 +217,7 @@ class Plan(ShownBuild):
     @property
     def gap(self) -> float | None:
         """What is proven to be left between value and bound, over the value; None without proof."""
-        early = isinstance(self.selection, StatePath) and self.selection.stopped
+        early = self.selection.stopped
         if self.certificate is None or (early and not isfinite(self.certificate.gap)):
             return None
         return _known_gap(self.certificate.gap)
@@ -228,21 +225,19 @@ class Plan(ShownBuild):
     @property
     def ended(self) -> End:
         """How the formulation ended."""
-        if isinstance(self.selection, StatePath):
-            return ENDS.get(self.stopped, End.STOPPED)
-        return self.selection.end
+        return ENDS.get(self.stopped, End.STOPPED)
 
     @property
     def stopped(self) -> str:
         """Why a search of states or orders ended early: ``time``, ``memory``, ``size``, say."""
         if self.order is not None and self.order.selection.stopped:
             return self.order.selection.stopped
-        return self.selection.stopped if isinstance(self.selection, StatePath) else ""
+        return self.selection.stopped
 
     @property
     def trace(self) -> tuple[Finding, ...]:
         """What the formulation knew at which time; of states nothing."""
-        return () if isinstance(self.selection, StatePath) else self.selection.trace
+        return self.selection.trace
 
     @property
     def among(self) -> str:
@@ -258,7 +253,7 @@ class Plan(ShownBuild):
         proof, graph = self.certificate, self.graph
         if self.order is not None and self.order.status is not Status.OPTIMAL:
             return self.order.status
-        if isinstance(self.selection, StatePath) and self.selection.stopped:
+        if self.selection.stopped and (isinstance(graph, States) or proof is None):
             return Status.FEASIBLE
         if proof is None:
             return Status.UNPROVEN
@@ -302,18 +297,17 @@ class Plan(ShownBuild):
     @property
     def choice(self) -> tuple[int, ...]:
         """The candidate chosen for every move; a `ProblemError` says if states were chosen."""
-        if isinstance(self.selection, StatePath):
+        if isinstance(self.graph, States | Instance):
             raise ProblemError("states were chosen, not candidates of moves; take its steps")
-        return self.selection.choice
+        pairs = zip(self.layers.candidates, self.nodes, strict=True)
+        return tuple(candidates.index(node) for candidates, node in pairs)
 
     @property
     def nodes(self) -> tuple[int, ...]:
         """The node chosen for every move, or the nodes of a path through an instance."""
-        if isinstance(self.selection, StatePath) and isinstance(self.graph, Instance):
-            return tuple(state[0] for state in self.selection.states)
-        choice = self.choice
-        assert not isinstance(self.graph, States | Instance)  # they have no choice
-        return self.graph.nodes(choice)
+        if isinstance(self.graph, States):
+            raise ProblemError("states were chosen, not candidates of moves; take its steps")
+        return tuple(state[-1] for state in self.selection.states)
 
     @property
     def _begin(self) -> Site | None:
@@ -385,14 +379,14 @@ class Plan(ShownBuild):
         many there were); then ``single_cost``, ``shared_cost`` and ``rank_in_window``, or without
         proof ``cost`` and the ``margin`` to the next candidate. Of states as of `grips`.
         """
-        if isinstance(self.selection, StatePath):
+        if isinstance(self.graph, States):
             return self.grips()
         from seqopt.plan import _tables  # noqa: PLC0415  # only where files are written
 
         aim = self.formulation.aim
         if aim is None or isinstance(self.graph, ScenarioLayers):
             return _tables.moves_table(self.layers, self.choice, self.grips())
-        return _tables.chosen_table(self.layers, self.selection, aim, self.search, self.grips())
+        return _tables.chosen_table(self.layers, self.choice, aim, self.search, self.grips())
 
     def alternatives(self) -> pd.DataFrame:
         """Return the responses and the cost of every choice that was evaluated.
@@ -451,7 +445,7 @@ class Plan(ShownBuild):
         ``order_bound`` (on the first aim, of any order), ``order_bound_proven``,
         ``order_evaluated`` and ``order_stopped``; the ``engine`` and ``versions``.
         """
-        bare = isinstance(self.graph, CostProblem | Instance)
+        bare = isinstance(self.graph, Instance)
         return bare_summary(self) if bare else _summarized(self)
 
     def brief(self) -> dict[str, object]:
@@ -549,14 +543,12 @@ def _bounds(plan: Plan) -> dict[str, float | None]:
     """Return what no plan stays below, by aim; also claimed of a search that ended early."""
     proof, chosen = plan.certificate, plan.selection
     bounds: tuple[float, ...] = () if proof is None else proof.bounds
-    if isinstance(chosen, StatePath):
-        if proof is None:
-            bounds = chosen.bound
-        elif chosen.stopped and not isfinite(proof.gap):
-            bounds = tuple(map(max, chosen.bound, bounds))
+    if proof is None and plan.objective:  # of a search without models nothing is known
+        bounds = chosen.bound
+    elif proof is not None and chosen.stopped and not isfinite(proof.gap):
+        bounds = tuple(map(max, chosen.bound, bounds))
+    if isinstance(plan.graph, States):
         bounds = bounds[: len(plan.states.aims)]
-    elif proof is None and plan.objective:  # of a search without models nothing is known
-        bounds = (chosen.bound,)
     found = plan._by_goal(bounds) if bounds else {}
     return {name: bound if isfinite(bound) else None for name, bound in found.items()}
 
@@ -571,9 +563,11 @@ def _spent(plan: Plan) -> dict[str, dict[str, float | None]]:
             for name, cap in capped
         }
     assert not isinstance(plan.graph, Instance)  # of which there is another summary
+    capped = [budget.name for budget in plan.graph.budgets if isfinite(budget.bound)]
+    prices = dict(zip(capped, chosen.prices[0] if chosen.prices else (), strict=False))
     for budget in plan.graph.budgets:
         bound = budget.bound if isfinite(budget.bound) else None
-        price = chosen.prices.get(budget.name) if isinstance(chosen, Selection) else None
+        price = prices.get(budget.name)
         out[budget.name] = {"bound": bound, "spent": budget.spent(plan.choice), "price": price}
     return out
 

@@ -19,7 +19,6 @@ from seqopt.engines.interface import Engine
 from seqopt.engines.registry import recipe_of, simplest
 from seqopt.errors import NothingFoundError, ProblemError, TimeUpError
 from seqopt.graph.formulation import Formulation, On, Run, as_formulation
-from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.scenarios import ScenarioLayers, engine_for, in_scenarios
 from seqopt.graph.states.states import States, build_states, over_scenarios, within
@@ -48,7 +47,7 @@ from seqopt.sequence.rules import FreeRules
 from seqopt.sequence.schedule import Schedule
 
 if TYPE_CHECKING:
-    from seqopt.graph.instances.instance import Instance
+    from seqopt.graph.instance import Instance
     from seqopt.graph.orders import AllOrders
     from seqopt.sequence._rule_space import FreeSpace
     from seqopt.sequence._schedule_space import ScheduleSpace
@@ -383,7 +382,7 @@ def _solver(on: On) -> Callable[[Any, Formulation, Run], Plan]:
 
 
 def solve(
-    problem: Problem | PlacementProblem | States | AllOrders | Instance,
+    problem: Problem | Layers | ScenarioLayers | States | AllOrders | Instance,
     formulation: Formulation | str | None = None,
     *,
     proof: bool = True,
@@ -396,9 +395,9 @@ def solve(
 
     Parameters
     ----------
-    problem : Problem, Instance or PlacementProblem
-        From `seqopt.pose` or `seqopt.read_instance`; or a graph of choices, as a
-        `seqopt.graph.layers.interface.CostProblem`.
+    problem : Problem or Instance
+        From `seqopt.pose` or `seqopt.read_instance`; or a graph of choices, as of
+        `seqopt.plan.solving.graph_of`.
     formulation : Formulation or str, optional
         Or a name in `seqopt.formulations`; by default the fastest exact one that there is for it.
     proof : bool, optional
@@ -442,8 +441,9 @@ def _solve_run(problem: Any, formulation: Formulation | str | None, run: Run) ->
     if not isinstance(problem, Problem):
         return _of_graph(problem, formulation, run)
     found = as_formulation(formulation or usual(problem), *_able(problem))
-    on = natural(problem) if natural(problem) in found.also else found.on
-    if found.aim is not None and problem.goals not in ((), (AIMS[found.aim],)):
+    able = _able(problem)
+    on = found.on if found.on in able else next(on for on in able if on in found.also)
+    if on is On.LAYERS and found.aim is not None and problem.goals not in ((), (AIMS[found.aim],)):
         asked = ", ".join(map(str, problem.goals))
         raise ProblemError(
             f"aim {asked}: {found.name} minimizes the {found.aim.value} of costs; "
@@ -478,20 +478,29 @@ def _able(problem: Problem) -> tuple[On, ...]:
 
 def _of_graph(problem: Any, formulation: Formulation | str | None, run: Run) -> Plan:
     """Return the plan of a graph of choices that is given, or of an instance."""
-    from seqopt.graph.instances.instance import Instance  # noqa: PLC0415  # few are given
+    from seqopt.graph.instance import Instance  # noqa: PLC0415  # few are given
     from seqopt.graph.orders import AllOrders  # noqa: PLC0415
-    from seqopt.plan._states import solve_instance  # noqa: PLC0415
+    from seqopt.plan._paths import solve_instance  # noqa: PLC0415
 
     if isinstance(problem, Instance):
         return solve_instance(problem, formulation, run)
-    graphs = {States: On.STATES, AllOrders: On.ORDERS, ScenarioLayers: On.SCENARIOS}
-    on = next((on for kind, on in graphs.items() if isinstance(problem, kind)), On.LAYERS)
+    graphs = {
+        States: On.STATES,
+        AllOrders: On.ORDERS,
+        ScenarioLayers: On.SCENARIOS,
+        Layers: On.LAYERS,
+    }
+    on = next((on for kind, on in graphs.items() if isinstance(problem, kind)), None)
+    if on is None:
+        raise ProblemError(
+            f"a {type(problem).__name__} is not a problem; give one that seqopt.pose made"
+        )
     sought, name = on is On.ORDERS, USUAL[on]
     if isinstance(problem, States) and problem.is_timed:
         on, name = On.TIMES, USUAL[On.TIMES]
     elif isinstance(problem, ScenarioLayers) and problem.aim.aim is Aim.PEAK:
         on, name = On.LAYERS, "minimax"
-    elif on is On.LAYERS and getattr(problem, "budgets", None):
+    elif on is On.LAYERS and problem.budgets:
         name = "labels"
     found = as_formulation(formulation or name, on)
-    return _solver(On.ORDERS if sought else found.on)(problem, found, run)
+    return _solver(On.ORDERS if sought else on)(problem, found, run)

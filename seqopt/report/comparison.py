@@ -19,8 +19,6 @@ from seqopt.graph.formulation import Formulation, On, find_formulation, formulat
 from seqopt.graph.layers.costs import TINY
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.layers.ranking import rank_choice, under_both
-from seqopt.graph.solution import StatePath
-from seqopt.judge.certificate import least_sum
 from seqopt.plan._layers import on_the_way
 from seqopt.plan._range import keeping
 from seqopt.plan.plan import Plan
@@ -343,7 +341,7 @@ def _facts(
     if PUBLISHED in rows and not robots:
         choice = published_choice(problem)
         value = problem.sums.cost(choice)
-        gap = (value - least_sum(problem.sums)) / max(abs(value), TINY)
+        gap = (value - problem.sums.least_sum()) / max(abs(value), TINY)
         rows[PUBLISHED] |= {"problem": method, "objective": value, "gap": gap}
         rows[PUBLISHED] |= under_both(problem, choice)
         ranks = rank_choice(problem, choice)
@@ -463,7 +461,6 @@ def fixed_methods(engine: Engine) -> dict[str, pd.DataFrame]:
 
 def _free_row(plan: Plan) -> dict[str, object]:
     """Return what a free schedule is worth, for a row: its objective is its worst step."""
-    assert isinstance(plan.selection, StatePath)  # of states
     bound, value = plan.selection.bound[0], plan.selection.objective[0]
     return {
         "problem": FREE,

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from seqopt.graph.layers.interface import CostProblem
 
 from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -17,7 +18,6 @@ from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import End
 from seqopt.graph.layers._partial_costs import PartialCosts, least_possible
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.solution import Selection
 from seqopt.judge.certificate import certify_partial

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from seqopt.graph.layers.interface import CostProblem
 
 from experiments.peers import peers
 from experiments.peers.parts.chain import chain_of
@@ -17,7 +18,6 @@ from experiments.peers.peers import difference
 from seqopt.engines.interface import Want, grip_columns
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
 
 STATES = [(4, (1, 5, 7)), (17, (1, 20, 33)), (17, (1, 20, 21)), (25, (4, 47)), (25, (12, 13, 46))]
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from seqopt.graph.layers.interface import CostProblem
 
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
@@ -22,7 +23,6 @@ from seqopt.graph.formulation import (
     formulations,
 )
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers, steps_over, travel
 from seqopt.network.build import build_network
 from seqopt.plan.solving import solve

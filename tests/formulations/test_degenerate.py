@@ -7,13 +7,13 @@ from dataclasses import replace
 import cvxpy as cp
 import numpy as np
 import pytest
+from formulations.layers.priced_paths import LayeredFlow
+from seqopt.graph.layers.interface import CostProblem
 
 from formulations import solvers
-from formulations.layers.priced_paths import LayeredFlow
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import Formulation, FormulationKind, On, formulations
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.solution import Selection
 from seqopt.judge.certificate import certify
 from seqopt.plan.solving import solve

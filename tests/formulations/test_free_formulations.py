@@ -7,12 +7,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from formulations.states.on_graph import Choice, on_graph
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from formulations.states._search import _on_paths, path_values
 from formulations.states._totals import least_total
-from formulations.states.on_graph import Choice, on_graph
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError, TimeUpError
 from seqopt.graph.formulation import FormulationKind, On, Watch, find_formulation, formulation_names

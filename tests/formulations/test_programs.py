@@ -5,19 +5,19 @@ from __future__ import annotations
 from itertools import pairwise, product
 
 import cvxpy as cp
+import formulations.layers.beam
+import formulations.layers.rank_search
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from seqopt.graph.layers.interface import CostProblem
 
-import formulations.layers.beam
-import formulations.layers.rank_search
 from formulations.solvers import anatomy, minimize, minimize_whole
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.formulation import End, FormulationKind, Reads, Watch
 from seqopt.graph.formulation import formulations as registered
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.problem.problem import Aim
 from tests.strategies import problems
 

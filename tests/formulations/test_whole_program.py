@@ -7,7 +7,6 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
-
 from formulations.layers.exhibits import (
     MINIMAX_LAYER,
     _flow_of_peaks,
@@ -17,10 +16,11 @@ from formulations.layers.exhibits import (
 )
 from formulations.layers.overlap_flow import OVERLAP_MIP
 from formulations.layers.priced_paths import ACCURACY
+from seqopt.graph.layers.interface import CostProblem
+
 from seqopt.errors import InfeasibleError
 from seqopt.graph.formulation import End, Watch, exhibits
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
 
 PROGRAMS = {OVERLAP_MIP.name: OVERLAP_MIP, **exhibits()}
 

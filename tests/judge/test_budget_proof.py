@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from seqopt.graph.layers.interface import CostProblem
 
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.formulation import End, FormulationKind, On, formulations
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import steps_over, travel
 from seqopt.judge import _budget_proof as budget_proof
 from seqopt.judge._budget_proof import least_within

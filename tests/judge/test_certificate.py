@@ -8,11 +8,11 @@ from itertools import product
 import numpy as np
 import pytest
 from hypothesis import given
+from seqopt.graph.layers.interface import CostProblem
 
 from seqopt.errors import SolverError
 from seqopt.graph.formulation import Formulation, FormulationKind, On, formulations
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import travel
 from seqopt.graph.solution import Selection
 from seqopt.judge.certificate import TOLERANCE, certify, judge, least_peak, least_sum

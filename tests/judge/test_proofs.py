@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from seqopt.graph.layers.interface import CostProblem
 
 import seqopt
 from seqopt.engines.interface import Want
@@ -15,7 +16,6 @@ from seqopt.errors import SolverError
 from seqopt.graph import Explorer
 from seqopt.graph.layers._partial_costs import PartialCosts
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.orders import AllOrders, OrderStates
 from seqopt.graph.paths import keep_best, least_peak
 from seqopt.graph.solution import Selection

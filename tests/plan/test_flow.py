@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from formulations.layers.priced_paths import ACCURACY, layered_flow
+from seqopt.graph.layers.interface import CostProblem
+
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.judge.certificate import TOLERANCE
 
 INF = np.inf

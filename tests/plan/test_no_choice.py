@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from seqopt.graph.layers.interface import CostProblem
 
 from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -21,7 +22,6 @@ from seqopt.errors import (
 from seqopt.graph import formulation as registry
 from seqopt.graph.formulation import FormulationKind, find_formulation, formulations
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.solution import Selection
 from seqopt.network.build import build_network

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from seqopt.graph.layers.interface import CostProblem
 
 import seqopt
 from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers, travel
 from seqopt.judge.certificate import certify
 from seqopt.problem.problem import Aim

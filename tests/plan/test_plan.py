@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from seqopt.graph.layers.interface import CostProblem
 
 import seqopt
 from seqopt.engines.interface import Want
 from seqopt.errors import ProblemError, StepError
 from seqopt.graph.formulation import FormulationKind, On
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import Layers, candidate_layers, travel
 from seqopt.study.published import find_criterion
 from tests.builders import small_arch

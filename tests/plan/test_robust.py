@@ -7,13 +7,13 @@ from itertools import pairwise, product
 
 import numpy as np
 import pytest
+from formulations.scenarios import scenario_search
+from formulations.scenarios.scenario_program import _solve_program
+from formulations.scenarios.scenario_search import _close_gap, best_weights
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
-from formulations.scenarios import scenario_search
-from formulations.scenarios.scenario_program import _solve_program
-from formulations.scenarios.scenario_search import _close_gap, best_weights
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import Watch

@@ -6,10 +6,10 @@ from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
-
 from formulations.layers.priced_paths import layered_flow
-from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
+
+from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.solution import Selection
 from seqopt.judge.certificate import certify
 from seqopt.problem.problem import Aim

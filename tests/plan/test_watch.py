@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from seqopt.graph.layers.interface import CostProblem
 
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Finding, Watch, find_formulation
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.plan.solving import solve
 
 

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from seqopt.graph.layers.interface import CostProblem
+from seqopt.plan.search.in_order import least_quantile, solve_in_order
 
 import seqopt
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import candidate_layers, travel
 from seqopt.graph.states.states import build_states
 from seqopt.judge._proof import Proof
-from seqopt.plan.search.in_order import least_quantile, solve_in_order
 from seqopt.problem.criteria import StepCost, WeightedSum
 from seqopt.problem.problem import Aim
 from seqopt.sequence.rules import FreeRules

@@ -31,10 +31,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
+from seqopt.graph.layers.interface import PlacementProblem
 
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import Formulation, FormulationKind, On, formulations
-from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.judge.certificate import judge as certified
 from seqopt.plan._guard import require_fit
 from tests.quality.degenerate_cases import CASES, Case, Size, enumerated

@@ -9,13 +9,13 @@ from itertools import pairwise, product
 
 import numpy as np
 from numpy.typing import ArrayLike
+from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 
 from experiments.harness.scenes import half_circle
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.network.network import Network
 from seqopt.problem.criteria import WorstRatio

@@ -18,7 +18,7 @@ from formulations.solvers import _solve_file
 from seqopt import judge_instance, save_instance, solve
 from seqopt.errors import SeqoptError
 from seqopt.graph.formulation import find_formulation
-from seqopt.graph.instances.instance import Instance
+from seqopt.graph.instance import Instance
 from seqopt.graph.paths import fewest_moves, reached
 from seqopt.graph.solution import StatePath
 from seqopt.plan._states import _claims, able

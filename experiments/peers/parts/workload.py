@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.optimize import linprog
+from seqopt.graph.layers.interface import PlacementProblem
 
 from seqopt import Network, three_robot_loop
 from seqopt.arrays import Floats, Ints
@@ -15,7 +16,6 @@ from seqopt.engines.interface import Fields, Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.layers.costs import LayeredCosts
-from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.study.published import EQUATIONS
 

@@ -17,8 +17,8 @@ from seqopt._files import parse_json, read_bytes, write_bytes, write_folder
 from seqopt.errors import FileError, ProblemError
 from seqopt.graph._timed import NOW, TimedGraph
 from seqopt.graph.graph import Graph
+from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _by_goal, _Cap, _Target
 from seqopt.graph.instances._texts import as_cp_sat, as_lp, as_mps
-from seqopt.graph.instances.instance import PEAK, SUM, TAIL, Instance, _by_goal, _Cap, _Target
 from seqopt.scene._checks import short
 
 FORMAT, VERSION = "seqopt-instance", 1

@@ -19,7 +19,7 @@ from scipy import sparse
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph._timed import HELD, NOW, TimedGraph
-from seqopt.graph.instances.instance import PEAK, SUM, TAIL, TIME, Instance, _Target
+from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _Target
 from seqopt.graph.paths import distances
 
 NEVER = -1  # of a row: it holds whatever is taken

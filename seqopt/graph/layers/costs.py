@@ -94,6 +94,10 @@ class LayeredCosts(FrozenValue):
         """Return the largest cost that a choice meets; infinite if it is not allowed."""
         return max(self.parts(choice))
 
+    def least_sum(self) -> float:
+        """Return the least total cost of any choice; infinite if none is allowed."""
+        return float(_least_to_go(self.arcs())[0][0])
+
     def continuable(self) -> tuple[Bools, ...]:
         """Return which candidates are allowed and can be continued to the last move.
 

@@ -297,6 +297,17 @@ class Layers(Shown):
             found[choices.moves[-1]].append(choices)
         return found
 
+    @property
+    def alone(self) -> LayeredCosts:
+        """The costs that a search of one move alone is charged: ranks among its candidates."""
+        if not isinstance(self.criterion, RankSum):
+            return self.sums
+        conditional = replace(self.criterion, ranked=Ranked.CONDITIONAL)
+        if conditional == self.criterion:
+            return self.sums
+        posed = replace(self, criterion=conditional)
+        return self.others.setdefault(conditional, posed).sums
+
     @cached_property
     def others(self) -> dict[Criterion, Layers]:
         """The same problem under other criteria that need the same responses, as they are met."""
@@ -334,6 +345,15 @@ class Layers(Shown):
     def table(self) -> pd.DataFrame:
         """Return a row per open grip, as `seqopt.sequence.schedule.Schedule.table` does."""
         return self.schedule.table()
+
+    @property
+    def candidates(self) -> tuple[tuple[int, ...], ...]:
+        """The nodes that can be chosen, move by move."""
+        return tuple(move.candidates for move in self.schedule.moves)
+
+    def rows(self, choice: Sequence[int]) -> tuple[tuple[int, ...], ...]:
+        """Return a choice, a candidate for every move, as states: the move, and its node."""
+        return tuple(enumerate(self.nodes(choice), start=1))
 
     def nodes(self, choice: Sequence[int]) -> tuple[int, ...]:
         """Return the nodes that a choice, a candidate for every move, stands for."""

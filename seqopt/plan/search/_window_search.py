@@ -34,13 +34,13 @@ from seqopt.errors import (
     ProblemError,
     TimeUpError,
 )
-from seqopt.graph.formulation import End, Formulation, FormulationKind, Watch
+from seqopt.graph.formulation import Formulation, FormulationKind, Run, Watch
 from seqopt.graph.layers._partial_costs import PartialCosts, floor_of
+from seqopt.graph.layers.compiled import compile_costs
 from seqopt.graph.layers.costs import Joined
-from seqopt.graph.layers.interface import CostProblem
 from seqopt.graph.layers.layers import Layers, _pairs_as_moves, _possible_after, window
-from seqopt.graph.solution import Selection
-from seqopt.plan._guard import select
+from seqopt.graph.solution import StatePath
+from seqopt.plan._paths import find_path
 from seqopt.problem.criteria import WeightedSum, WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.responses._choices import StepChoices
@@ -212,14 +212,15 @@ EQUAL = 1e-9  # of a value: two that differ by less are one, found in another or
 class PairSearch:
     """What a search among pairs found.
 
-    ``costs``: all that it looked at; ``selection``: the best choice of which all pairs are known;
-    its trace tells how choice and bound met; ``along``: the steps that the choice meets, move by
-    move, to be solved anew; ``models``: how many models were solved; ``given`` (n,): what steps
-    without an open grip cost.
+    ``costs``: all that it looked at; ``choice``: the best one of which all pairs are known;
+    ``selection``: what is claimed of it; its trace tells how choice and bound met; ``along``: the
+    steps that the choice meets, move by move, to be solved anew; ``models``: how many models were
+    solved; ``given`` (n,): what steps without an open grip cost.
     """
 
     costs: PartialCosts
-    selection: Selection
+    choice: tuple[int, ...]
+    selection: StatePath
     along: WindowSearch
     models: int
     given: Floats
@@ -250,21 +251,25 @@ def search_pairs(problem: Layers, formulation: Formulation, watch: Watch) -> Pai
         if watch.over:
             raise TimeUpError("no choice was found yet; give more")
         raise InfeasibleError("no choice is allowed; relax a limit or widen a reach")
-    selection = _best_known(costs, formulation, watch)
-    along = walk.along(selection.choice)
-    return PairSearch(costs, selection, along, walk.models, problem.given_costs)
+    choice, selection = _best_known(costs, formulation, watch)
+    along = walk.along(choice)
+    return PairSearch(costs, choice, selection, along, walk.models, problem.given_costs)
 
 
-def _best_known(costs: PartialCosts, formulation: Formulation, watch: Watch) -> Selection:
-    """Return what the formulation makes of the pairs that are known."""
+def _best_known(
+    costs: PartialCosts, formulation: Formulation, watch: Watch
+) -> tuple[tuple[int, ...], StatePath]:
+    """Return the choice that the formulation makes of the pairs that are known."""
     known, candidates = costs.known()
-    found = select(formulation, CostProblem(known))
-    choice = tuple(left[index] for left, index in zip(candidates, found.choice, strict=True))
-    early = End.INTERRUPTED if watch.interrupted else End.STOPPED
-    end = End.DONE if _proven(costs) else early
-    watch.tell(found.objective, costs.bound)
-    bound = min(found.objective, costs.bound)
-    return replace(found, choice=choice, bound=bound, end=end, trace=watch.trace)
+    compiled = compile_costs("what is known", known, costs.aim)
+    found = find_path(compiled.instance, formulation, Run(proof=False), compiled.offset).selection
+    met = compiled.choice([node for (node,) in found.states])
+    choice = tuple(left[index] for left, index in zip(candidates, met, strict=True))
+    early = "" if _proven(costs) else "interrupt" if watch.interrupted else "time"
+    (value,) = found.objective
+    watch.tell(value, costs.bound)
+    bound = (min(value, costs.bound),)
+    return choice, replace(found, bound=bound, stopped=early, trace=watch.trace)
 
 
 def _proven(costs: PartialCosts) -> bool:

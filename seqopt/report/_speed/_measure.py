@@ -23,7 +23,6 @@ from seqopt.engines.registry import ENGINES, LIMITED, make_engine, recipe_of, si
 from seqopt.errors import ProblemError, SeqoptError, SolverError, TimeUpError
 from seqopt.graph.formulation import End, Formulation, FormulationKind, On, formulations
 from seqopt.graph.layers.costs import TINY
-from seqopt.judge.certificate import least_sum
 from seqopt.judge.schedules import plan_values
 from seqopt.plan._layers import on_the_way
 from seqopt.plan.plan import Plan
@@ -74,7 +73,7 @@ class Reference:
         parts = np.abs(costs.parts(plan.choice))
         if not np.isfinite(parts).all():
             return np.inf
-        return (costs.cost(plan.choice) - least_sum(costs)) / max(float(parts.sum()), TINY)
+        return (costs.cost(plan.choice) - costs.least_sum()) / max(float(parts.sum()), TINY)
 
     def _of_states(self, plan: Plan) -> float:
         """Return the gap in the first goal that is not at its optimum."""

@@ -36,8 +36,8 @@ from operator import le
 
 import numpy as np
 
+from formulations.on_graph import Choice, on_graph
 from formulations.states._totals import path_of
-from formulations.states.on_graph import Choice, on_graph
 from seqopt.arrays import Floats
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph

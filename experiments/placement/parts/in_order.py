@@ -18,10 +18,8 @@ import numpy as np
 from seqopt.arrays import Bools, Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.layers.costs import TINY, Joined, LayeredCosts
-from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 from seqopt.graph.layers.layers import Layers
 from seqopt.graph.layers.ranking import _on_a_least_path
-from seqopt.judge.certificate import least_sum
 from seqopt.problem.problem import Aim
 from seqopt.scene._checks import short
 
@@ -37,29 +35,28 @@ class InOrder:
     values: tuple[float, ...]
 
 
-def solve_in_order(goals: Sequence[tuple[PlacementProblem, Aim]]) -> InOrder:
+def solve_in_order(goals: Sequence[tuple[LayeredCosts, Aim]]) -> InOrder:
     """Return the choice that is best for the first aim; among these best for the second; and so on.
 
     Exact, sums that differ by less than `seqopt.graph.layers.ranking.TIED_SUMS` counting as equal.
 
-    ``goals`` (sequence of (PlacementProblem, Aim)): problems of the same moves, each under its own
-    criterion, and whether its sum or its peak is to minimize; the most important first. Raises
-    `InfeasibleError` if no choice is allowed by all problems; `ProblemError` if there is no goal,
-    problems have other moves or candidates, or one has budgets.
+    ``goals`` (sequence of (LayeredCosts, Aim)): costs of the same moves, each by its own criterion,
+    and whether their sum or the largest is to be small; the most important first. Raises
+    `InfeasibleError` if no choice is allowed by all; `ProblemError` if there is no goal, or costs
+    are of other moves or candidates.
 
     Examples
     --------
-    >>> from seqopt.graph.layers.interface import CostProblem
     >>> nothing = np.zeros((1, 2))
     >>> first, second = (
-    ...     CostProblem(LayeredCosts((np.array(costs),), (np.zeros((1, 3)),)))
+    ...     LayeredCosts((np.array(costs),), (np.zeros((1, 3)),))
     ...     for costs in ([2.0, 1.0, 1.0], [0.0, 5.0, 4.0])
     ... )
     >>> solve_in_order([(first, Aim.PEAK), (second, Aim.SUM)])
     InOrder(choice=(2,), values=(1.0, 4.0))
     """
-    layers = [aim.costs(problem) for problem, aim in goals]
-    _require_same(goals, layers)
+    layers = [costs for costs, _ in goals]
+    _require_same(layers)
     masks = _allowed(layers)
     for costs, (_, aim) in zip(layers, goals, strict=True):
         masks = _best(costs, aim, masks)
@@ -70,13 +67,9 @@ def solve_in_order(goals: Sequence[tuple[PlacementProblem, Aim]]) -> InOrder:
     return InOrder(tuple(choice), tuple(aim.value_of(costs, choice) for costs, (_, aim) in pairs))
 
 
-def _require_same(
-    goals: Sequence[tuple[PlacementProblem, Aim]], layers: Sequence[LayeredCosts]
-) -> None:
+def _require_same(layers: Sequence[LayeredCosts]) -> None:
     if not layers:
         raise ProblemError("there is no aim; give at least one")
-    if any(problem.budgets for problem, _ in goals):
-        raise ProblemError("aims in their order take no budgets; leave them out")
     if len({costs.sizes for costs in layers}) > 1:
         raise ProblemError(
             "the problems have other moves or candidates; pose them with one schedule"
@@ -143,11 +136,11 @@ def least_quantile(problem: Layers, share: float = 0.1) -> StepQuantile:
     levels = np.unique(np.concatenate([costs[np.isfinite(costs)] for _, costs in steps]))
 
     def kept(level: float) -> bool:
-        return least_sum(_above(steps, sizes, level)) <= most
+        return _above(steps, sizes, level).least_sum() <= most
 
     level = float(levels[bisect_left(levels, x=True, hi=len(levels) - 1, key=kept)])
     layers = (_above(steps, sizes, level), problem.sums)
-    found = solve_in_order([(CostProblem(costs), Aim.SUM) for costs in layers])
+    found = solve_in_order([(costs, Aim.SUM) for costs in layers])
     return StepQuantile(found.choice, level, round(found.values[0]), len(steps))
 
 

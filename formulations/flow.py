@@ -42,13 +42,12 @@ from dataclasses import replace
 import numpy as np
 from scipy import sparse
 
+from formulations.on_graph import Choice, on_graph
 from formulations.solvers import STOPS, Point, minimize_rows
-from formulations.states._search import path_values
-from formulations.states.on_graph import Choice, on_graph
 from seqopt.arrays import Floats
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import TIED, fewest_moves, tied
+from seqopt.graph.paths import TIED, fewest_moves, path_values, tied
 
 
 def _rows(graph: Graph) -> tuple[sparse.csc_array, Floats]:

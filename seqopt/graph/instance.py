@@ -67,6 +67,8 @@ class Instance(FrozenValue, Shown):
         What nodes stand for; the first column is the level: no arc leads to a lower one.
     timed : TimedGraph or None
         Who may act on every arc and for how long, where times are asked.
+    alone : (m, 2) float or None
+        What a search of one move alone is charged, as of `seqopt.graph.graph.Graph`.
     facts : mapping
         Where it comes from: the command that made it, and the version.
 
@@ -87,6 +89,7 @@ class Instance(FrozenValue, Shown):
     caps: tuple[_Cap, ...] = ()
     states: Ints = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
     timed: TimedGraph | None = field(default=None, compare=False)
+    alone: Floats | None = field(default=None, compare=False)
     facts: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
@@ -131,6 +134,16 @@ class Instance(FrozenValue, Shown):
         peaks = {c for goal in self.goals if goal.kind == PEAK for c in goal.columns}
         kinds = tuple(c in peaks for c in range(len(self.columns)))
         return Graph(self.source, self.target, self.amounts, kinds, self.ends)
+
+    @cached_property
+    def asked(self) -> Graph:
+        """The same with the columns of goals, one after the other, and then those with caps."""
+        graph, goals = self.graph, [c for goal in self.goals for c in goal.columns]
+        columns = [*goals, *(cap.column for cap in self.caps if cap.column is not None)]
+        caps = tuple(cap.most for cap in self.caps if cap.column is not None)
+        peaks = tuple(graph.peaks[c] for c in columns)
+        rows = graph.source, graph.target, graph.amounts[:, columns]
+        return Graph(*rows, peaks, graph.ends, caps, self.alone)
 
     @property
     def asks_time(self) -> bool:

@@ -1,0 +1,85 @@
+r"""Paths within budgets: multipliers alone, a bound, or with labels that close what is left open.
+
+.. math::
+
+   \min_{o_1, \dots, o_K} \; \sum_{k=1}^{K} c_k(o_k) + \sum_{k=2}^{K} d_k(o_{k-1}, o_k)
+   \quad \text{s.t.} \quad \sum_k a_{bk}(o_{k-1}, o_k) \le B_b \quad \text{for every budget } b
+
+is a path with resources; of a free schedule likewise, goal by goal. ``lagrangian`` relaxes it:
+every budget has a multiplier,
+
+.. math::
+
+   \max_{\lambda \ge 0} \; L(\lambda), \qquad
+   L(\lambda) = \min_{p} \; c(p) + \sum_b \lambda_b \bigl( a_b(p) - B_b \bigr)
+
+over all paths :math:`p`, with their costs :math:`c` and amounts :math:`a`. At fixed multipliers
+this is a shortest path. :math:`L` is concave and made of planes, one for every path; cutting planes
+find its highest point,
+
+.. math::
+
+   \max_{\lambda \ge 0, \, \theta} \; \theta \quad \text{s.t.} \quad
+   \theta \le c(p) + \sum_b \lambda_b \left( a_b(p) - B_b \right)
+   \quad \text{for every path } p \text{ met so far.}
+
+Its height is a bound on what any path within the budgets costs, the same as that of the linear
+program, and the multipliers are its duals. The path is the cheapest within the budgets among those
+met; it need not be the best. ``labels`` goes on: a label is a beginning of a path, with what it
+costs and takes; those are continued that may become better than the best path known
+(`seqopt.graph._labels`). Without budgets both are the optimum.
+"""
+
+from __future__ import annotations
+
+from formulations.on_graph import Choice, on_graph
+from seqopt.errors import ProblemError
+from seqopt.graph._budgets import within_budgets
+from seqopt.graph.formulation import FormulationKind, On, Watch
+from seqopt.graph.graph import Graph
+from seqopt.graph.paths import lexicographic, strictly_below
+from seqopt.problem.problem import Aim
+
+
+def _exact(graph: Graph, watch: Watch, *, most: int = 20_000) -> Choice:
+    """Return the best path within the budgets, or the best one that was met.
+
+    ``most``: how many labels are kept at a time, from 1; it has stopped early if more were needed.
+    """
+    if most < 1:
+        raise ProblemError(f"labels: most is {most}; give a whole number from 1")
+    return _chosen(graph, watch, most)
+
+
+def relaxed(graph: Graph, watch: Watch) -> Choice:
+    """Return the best path that was met, with the bounds of multipliers; exact without budgets."""
+    return _chosen(graph, watch, 0)
+
+
+def _chosen(graph: Graph, watch: Watch, most: int) -> Choice:
+    if not graph.caps:
+        return Choice(*lexicographic(graph))
+    found = within_budgets(graph, graph.caps, watch, most)
+    goals = zip(found.values[: graph.goals], found.bounds, strict=False)
+    is_open = any(bound < strictly_below(value) for value, bound in goals)
+    stopped = watch.over or (most > 0 and is_open)
+    return Choice(found.path, found.bounds[: graph.goals], stopped, found.prices)
+
+
+LABELS = on_graph(
+    "labels",
+    "full overlap, labels within budgets",
+    _exact,
+    on=On.LAYERS,
+    aim=Aim.SUM,
+    takes_budgets=True,
+)
+LAGRANGIAN = on_graph(
+    "lagrangian",
+    "full overlap, prices for budgets",
+    relaxed,
+    FormulationKind.BOUND,
+    on=On.LAYERS,
+    aim=Aim.SUM,
+    takes_budgets=True,
+)

@@ -1,1 +1,0 @@
-"""Programs over layers of candidates: the open grips of a schedule, one layer a move."""

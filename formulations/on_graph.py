@@ -1,0 +1,197 @@
+"""What formulations of paths share: a graph goes in, a path comes out, whatever is built.
+
+A formulation is a function from a `seqopt.graph.Graph` to a `Choice`: a path, and what no path
+stays below. The graph is that of the open grips of a schedule, of the states of a free schedule, of
+all orders, or of an instance; see `on_graph`.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from seqopt.arrays import Terse
+from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
+from seqopt.graph.formulation import Formulation, FormulationKind, On, Reads, Watch
+from seqopt.graph.graph import Graph
+from seqopt.graph.instance import TAIL, Instance, _Target, _target_sums
+from seqopt.graph.orders import AllOrders, OrderSelection
+from seqopt.graph.paths import distances, path_values
+from seqopt.graph.solution import StatePath
+from seqopt.graph.states.states import States
+from seqopt.problem.problem import WORST_TOTAL, Aim, RobustAim, cvar
+from seqopt.responses.resources import HERE, Resources
+from seqopt.work.progress import Tell
+
+
+class Choice(NamedTuple):
+    """A path through a graph, its start left out and empty where none was found in time.
+
+    ``bounds``: what no path stays below in the first goals, those before each being at their
+    values; ``stopped``: whether time was over before all was found; ``prices``: by goal, the
+    multipliers of caps and of the sums before it that prove its bound; ``compile_seconds``: what
+    writing a program down took.
+    """
+
+    path: tuple[int, ...]
+    bounds: tuple[float, ...] = ()
+    stopped: bool = False
+    prices: tuple[tuple[float, ...], ...] = ()
+    compile_seconds: float = 0.0
+
+
+Choose = Callable[..., Choice]
+"""Takes a graph whose moves are all on paths from the start to an end, a `Watch` and options."""
+
+
+def onward(graph: Graph) -> Graph:
+    """Return the graph of moves after which fewer moves are left to an end."""
+    left = distances(graph, np.ones(len(graph.source)), back=True)
+    return graph.only(left[graph.target] < left[graph.source])
+
+
+def path_of_instance(instance: Instance, choose: Choose, watch: Watch) -> StatePath:
+    """Return the path that is chosen, its states the numbers of nodes."""
+    graph, goal = instance.asked, instance.goals[0]
+    if goal.kind == TAIL:
+        found = _least_tail(graph, goal, choose, watch)
+    else:
+        found = choose(graph, watch)
+        if not found.path and not found.stopped:
+            raise InfeasibleError("no path leads to an end")
+    if not found.path:
+        raise TimeUpError("no path was found yet; give more")
+    values = path_values(graph, found.path)[: graph.goals]
+    if goal.kind == TAIL:
+        values = (_target_sums(goal, np.array(values)),)
+    bounds = (*found.bounds, *[-np.inf] * (len(values) - len(found.bounds)))
+    states = tuple((node,) for node in found.path)
+    early = ("interrupt" if watch.interrupted else "time") * found.stopped
+    watch.tell(values[0], min(values[0], bounds[0]))  # the trace ends with what is claimed
+    told = (found.prices, early)
+    return StatePath(
+        states,
+        values,
+        tuple(map(min, values, bounds)),
+        (),
+        *told,
+        trace=watch.trace,
+        compile_seconds=found.compile_seconds,
+    )
+
+
+def _least_tail(graph: Graph, goal: _Target, choose: Choose, watch: Watch) -> Choice:
+    """Return the path of least worst or tail total over scenarios, with their weights."""
+    from formulations.states._totals import cheapest_by, least_total  # noqa: PLC0415  # few ask
+
+    found = least_total(graph, _aim(goal), cheapest_by(choose, watch), watch)
+    return Choice(found.path, (found.bound,), watch.over, (tuple(found.weights.tolist()),))
+
+
+def _aim(goal: _Target) -> RobustAim:
+    """Return what is made of totals; one weight of all is that of the worst."""
+    count = len(goal.columns)
+    return WORST_TOTAL if goal.most >= 1.0 else cvar(max(0.0, 1.0 - 1.0 / (goal.most * count)))
+
+
+@dataclass(frozen=True, repr=False)
+class OnGraph(Terse):
+    """The ``solve`` of a formulation that chooses a path through a graph."""
+
+    name: str
+    choose: Choose = field(repr=False)
+    takes_budgets: bool
+
+    @property
+    def __signature__(self) -> inspect.Signature:
+        """Its own parameters and the options of what it chooses by."""
+        own = inspect.signature(type(self).__call__).parameters.values()
+        mine = [p for p in own if p.name != "self" and p.kind is not inspect.Parameter.VAR_KEYWORD]
+        options = [
+            p
+            for p in inspect.signature(self.choose).parameters.values()
+            if p.kind is inspect.Parameter.KEYWORD_ONLY
+        ]
+        return inspect.Signature([*mine, *options])
+
+    def __call__(
+        self,
+        problem: States | AllOrders | Instance,
+        *,
+        watch: Watch | None = None,
+        seconds: float = np.inf,
+        max_memory: float = np.inf,
+        progress: Tell = lambda _: None,
+        resources: Resources = HERE,
+        **options: Any,
+    ) -> StatePath | OrderSelection:
+        """Return the plan of the chosen path; where time or memory ends early, a first plan.
+
+        Raises a `ProblemError` if there are budgets that it does not take.
+        """
+        watch = watch or Watch(seconds)
+
+        def choose(graph: Graph, watch: Watch) -> Choice:
+            return self.choose(graph, watch, **options)
+
+        if isinstance(problem, Instance):
+            if problem.caps and not self.takes_budgets:
+                raise ProblemError(f"formulation {self.name}: it takes no caps; take labels")
+            return path_of_instance(problem, choose, watch)
+        from formulations.states import _search  # noqa: PLC0415  # of states
+
+        states = problem.states if isinstance(problem, AllOrders) else problem
+        if states.budgets and (states is not problem or not self.takes_budgets):
+            able = "schedule_search or path_beam" if problem is states else "order_search"
+            raise ProblemError(f"formulation {self.name}: it takes no budgets; take {able}")
+        tell = _search.watched(states, watch, max_memory, resources.progress or progress)
+        if isinstance(problem, AllOrders):
+            return _search.best_order(problem, choose, watch, tell)
+        if problem.totals:
+            return _search.best_total(problem, choose, watch, tell)
+        return _search.after_margins(
+            problem, lambda rest: _search.chosen(rest, choose, watch, tell), tell
+        )
+
+
+EVERYWHERE = (On.LAYERS, On.SCENARIOS, On.STATES, On.ORDERS, On.GRAPHS)
+
+
+def on_graph(  # noqa: PLR0913  # the fields of a formulation
+    name: str,
+    summary: str,
+    choose: Choose,
+    kind: FormulationKind = FormulationKind.EXACT,
+    *,
+    on: On = On.STATES,
+    aim: Aim | None = None,
+    takes_budgets: bool = False,
+    reads: Reads = Reads.ALL,
+    windowed: tuple[tuple[str, int | str], ...] | None = None,
+    alone: bool = False,
+) -> Formulation:
+    """Return the formulation that chooses a path through a graph.
+
+    Parameters
+    ----------
+    name, summary, kind, aim, takes_budgets, reads, windowed, alone
+        As of `Formulation`.
+    choose : callable
+        Returns a `Choice` of a `Graph` whose moves are all on paths from the start to an end; stops
+        when a `Watch` says so; its options are keyword arguments with defaults. Of states whose
+        first goal is a peak, the graph has those below that of a first plan, by a narrow search.
+    on : On, optional
+        What it is listed for; it runs on every graph.
+
+    Returns
+    -------
+    Formulation
+    """
+    solve, also = OnGraph(name, choose, takes_budgets), tuple(o for o in EVERYWHERE if o is not on)
+    return Formulation(
+        name, summary, kind, aim, solve, reads, takes_budgets, windowed, on, also, alone
+    )

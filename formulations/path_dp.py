@@ -1,0 +1,66 @@
+r"""The full overlap formulation by dynamic programming, one goal after the other: exact.
+
+For the open grips of a schedule it is
+
+.. math::
+
+   \min_{o_1, \dots, o_K} \; \sum_{k=1}^{K} c_k(o_k) + \sum_{k=2}^{K} d_k(o_{k-1}, o_k)
+
+with the costs :math:`c` of single candidates and :math:`d` of the step that neighboring moves
+share (``overlap_dp``), or the same with the largest cost in place of the sum (``minimax``); for a
+free schedule a path through its states (``path_dp``). With moves :math:`a = (u, v)` that take
+:math:`c_a`,
+
+.. math::
+
+   d(v) = \min_{a = (u, v)} \; \max \{ d(u), c_a \}
+   \quad\text{or}\quad
+   d(v) = \min_{a = (u, v)} \; \bigl( d(u) + c_a \bigr),
+   \qquad d(\text{start}) = 0 .
+
+A sum is found by Dijkstra's algorithm from both sides, and only moves with :math:`d(u) + c_a +
+d'(v)` at its least are left for the next goal, :math:`d'` being what is left to an end. Of a peak
+the least value below which moves connect the start to an end is found by bisection. Among paths of
+the same largest cost ``minimax`` takes one of least sum.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from formulations.on_graph import Choice, on_graph
+from seqopt.graph.formulation import On, Watch
+from seqopt.graph.graph import Graph
+from seqopt.graph.paths import fewest_moves, lexicographic
+from seqopt.problem.problem import Aim
+
+
+def _shortest(graph: Graph, watch: Watch) -> Choice:
+    if watch.over:
+        return Choice(fewest_moves(graph), stopped=True)
+    return Choice(*lexicographic(graph))
+
+
+def _least_peak(graph: Graph, watch: Watch) -> Choice:
+    """Return the path of least peak, among these that of the least sum of the same amounts."""
+    twice = np.column_stack([graph.amounts, graph.amounts[:, :1]])
+    peaks = (True, *graph.peaks[1:], False)
+    found = _shortest(Graph(graph.source, graph.target, twice, peaks, graph.ends), watch)
+    return found._replace(bounds=found.bounds[:-1])
+
+
+PATH_DP = on_graph(
+    "path_dp", "dynamic programming over all states, one goal after the other", _shortest
+)
+OVERLAP_DP = on_graph(
+    "overlap_dp", "full overlap, dynamic programming", _shortest, on=On.LAYERS, aim=Aim.SUM
+)
+MINIMAX = on_graph(
+    "minimax", "smallest worst cost over the build", _least_peak, on=On.LAYERS, aim=Aim.PEAK
+)
+SCENARIO_SEARCH = on_graph(
+    "scenario_search",
+    "totals over scenarios, by weights and labels that they bound",
+    _shortest,
+    on=On.SCENARIOS,
+)

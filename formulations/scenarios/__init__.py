@@ -1,1 +1,0 @@
-"""Programs over layers of candidates in many scenarios at once."""

@@ -1,0 +1,216 @@
+"""Choose a path through a graph, and have it judged: of an instance, or of candidates of moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from seqopt._interrupts import answered
+from seqopt.arrays import Floats
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.graph.formulation import (
+    Finding,
+    Formulation,
+    FormulationKind,
+    On,
+    Run,
+    Watch,
+    as_formulation,
+    formulations,
+    timed,
+)
+from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
+from seqopt.graph.solution import StatePath
+from seqopt.judge._arithmetic import judge_instance
+from seqopt.judge._claims import Claim
+from seqopt.judge.certificate import TOLERANCE, Certificate
+from seqopt.plan._guard import called, with_numbers
+from seqopt.plan.plan import Plan
+from seqopt.problem.problem import Aim
+from seqopt.work._clock import INTERRUPT
+
+PROOF = "the proof"  # what it is called where there was no time for it
+AIMS = {SUM: Aim.SUM, PEAK: Aim.PEAK}
+
+
+class FoundPath(NamedTuple):
+    """A path through an instance: what is claimed of it, what is proven, and what it took, s."""
+
+    selection: StatePath
+    certificate: Certificate | None
+    seconds: dict[str, float]
+
+
+def able(instance: Instance) -> tuple[str, ...]:
+    """Return the names of formulations that an instance fits, the usual one first."""
+    every = formulations()
+    kind = On.TIMES if instance.asks_time else On.STATES
+    found = [n for n, f in every.items() if f.on is kind and On.GRAPHS in f.also]
+    if len(instance.goals) == 1 and instance.goals[0].kind in AIMS and not instance.asks_time:
+        aim = AIMS[instance.goals[0].kind]
+        found += [n for n, f in every.items() if f.on is On.LAYERS and f.aim is aim]
+    if instance.caps:
+        found = [name for name in found if every[name].takes_budgets]
+    usual = ("makespan_labels", "labels" if instance.caps else "path_dp", "schedule_search")
+    first = next(name for name in usual if name in found)
+    return (first, *(name for name in found if name != first))
+
+
+def solve_instance(instance: Instance, named: Formulation | str | None, run: Run) -> Plan:
+    """Return the plan of a formulation, of which an instance has the nodes and no steps.
+
+    Raises `ProblemError` if the formulation does not fit; `SolverError` if its answer is not what
+    is claimed.
+    """
+    names = able(instance)
+    formulation = as_formulation(named or names[0])
+    if formulation.name not in names and formulation.name in formulations():
+        raise ProblemError(
+            f"{formulation.name}: instance {instance.name} does not fit; use {' or '.join(names)}"
+        )
+    found = find_path(instance, formulation, run)
+    return Plan(
+        instance, instance, formulation, found.selection, found.certificate, (), found.seconds
+    )
+
+
+def find_path(
+    instance: Instance, formulation: Formulation, run: Run, offset: float = 0.0
+) -> FoundPath:
+    """Return the path that a formulation chooses, judged where a proof is asked for.
+
+    ``offset``: what every path takes beside its arcs. An interrupt is told to the formulation, so
+    that it ends with the best path so far. Raises `InfeasibleError` if no path is within all caps;
+    `SolverError` if the answer is not what is claimed; `KeyboardInterrupt` if it was interrupted
+    and no path was at hand.
+    """
+    formulation.require_options(run.options)
+    watch = Watch(run.left, _shifted(run.progress, offset))
+    seconds: dict[str, float] = {}
+    with timed(seconds, "solve"):
+        selection = _selected(instance, formulation, run, watch)
+    seconds |= {"compile": selection.compile_seconds}
+    seconds["solve"] -= selection.compile_seconds
+    certificate = None
+    with timed(seconds, "verify"):
+        if run.proof:
+            judged = partial(_path_judged, instance, formulation, selection)
+            certificate = run.clock.spare(PROOF, judged, None)
+            if certificate is None:
+                selection = replace(selection, stopped=run.clock.left_out[PROOF])
+    if offset:
+        selection, certificate = _raised(selection, certificate, offset)
+    return FoundPath(selection, certificate, seconds)
+
+
+def _selected(instance: Instance, formulation: Formulation, run: Run, watch: Watch) -> StatePath:
+    """Return what a formulation says, with numbers where numbers belong; or why there is none."""
+    name = formulation.name
+    limit = {} if math.isinf(run.left) else {"seconds": run.left}
+    told = {"watch": watch} if formulation.watched else limit
+    solve = partial(formulation.solve, instance, **run.options, **told)
+    try:
+        with answered(watch.interrupt):
+            found = called(name, lambda: instance, StatePath, solve)
+    except InfeasibleError as error:
+        if not instance.caps:
+            raise SolverError(
+                f"formulation {name} says that no path is allowed, and some are: {error}"
+            ) from None
+        from seqopt.plan._infeasible import refusal  # noqa: PLC0415  # seldom needed
+
+        raise refusal(instance, name, exact=formulation.looks_at_all) from None
+    except SolverError as error:
+        if watch.interrupted:
+            raise KeyboardInterrupt(str(error)) from error
+        raise
+    selection = with_numbers(name, found, len(instance.goals))
+    stopped = INTERRUPT if watch.interrupted else selection.stopped
+    return replace(selection, stopped=stopped, trace=watch.trace)
+
+
+def _shifted(
+    progress: Callable[[Finding], object] | None, offset: float
+) -> Callable[[Finding], object] | None:
+    """Return what is told findings with what every path takes beside."""
+    if progress is None or not offset:
+        return progress
+    return lambda found: progress(_moved(found, offset))
+
+
+def _moved(found: Finding, offset: float) -> Finding:
+    return replace(found, objective=found.objective + offset, bound=found.bound + offset)
+
+
+def _raised(
+    selection: StatePath, certificate: Certificate | None, offset: float
+) -> tuple[StatePath, Certificate | None]:
+    """Return the same with what every path takes beside its arcs."""
+    values, bounds = ((v[0] + offset, *v[1:]) for v in (selection.objective, selection.bound))
+    trace = tuple(_moved(found, offset) for found in selection.trace)
+    selection = replace(selection, objective=values, bound=bounds, trace=trace)
+    if certificate is None:
+        return selection, None
+    proven = [(v[0] + offset, *v[1:]) for v in (certificate.values, certificate.bounds)]
+    return selection, replace(certificate, values=proven[0], bounds=proven[1])
+
+
+def _path_judged(instance: Instance, formulation: Formulation, found: StatePath) -> Certificate:
+    """Return the certificate of a path, by what the formulation says proves its bounds."""
+    nodes = [state[0] for state in found.states]
+    answer = {"nodes": nodes, "values": found.objective}
+    proof = judge_instance(instance, answer, _claims(instance, found))
+    exact = formulation.kind is not FormulationKind.HEURISTIC and not found.stopped
+    if exact and instance.is_plain and proof.gap > TOLERANCE:
+        raise SolverError(
+            f"{formulation.name} promises the least, and no more than "
+            f"{', '.join(f'{b:.9g}' for b in proof.bounds)} is proven"
+        )
+    pairs = zip(proof.values, proof.bounds, found.bound, strict=True)
+    left = [(v - min(v, max(b, said))) / (abs(v) or 1.0) for v, b, said in pairs]
+    return replace(proof, claimed_gap=max(left))
+
+
+def _claims(instance: Instance, found: StatePath) -> list[Claim]:
+    """Return what proves the bound of every goal, as far as the formulation says."""
+    kinds = [goal.kind for goal in instance.goals]
+    if instance.asks_time:
+        return _of_times(instance, found, kinds)
+    if kinds == [TAIL]:
+        return [Claim(weights=np.array(found.prices[0]))] if found.prices else []
+    if not instance.caps:
+        return []
+    sums = [cap.name for cap in instance.caps]
+    out = list[Claim]()
+    for goal, prices, bound in zip(instance.goals, found.prices, found.bound, strict=False):
+        named = {n: max(p, 0.0) for n, p in zip(sums, prices, strict=False)}
+        out.append(Claim(bound if goal.kind == PEAK else None, prices=named))
+        if goal.kind == SUM:
+            sums.append(goal.name)
+    return out
+
+
+def _of_times(instance: Instance, found: StatePath, kinds: list[str]) -> list[Claim]:
+    """Return what proves times: labels where there are any, and shares."""
+    first = 0 if instance.caps else kinds.index(TIME)
+    own = [Claim() for _ in kinds]
+    for k, proof in enumerate(found.proofs[: len(kinds) - first], start=first):
+        if kinds[k] == TIME and len(proof.prices):
+            shares, labels = _shares(instance, proof.prices), None
+            if len(proof.labels):
+                labels = proof.states[:, 1], proof.labels
+            value = None if labels is None else found.bound[k]
+            own[k] = Claim(value, shares=shares, labels=labels)
+    return own
+
+
+def _shares(instance: Instance, prices: Floats) -> Floats:
+    """Return the share of all, and of a robot of every kind, of prices (L, 1 + c) by column."""
+    assert instance.timed is not None  # prices are of robots
+    _, firsts = np.unique(instance.timed.kinds, return_index=True)
+    return np.asarray(prices[:, [0, *(1 + firsts)]])
