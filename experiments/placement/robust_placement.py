@@ -26,7 +26,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from formulations.scenarios.scenario_program import _solve_program
+from experiments.placement.parts.in_order import least_quantile, solve_in_order
+from formulations.scenario_program import solve_program
 from matplotlib.figure import Figure
 
 from experiments.harness.charts import subplots, ticks
