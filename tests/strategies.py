@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 from hypothesis import strategies as st
-from seqopt.graph.layers.interface import CostProblem
 
 from experiments.harness.scenes import running_bond
 from seqopt.graph.layers.costs import Budget, LayeredCosts
@@ -18,6 +17,7 @@ from seqopt.scene.shape import Polyhedron
 from seqopt.sequence.rules import FreeRules
 from seqopt.study.published import ROBOTS
 from tests.builders import about_vertical, from_both_sides, moved
+from tests.layered import Costs
 
 angles = st.floats(-0.3, 0.3)
 
@@ -160,7 +160,7 @@ def problems(draw, most_moves=5, most_candidates=4):
 
     single = tuple(array(size) for size in sizes)
     shared = tuple(array(a, b) for a, b in zip([1, *sizes[:-1]], sizes, strict=True))
-    return CostProblem(LayeredCosts(single, shared))
+    return Costs(LayeredCosts(single, shared))
 
 
 @st.composite

@@ -26,16 +26,17 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from experiments.placement.parts.in_order import least_quantile, solve_in_order
-from formulations.scenario_program import solve_program
 from matplotlib.figure import Figure
 
 from experiments.harness.charts import subplots, ticks
 from experiments.harness.claim import Claim, Finding, Options, Times, on_this_run
 from experiments.harness.results import drawn, stored
 from experiments.harness.scenes import half_circle
+from experiments.placement.parts.in_order import least_quantile, solve_in_order
+from formulations.scenario_program import solve_program
 from seqopt import Plan, Scene, build_network, load_scene, make_engine, scenarios, solve
 from seqopt.graph.formulation import Watch
+from seqopt.graph.layers.compiled import compile_totals
 from seqopt.graph.layers.layers import Layers, candidate_layers
 from seqopt.graph.scenarios import Choice, ScenarioLayers, in_scenarios
 from seqopt.plan.out_of_sample import judge_unseen
@@ -105,12 +106,14 @@ def references(scene: Scene, count: int, limit: float) -> pd.DataFrame:
     for aim in (WORST_TOTAL, TAIL):
         plan = solve(most.under(aim))
         start = time.perf_counter()
-        told = _solve_program(
-            most.layered(Aim.SUM), aim.most(count), whole=True, watch=Watch(limit)
+        compiled = compile_totals("totals", most.layered(Aim.SUM), aim)
+        told, value = solve_program(
+            compiled.instance.asked, aim.most(count), whole=True, watch=Watch(limit)
         )
         row = {"aim": str(aim), "scenarios": count, "objective": plan.objective[str(aim)]}
-        row |= {"bound": plan.selection.bound, "solve_s": plan.seconds["solve"]}
-        row |= {"program": told.objective, "program_bound": told.bound}
+        row |= {"bound": plan.selection.bound[0], "solve_s": plan.seconds["solve"]}
+        row |= {"program": value + compiled.offset}
+        row |= {"program_bound": told.bounds[0] + compiled.offset}
         found.append(row | {"program_s": time.perf_counter() - start, "limit_s": limit})
     return pd.DataFrame(found)
 

@@ -29,7 +29,8 @@ from itertools import islice
 
 import numpy as np
 
-from formulations.states._search import StopError, best_order, exact_best, shortest, watched
+from formulations.states._search import best_order, exact_best, shortest, watched
+from formulations.states._totals import StopError
 from seqopt.errors import NothingFoundError, ProblemError, TimeUpError
 from seqopt.graph._explore import Explorer, Visited
 from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch

@@ -21,7 +21,6 @@ import numpy as np
 
 from formulations.on_graph import Choice
 from formulations.states._search import (
-    StopError,
     after_margins,
     best_order,
     best_standing,
@@ -31,6 +30,7 @@ from formulations.states._search import (
     shortest,
     watched,
 )
+from formulations.states._totals import StopError
 from seqopt.errors import ProblemError
 from seqopt.graph._explore import Explorer
 from seqopt.graph.formulation import Formulation, FormulationKind, On, Watch

@@ -53,7 +53,6 @@ from formulations.labels import relaxed
 from formulations.on_graph import path_of_instance
 from formulations.states._search import (
     WIDTH,
-    StopError,
     Watching,
     after_margins,
     best_standing,
@@ -63,6 +62,7 @@ from formulations.states._search import (
     shortest,
     watched,
 )
+from formulations.states._totals import StopError
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError
 from seqopt.graph._budgets import is_beyond
 from seqopt.graph._explore import Explorer

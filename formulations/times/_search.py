@@ -15,13 +15,13 @@ import numpy as np
 
 from formulations.states._search import (
     WIDTH,
-    StopError,
     Watching,
     after_margins,
     narrow,
     plan_by_then,
     watched,
 )
+from formulations.states._totals import StopError
 from formulations.times._stages import ALMOST, Choose, StageFound, Stages
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, StepError, TimeUpError

@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from formulations.states._search import StopError
+from formulations.states._totals import StopError
 from formulations.times._labels import (
     STEPS,
     Caps,

@@ -155,7 +155,7 @@ def _extended(asked: Ground, now: Labels, limit: float) -> Labels:
         keep = np.flatnonzero(priced + asked.rest[state] < tight)
         row, move, state, priced = row[keep], move[keep], state[keep], priced[keep]
         taken = part.taken[row] + asked.amounts[move]
-        fits = (taken + asked.least[state] <= asked.caps).all(axis=1)
+        fits: Bools = np.asarray((taken + asked.least[state] <= asked.caps).all(axis=1))
         cost = part.cost[row] + asked.costs[move]
         parts.append(Labels(state, priced, cost, taken, move, row + start).of(fits))
     return Labels._make(map(np.concatenate, zip(*parts, strict=True)))

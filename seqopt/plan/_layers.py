@@ -89,8 +89,8 @@ def compiled(graph: Choices, aim: Aim | None, name: str = "", *, alone: bool = F
         largest_of(layers)  # says if no choice is allowed in all scenarios
         return compile_totals(name, layers, graph.aim, nodes)
     aim = aim or Aim.SUM
-    alone = graph.alone if alone and isinstance(graph, Layers) else None
-    found = compile_costs(name, aim.costs(graph), aim, graph.budgets, alone, nodes)
+    charged = graph.alone if alone and isinstance(graph, Layers) else None
+    found = compile_costs(name, aim.costs(graph), aim, graph.budgets, charged, nodes)
     if isinstance(graph, Layers):
         return found
     (goal,) = found.instance.goals

@@ -563,8 +563,8 @@ def _spent(plan: Plan) -> dict[str, dict[str, float | None]]:
             for name, cap in capped
         }
     assert not isinstance(plan.graph, Instance)  # of which there is another summary
-    capped = [budget.name for budget in plan.graph.budgets if isfinite(budget.bound)]
-    prices = dict(zip(capped, chosen.prices[0] if chosen.prices else (), strict=False))
+    known = [budget.name for budget in plan.graph.budgets if isfinite(budget.bound)]
+    prices = dict(zip(known, chosen.prices[0] if chosen.prices else (), strict=False))
     for budget in plan.graph.budgets:
         bound = budget.bound if isfinite(budget.bound) else None
         price = prices.get(budget.name)

@@ -10,7 +10,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.errors import SolverError
 from seqopt.graph._timed import HELD, NOW, TimedGraph
 from seqopt.graph.graph import Graph
-from seqopt.graph.instances.instance import Instance
+from seqopt.graph.instance import Instance
 from seqopt.judge._claims import Claim, Labels, Stage, _sum
 from seqopt.times._label_proof import Closed, Limits, Team, TimedMoves, limit_below
 

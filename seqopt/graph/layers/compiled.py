@@ -132,9 +132,19 @@ def _compiled(
     levels = np.repeat(np.arange(len(sizes) + 1), [1, *sizes])
     called = candidates if nodes is None else np.concatenate([[0], *nodes])
     rows = np.column_stack([levels, called]).astype(np.int64)[kept]
-    arrays = graph.source, graph.target, graph.ends
-    told = tuple(names), graph.amounts, goals, caps, rows
-    return Compiled(Instance(name, *arrays, *told, alone=graph.alone), candidates[kept], offset)
+    instance = Instance(
+        name,
+        graph.source,
+        graph.target,
+        graph.ends,
+        tuple(names),
+        graph.amounts,
+        goals,
+        caps,
+        rows,
+        alone=graph.alone,
+    )
+    return Compiled(instance, candidates[kept], offset)
 
 
 def on_paths(graph: Graph) -> tuple[Graph, Ints]:
