@@ -9,13 +9,13 @@ from seqopt.engines.registry import make_engine as make_engine
 from seqopt.errors import SeqoptError as SeqoptError
 from seqopt.graph.formulation import Formulation as Formulation
 from seqopt.graph.formulation import formulations as formulations
-from seqopt.graph.instances._files import read_instance as read_instance
-from seqopt.graph.instances._files import save_instance as save_instance
-from seqopt.judge._arithmetic import judge_instance as judge_instance
+from seqopt.instances._files import read_instance as read_instance
+from seqopt.instances._files import save_instance as save_instance
+from seqopt.instances.answers import judge_instance as judge_instance
+from seqopt.instances.compiled import compile_instance as compile_instance
 from seqopt.judge.certificate import Certificate as Certificate
 from seqopt.network.build import build_network as build_network
 from seqopt.network.network import Network as Network
-from seqopt.plan._compiled import compile_instance as compile_instance
 from seqopt.plan.build import GivenSequence as GivenSequence
 from seqopt.plan.plan import Plan as Plan
 from seqopt.plan.solving import pose as pose

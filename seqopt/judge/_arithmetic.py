@@ -1,27 +1,19 @@
-"""The judge of instances: a path recomputed arc by arc, and bounds checked by arithmetic alone."""
+"""The judge of paths: one is recomputed arc by arc, and bounds are checked by arithmetic alone."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping, Sequence
-from numbers import Real
-from pathlib import Path
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from seqopt._files import parse_json, read_text
 from seqopt.arrays import Floats, Ints
-from seqopt.errors import ProblemError, SolverError
+from seqopt.errors import SolverError
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance, _Target, _target_sums
 from seqopt.judge._claims import ABOVE, Claim, first_stage, next_stage, proven, within_caps
 from seqopt.judge._twin import twin_of
 from seqopt.judge.certificate import TOLERANCE, Certificate
 from seqopt.problem.problem import Measure
-from seqopt.scene._checks import as_float, short
-
-WHAT = ("nodes", "arcs", "acts")
-KEYS = ("value", "potentials", "cut", "prices", "weights", "shares", "labels")
 
 
 class Answer(NamedTuple):
@@ -33,191 +25,17 @@ class Answer(NamedTuple):
     bounds: tuple[Claim, ...]
 
 
-def as_answer(instance: Instance, solution: Any, bounds: Any) -> Answer:
-    """Return a solution with its bounds; a `ProblemError` names an entry that cannot be read."""
-    found, where = _loaded(solution)
-    if isinstance(found, Mapping):
-        if unknown := {*found} - {*WHAT, "values", "bounds", "instance"}:
-            known = f"{', '.join(WHAT)}, values and bounds"
-            raise ProblemError(f"{where}: {min(map(str, unknown))} is none of {known}")
-        named = [what for what in WHAT if what in found]
-        if len(named) != 1:
-            raise ProblemError(f"{where}: give one of {', '.join(WHAT)}")
-        what, numbers = named[0], found[named[0]]
-        own = found.get("bounds", ())
-        values = found.get("values", ())
-    else:
-        what, numbers, own, values = "nodes", found, (), ()
-    claims, said = (own, where) if _is_empty(bounds) else _loaded(bounds)
-    if isinstance(claims, Mapping):
-        claims = claims.get("bounds", claims)
-    claims = [claims] if isinstance(claims, Mapping | Claim) else claims
-    if isinstance(claims, str) or not isinstance(claims, Sequence):
-        raise ProblemError(f"{said}: bounds are {short(claims)}; give a list, one for every goal")
-    return Answer(
-        what,
-        _whole(numbers, f"{where}, {what}"),
-        _values(instance, values, where),
-        tuple(_claim(each, f"{said}, bound {k}") for k, each in enumerate(claims, start=1)),
-    )
-
-
-def _is_empty(bounds: Any) -> bool:
-    return isinstance(bounds, Sequence) and not len(bounds)
-
-
-def _loaded(given: Any) -> tuple[Any, str]:
-    """Return what a file or a text holds, or what is given; and what to call it."""
-    if isinstance(given, Path):
-        return _parsed(read_text(given), str(given)), str(given)
-    if isinstance(given, str):
-        return _parsed(given, "the solution"), "the solution"
-    return given, "the solution"
-
-
-def _parsed(text: str, where: str) -> Any:
-    """Return what a text holds: JSON, or numbers after a word that says of what."""
-    if text.lstrip()[:1] in ("{", "["):
-        return parse_json(text, where, ProblemError)
-    words = re.split(r"[\s,;]+", text.strip())
-    what = words[0].lower().rstrip(":").removesuffix("s") + "s"
-    numbers = words[1:] if what in WHAT else words
-    for word in numbers:
-        if not re.fullmatch(r"[0-9]{1,18}", word):
-            raise ProblemError(f"{where}: {short(word)} is no number of a node; give 0, 1, 2 …")
-    return {what if what in WHAT else "nodes": [int(word) for word in numbers]}
-
-
-def _whole(given: Any, where: str) -> Ints:
-    """Return whole numbers from 0."""
-    found = _array(given)
-    if found is None or found.ndim != 1 or not len(found) or (found % 1).any():
-        raise ProblemError(f"{where}: give a list of whole numbers")
-    return found.astype(np.int64)
-
-
-def _array(given: Any) -> np.ndarray | None:
-    """Return numbers as an array, none of them beyond what whole numbers hold; None if not all are.
-
-    Nothing but numbers counts as one, nor does a list whose rows differ in length.
-    """
-    try:
-        found = np.asarray(given)
-    except (TypeError, ValueError, OverflowError, RecursionError):
-        return None
-    if found.dtype.kind not in "iuf" or not (np.abs(found) < 2.0**63).all():  # NaN is none
-        return None
-    return found
-
-
-def _values(instance: Instance, given: Any, where: str) -> tuple[float | None, ...]:
-    """Return claimed values in the order of goals, None where none is claimed."""
-    names = [goal.name for goal in instance.goals]
-    if isinstance(given, Mapping):
-        if unknown := {*given} - {*names}:
-            first = min(map(str, unknown))
-            raise ProblemError(f"{where}: {first} is no goal; give {', '.join(names)}")
-        return tuple(
-            float(_floats([given[n]], f"{where}, values, {n}")[0]) if n in given else None
-            for n in names
-        )
-    found = _floats(given, f"{where}, values")
-    if len(found) > len(names):
-        raise ProblemError(f"{where}: {len(found)} values for {len(names)} goals; leave some out")
-    return tuple(found.tolist())
-
-
-def _floats(given: Any, where: str) -> Floats:
-    """Return numbers (n,), infinite where there is none."""
-    if isinstance(given, str | bytes | Mapping) or not isinstance(given, Iterable):
-        raise ProblemError(f"{where}: give a list of numbers")
-    found = np.array([np.inf if v is None else as_float(v) for v in given], dtype=float)
-    if np.isnan(found).any():
-        raise ProblemError(f"{where}: give a list of numbers; NaN and text are none")
-    return found
-
-
-def _claim(given: Any, where: str) -> Claim:
-    """Return a claim of a mapping, or of a number alone."""
-    if isinstance(given, Real):
-        given = {"value": given}
-    if isinstance(given, Claim):
-        return given
-    if not isinstance(given, Mapping):
-        raise ProblemError(f"{where}: {short(given)} is no bound; give {', '.join(KEYS)}")
-    if unknown := {*given} - {*KEYS}:
-        raise ProblemError(f"{where}: {min(map(str, unknown))} is none of {', '.join(KEYS)}")
-    value, prices = given.get("value"), given.get("prices", {})
-    if not isinstance(prices, Mapping):
-        raise ProblemError(f"{where}, prices: give them by name of a cap, or of a sum before")
-    arrays = {
-        name: None if given.get(name) is None else _floats(given[name], f"{where}, {name}")
-        for name in ("potentials", "weights")
-    }
-    shares = None if given.get("shares") is None else _table(given["shares"], f"{where}, shares")
-    cut = None if given.get("cut") is None else _whole(given["cut"], f"{where}, cut")
-    labels = None if given.get("labels") is None else _labels(given["labels"], f"{where}, labels")
-    number = None if value is None else float(_floats([value], where)[0])
-    named = {str(n): float(_floats([p], f"{where}, prices")[0]) for n, p in prices.items()}
-    return Claim(number, **arrays, cut=cut, prices=named, shares=shares, labels=labels)
-
-
-def _table(given: Any, where: str) -> Floats:
-    """Return rows of numbers; one row may be given alone."""
-    found = _array(given)
-    if found is None or not 1 <= found.ndim <= 2:
-        raise ProblemError(f"{where}: give rows of as many numbers each")
-    return np.atleast_2d(found.astype(float))
-
-
-def _labels(given: Any, where: str) -> tuple[Ints, Floats]:
-    """Return labels: nodes and a row of numbers for each."""
-    if not isinstance(given, Mapping) or {*given} != {"nodes", "values"}:
-        raise ProblemError(f"{where}: give nodes and values")
-    return _whole(given["nodes"], f"{where}, nodes"), _table(given["values"], f"{where}, values")
-
-
 BELOW = 1e-9  # by how much a path must be better, over the size of the value
 
 
-def judge_instance(instance: Instance, solution: Any, bounds: Any = ()) -> Certificate:
-    """Check a bare solution of an instance, and bounds with what is to prove them.
+def judge_path(instance: Instance, answer: Answer) -> Certificate:
+    """Check a path through an instance, and bounds with what is to prove them.
 
-    Parameters
-    ----------
-    instance : Instance
-        From `seqopt.read_instance` or `seqopt.compile_instance`.
-    solution : path, str, sequence of int or mapping
-        A file (JSON, CSV or plain text), or what it holds: the nodes of a path, or a mapping with
-        ``nodes``, ``arcs`` or ``acts`` and, if they are to be checked, ``values`` and ``bounds``.
-    bounds : path, sequence or mapping, optional
-        For every goal, the most important first, a mapping: ``value`` and what proves it:
-        ``potentials``, ``cut``, ``prices``, ``weights``, ``shares``, ``labels``.
-
-    Returns
-    -------
-    Certificate
-        Values, and what no path stays below: by what is given; where nothing is, by potentials, a
-        cut or prices that the judge finds itself. A bound without proof counts as claimed.
-
-    Raises
-    ------
-    FileError, ProblemError
-        If a file or an entry cannot be read.
-    SolverError
-        If the path does not lead from node 0 to an end, exceeds a cap or is worth something else
-        than is claimed; or if a bound is higher than what is to prove it.
-
-    Examples
-    --------
-    >>> import seqopt
-    >>> instance = seqopt.compile_instance(seqopt.optimize("arch25").problem)
-    >>> plan = seqopt.solve(instance)
-    >>> proof = seqopt.judge_instance(instance, plan.nodes)
-    >>> round(proof.objective, 5), proof.gap
-    (657.46456, 0.0)
+    Result: values, and what no path stays below: by what is given; where nothing is, by potentials,
+    a cut or multipliers that the judge finds itself. A bound without proof counts as claimed.
+    Raises `SolverError` if the path does not lead from node 0 to an end, exceeds a cap or is worth
+    something else than is claimed; or if a bound is higher than what is to prove it.
     """
-    answer = as_answer(instance, solution, bounds)
     path = _walked(instance, answer)
     values = tuple(_value(instance, goal, path) for goal in instance.goals)
     for goal, value, claimed in zip(instance.goals, values, answer.values, strict=False):

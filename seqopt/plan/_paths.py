@@ -26,7 +26,7 @@ from seqopt.graph.formulation import (
 )
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
 from seqopt.graph.solution import StatePath
-from seqopt.judge._arithmetic import judge_instance
+from seqopt.judge._arithmetic import Answer, judge_path
 from seqopt.judge._claims import Claim
 from seqopt.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan._guard import called, with_numbers
@@ -163,8 +163,8 @@ def _raised(
 def _path_judged(instance: Instance, formulation: Formulation, found: StatePath) -> Certificate:
     """Return the certificate of a path, by what the formulation says proves its bounds."""
     nodes = [state[0] for state in found.states]
-    answer = {"nodes": nodes, "values": found.objective}
-    proof = judge_instance(instance, answer, _claims(instance, found))
+    answer = Answer("nodes", np.array(nodes), found.objective, tuple(_claims(instance, found)))
+    proof = judge_path(instance, answer)
     exact = formulation.kind is not FormulationKind.HEURISTIC and not found.stopped
     if exact and instance.is_plain and proof.gap > TOLERANCE:
         raise SolverError(

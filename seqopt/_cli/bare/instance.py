@@ -17,9 +17,9 @@ from seqopt._cli.values import parse_time_limit
 from seqopt._cli.words.given import file_name, take
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import find_formulation
-from seqopt.graph.instances._files import WRITERS, save_instance
+from seqopt.instances._files import WRITERS, save_instance
+from seqopt.instances.compiled import compile_instance
 from seqopt.judge._claims import first_stage
-from seqopt.plan._compiled import compile_instance
 from seqopt.problem._limit_words import number_word
 from seqopt.work._clock import Clock
 

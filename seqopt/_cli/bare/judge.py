@@ -11,8 +11,8 @@ from seqopt._cli.options import declare, form_options
 from seqopt._cli.screens import question
 from seqopt.errors import SolverError
 from seqopt.graph.instance import Instance
-from seqopt.graph.instances._files import read_instance
-from seqopt.judge._arithmetic import judge_instance
+from seqopt.instances._files import read_instance
+from seqopt.instances.answers import judge_instance
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 
 DESCRIPTION = (

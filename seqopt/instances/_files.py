@@ -18,7 +18,7 @@ from seqopt.errors import FileError, ProblemError
 from seqopt.graph._timed import NOW, TimedGraph
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _by_goal, _Cap, _Target
-from seqopt.graph.instances._texts import as_cp_sat, as_lp, as_mps
+from seqopt.instances._texts import as_cp_sat, as_lp, as_mps
 from seqopt.scene._checks import short
 
 FORMAT, VERSION = "seqopt-instance", 1

@@ -9,7 +9,7 @@ from scipy import sparse
 
 from seqopt.arrays import Floats
 from seqopt.graph.instance import Instance
-from seqopt.graph.instances._program import NEVER, Program, program
+from seqopt.instances._program import NEVER, Program, program
 
 FINEST = 1e9  # parts of the largest amount, where whole numbers are asked
 PARTS = (1, 2, 5, 10, 20, 50, 100, 1000)
