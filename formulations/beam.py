@@ -18,7 +18,8 @@ from __future__ import annotations
 import numpy as np
 
 from formulations.cascade import _charged, greedy
-from formulations.on_graph import Choice, on_graph, onward
+from formulations.choice import Choice, onward
+from formulations.on_graph import on_graph
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import FormulationKind, On, Watch
 from seqopt.graph.graph import Graph

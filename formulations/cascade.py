@@ -25,7 +25,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from formulations.on_graph import Choice, on_graph, onward
+from formulations.choice import Choice, onward
+from formulations.on_graph import on_graph
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import FormulationKind, On, Reads, Watch

@@ -42,7 +42,8 @@ from dataclasses import replace
 import numpy as np
 from scipy import sparse
 
-from formulations.on_graph import Choice, on_graph
+from formulations.choice import Choice
+from formulations.on_graph import on_graph
 from formulations.solvers import STOPS, Point, minimize_rows
 from seqopt.arrays import Floats
 from seqopt.graph.formulation import Watch

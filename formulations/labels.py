@@ -32,7 +32,8 @@ costs and takes; those are continued that may become better than the best path k
 
 from __future__ import annotations
 
-from formulations.on_graph import Choice, on_graph
+from formulations.choice import Choice
+from formulations.on_graph import on_graph
 from seqopt.errors import ProblemError
 from seqopt.graph._budgets import within_budgets
 from seqopt.graph.formulation import FormulationKind, On, Watch

@@ -1,57 +1,33 @@
 """What formulations of paths share: a graph goes in, a path comes out, whatever is built.
 
-A formulation is a function from a `seqopt.graph.Graph` to a `Choice`: a path, and what no path
-stays below. The graph is that of the open grips of a schedule, of the states of a free schedule, of
-all orders, or of an instance; see `on_graph`.
+A formulation is a function from a `seqopt.graph.graph.Graph` to a `formulations.choice.Choice`: a
+path, and what no path stays below. The graph is that of the open grips of a schedule, of the states
+of a free schedule, of all orders, or of an instance; see `on_graph`.
 """
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from formulations.choice import Choice, Choose
+from formulations.states import _search
+from formulations.states._totals import cheapest_by, least_total
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
 from seqopt.graph.formulation import Formulation, FormulationKind, On, Reads, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import TAIL, Instance, _Target, _target_sums
 from seqopt.graph.orders import AllOrders, OrderSelection
-from seqopt.graph.paths import distances, path_values
+from seqopt.graph.paths import path_values
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import WORST_TOTAL, Aim, RobustAim, cvar
 from seqopt.responses.resources import HERE, Resources
 from seqopt.work.progress import Tell
-
-
-class Choice(NamedTuple):
-    """A path through a graph, its start left out and empty where none was found in time.
-
-    ``bounds``: what no path stays below in the first goals, those before each being at their
-    values; ``stopped``: whether time was over before all was found; ``prices``: by goal, the
-    multipliers of caps and of the sums before it that prove its bound; ``compile_seconds``: what
-    writing a program down took.
-    """
-
-    path: tuple[int, ...]
-    bounds: tuple[float, ...] = ()
-    stopped: bool = False
-    prices: tuple[tuple[float, ...], ...] = ()
-    compile_seconds: float = 0.0
-
-
-Choose = Callable[..., Choice]
-"""Takes a graph whose moves are all on paths from the start to an end, a `Watch` and options."""
-
-
-def onward(graph: Graph) -> Graph:
-    """Return the graph of moves after which fewer moves are left to an end."""
-    left = distances(graph, np.ones(len(graph.source)), back=True)
-    return graph.only(left[graph.target] < left[graph.source])
 
 
 def path_of_instance(instance: Instance, choose: Choose, watch: Watch) -> StatePath:
@@ -86,8 +62,6 @@ def path_of_instance(instance: Instance, choose: Choose, watch: Watch) -> StateP
 
 def _least_tail(graph: Graph, goal: _Target, choose: Choose, watch: Watch) -> Choice:
     """Return the path of least worst or tail total over scenarios, with their weights."""
-    from formulations.states._totals import cheapest_by, least_total  # noqa: PLC0415  # few ask
-
     found = least_total(graph, _aim(goal), cheapest_by(choose, watch), watch)
     return Choice(found.path, (found.bound,), watch.over, (tuple(found.weights.tolist()),))
 
@@ -142,8 +116,6 @@ class OnGraph(Terse):
             if problem.caps and not self.takes_budgets:
                 raise ProblemError(f"formulation {self.name}: it takes no caps; take labels")
             return path_of_instance(problem, choose, watch)
-        from formulations.states import _search  # noqa: PLC0415  # of states
-
         states = problem.states if isinstance(problem, AllOrders) else problem
         if states.budgets and (states is not problem or not self.takes_budgets):
             able = "schedule_search or path_beam" if problem is states else "order_search"

@@ -34,7 +34,8 @@ import numpy as np
 from scipy import sparse
 
 from formulations.cascade import greedy
-from formulations.on_graph import Choice, Choose, on_graph, onward
+from formulations.choice import Choice, Choose, onward
+from formulations.on_graph import on_graph
 from formulations.solvers import minimize, minimize_whole
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError

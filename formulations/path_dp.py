@@ -28,7 +28,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from formulations.on_graph import Choice, on_graph
+from formulations.choice import Choice
+from formulations.on_graph import on_graph
 from seqopt.graph.formulation import On, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import fewest_moves, lexicographic

@@ -36,7 +36,8 @@ from operator import le
 
 import numpy as np
 
-from formulations.on_graph import Choice, on_graph
+from formulations.choice import Choice
+from formulations.on_graph import on_graph
 from formulations.states._totals import path_of
 from seqopt.arrays import Floats
 from seqopt.graph.formulation import Watch

@@ -23,7 +23,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from formulations.on_graph import Choice, on_graph, onward
+from formulations.choice import Choice, onward
+from formulations.on_graph import on_graph
 from seqopt.arrays import Floats, Ints
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import FormulationKind, On, Watch

@@ -18,7 +18,7 @@ from __future__ import annotations
 import cvxpy as cp
 import numpy as np
 
-from formulations.on_graph import Choice
+from formulations.choice import Choice
 from formulations.overlap_flow import unit_flow
 from formulations.solvers import minimize, minimize_whole
 from seqopt.graph.formulation import Watch

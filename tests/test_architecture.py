@@ -40,12 +40,13 @@ ROOMS = (
     {"_cli"},
     {"__init__", "__main__"},
 )  # a room imports from rooms above it in this list only
-OUTER = {"arms", "exchange", "times", "instances", "report", "_cli"}  # the inner rooms do without them
+OUTER = {"arms", "exchange", "times", "instances", "report", "_cli"}  # the inner ones do without
 TOP = {"workflow", "__init__", "__main__"}  # open inner and outer rooms
 SOLVERS = {"cvxpy", "clarabel", "highspy"}
 SOLVER_HOME = "formulations"
 SHARED = {  # what formulations may import
     "formulations.solvers",
+    "formulations.choice",
     "formulations.on_graph",
     "formulations.cascade",
     "formulations.labels",

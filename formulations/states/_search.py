@@ -9,7 +9,7 @@ from operator import le
 
 import numpy as np
 
-from formulations.on_graph import Choice, Choose
+from formulations.choice import Choice, Choose
 from formulations.states._totals import StopError, cheapest_by, least_total
 from seqopt._interrupts import answered
 from seqopt.arrays import Ints

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from formulations._weights import CLOSE, Weighed, best_weights, provers
-from formulations.on_graph import Choose
+from formulations.choice import Choose
 from seqopt.arrays import Floats, Ints
 from seqopt.graph.formulation import Watch
 from seqopt.graph.graph import Graph

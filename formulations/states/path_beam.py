@@ -19,7 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from formulations.on_graph import Choice
+from formulations.choice import Choice
 from formulations.states._search import (
     after_margins,
     best_order,

@@ -12,30 +12,17 @@ import numpy as np
 
 from seqopt._interrupts import answered
 from seqopt.arrays import Floats
-from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph.formulation import (
-    Finding,
-    Formulation,
-    FormulationKind,
-    On,
-    Run,
-    Watch,
-    as_formulation,
-    formulations,
-    timed,
-)
+from seqopt.errors import InfeasibleError, SolverError
+from seqopt.graph.formulation import Finding, Formulation, FormulationKind, Run, Watch, timed
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
 from seqopt.graph.solution import StatePath
 from seqopt.judge._arithmetic import Answer, judge_path
 from seqopt.judge._claims import Claim
 from seqopt.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan._guard import called, with_numbers
-from seqopt.plan.plan import Plan
-from seqopt.problem.problem import Aim
 from seqopt.work._clock import INTERRUPT
 
 PROOF = "the proof"  # what it is called where there was no time for it
-AIMS = {SUM: Aim.SUM, PEAK: Aim.PEAK}
 
 
 class FoundPath(NamedTuple):
@@ -44,39 +31,6 @@ class FoundPath(NamedTuple):
     selection: StatePath
     certificate: Certificate | None
     seconds: dict[str, float]
-
-
-def able(instance: Instance) -> tuple[str, ...]:
-    """Return the names of formulations that an instance fits, the usual one first."""
-    every = formulations()
-    kind = On.TIMES if instance.asks_time else On.STATES
-    found = [n for n, f in every.items() if f.on is kind and On.GRAPHS in f.also]
-    if len(instance.goals) == 1 and instance.goals[0].kind in AIMS and not instance.asks_time:
-        aim = AIMS[instance.goals[0].kind]
-        found += [n for n, f in every.items() if f.on is On.LAYERS and f.aim is aim]
-    if instance.caps:
-        found = [name for name in found if every[name].takes_budgets]
-    usual = ("makespan_labels", "labels" if instance.caps else "path_dp", "schedule_search")
-    first = next(name for name in usual if name in found)
-    return (first, *(name for name in found if name != first))
-
-
-def solve_instance(instance: Instance, named: Formulation | str | None, run: Run) -> Plan:
-    """Return the plan of a formulation, of which an instance has the nodes and no steps.
-
-    Raises `ProblemError` if the formulation does not fit; `SolverError` if its answer is not what
-    is claimed.
-    """
-    names = able(instance)
-    formulation = as_formulation(named or names[0])
-    if formulation.name not in names and formulation.name in formulations():
-        raise ProblemError(
-            f"{formulation.name}: instance {instance.name} does not fit; use {' or '.join(names)}"
-        )
-    found = find_path(instance, formulation, run)
-    return Plan(
-        instance, instance, formulation, found.selection, found.certificate, (), found.seconds
-    )
 
 
 def find_path(

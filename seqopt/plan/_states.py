@@ -13,8 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from seqopt.errors import InfeasibleError, SolverError
-from seqopt.graph.formulation import Formulation, FormulationKind, Run, find_formulation
+from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from seqopt.graph.formulation import (
+    Formulation,
+    FormulationKind,
+    On,
+    Run,
+    as_formulation,
+    find_formulation,
+    formulations,
+)
+from seqopt.graph.instance import PEAK, SUM, Instance
 from seqopt.graph.orders import AllOrders, OrderSelection
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import barred, steps_in_hands
@@ -24,12 +33,49 @@ from seqopt.judge.certificate import TOLERANCE
 from seqopt.judge.schedules import judge_schedule
 from seqopt.plan._guard import called, readable, require_proof, text, with_numbers
 from seqopt.plan._infeasible import claimed, confirmed, without_order
-from seqopt.plan._paths import PROOF
+from seqopt.plan._paths import PROOF, find_path
 from seqopt.plan._status import FoundOrder
 from seqopt.plan.plan import Plan
+from seqopt.problem.problem import Aim
 from seqopt.responses.resources import HERE
 from seqopt.scene.scene import Order, in_order
 from seqopt.work._workers import keep
+
+AIMS = {SUM: Aim.SUM, PEAK: Aim.PEAK}
+
+
+def able(instance: Instance) -> tuple[str, ...]:
+    """Return the names of formulations that an instance fits, the usual one first."""
+    every = formulations()
+    kind = On.TIMES if instance.asks_time else On.STATES
+    found = [n for n, f in every.items() if f.on is kind and On.GRAPHS in f.also]
+    if len(instance.goals) == 1 and instance.goals[0].kind in AIMS and not instance.asks_time:
+        aim = AIMS[instance.goals[0].kind]
+        found += [n for n, f in every.items() if f.on is On.LAYERS and f.aim is aim]
+    if instance.caps:
+        found = [name for name in found if every[name].takes_budgets]
+    usual = ("makespan_labels", "labels" if instance.caps else "path_dp", "schedule_search")
+    first = next(name for name in usual if name in found)
+    return (first, *(name for name in found if name != first))
+
+
+def solve_instance(instance: Instance, named: Formulation | str | None, run: Run) -> Plan:
+    """Return the plan of a formulation, of which an instance has the nodes and no steps.
+
+    Raises `ProblemError` if the formulation does not fit; `SolverError` if its answer is not what
+    is claimed.
+    """
+    names = able(instance)
+    formulation = as_formulation(named or names[0])
+    if formulation.name not in names and formulation.name in formulations():
+        raise ProblemError(
+            f"{formulation.name}: instance {instance.name} does not fit; use {' or '.join(names)}"
+        )
+    found = find_path(instance, formulation, run)
+    return Plan(
+        instance, instance, formulation, found.selection, found.certificate, (), found.seconds
+    )
+
 
 COUNTED = ("each", "sets", "screened", "stability")  # of a problem: they know what was computed
 

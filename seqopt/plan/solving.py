@@ -480,7 +480,7 @@ def _of_graph(problem: Any, formulation: Formulation | str | None, run: Run) -> 
     """Return the plan of a graph of choices that is given, or of an instance."""
     from seqopt.graph.instance import Instance  # noqa: PLC0415  # few are given
     from seqopt.graph.orders import AllOrders  # noqa: PLC0415
-    from seqopt.plan._paths import solve_instance  # noqa: PLC0415
+    from seqopt.plan._states import solve_instance  # noqa: PLC0415
 
     if isinstance(problem, Instance):
         return solve_instance(problem, formulation, run)
