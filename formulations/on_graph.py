@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from formulations.choice import Choice, Choose
-from formulations.states import _search
+from formulations.states._search import after_margins, best_order, best_total, chosen, watched
 from formulations.states._totals import cheapest_by, least_total
 from seqopt.arrays import Terse
 from seqopt.errors import InfeasibleError, ProblemError, TimeUpError
@@ -120,14 +120,12 @@ class OnGraph(Terse):
         if states.budgets and (states is not problem or not self.takes_budgets):
             able = "schedule_search or path_beam" if problem is states else "order_search"
             raise ProblemError(f"formulation {self.name}: it takes no budgets; take {able}")
-        tell = _search.watched(states, watch, max_memory, resources.progress or progress)
+        tell = watched(states, watch, max_memory, resources.progress or progress)
         if isinstance(problem, AllOrders):
-            return _search.best_order(problem, choose, watch, tell)
+            return best_order(problem, choose, watch, tell)
         if problem.totals:
-            return _search.best_total(problem, choose, watch, tell)
-        return _search.after_margins(
-            problem, lambda rest: _search.chosen(rest, choose, watch, tell), tell
-        )
+            return best_total(problem, choose, watch, tell)
+        return after_margins(problem, lambda rest: chosen(rest, choose, watch, tell), tell)
 
 
 EVERYWHERE = (On.LAYERS, On.SCENARIOS, On.STATES, On.ORDERS, On.GRAPHS)
