@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -112,6 +112,18 @@ class Instance(FrozenValue, Shown):
         asked = ", ".join([goal.name for goal in self.goals])
         capped = "".join(f", {cap.name} <= {cap.most:g}" for cap in self.caps)
         return f"<Instance {self.name!r}: {self.nodes} nodes, {self.arcs} arcs, {asked}{capped}>"
+
+    @property
+    def alone_in_scene(self) -> NoReturn:
+        """Nothing: an instance has no scene; a `ProblemError` says so."""
+        raise ProblemError(f"instance {self.name}: it is costs alone; no scene, no steps")
+
+    models = 0  # that were solved: none, all is given
+    among = ""
+
+    def names_of(self, _: object) -> tuple[str, ...]:
+        """Return what every goal is called."""
+        return tuple(goal.name for goal in self.goals)
 
     @property
     def nodes(self) -> int:

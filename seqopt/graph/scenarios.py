@@ -203,6 +203,20 @@ class ScenarioLayers(Shown):
         return {"respond": self._found[1]}
 
     @property
+    def alone_in_scene(self) -> Layers:
+        """The layers of the nominal scene."""
+        return self.nominal
+
+    @property
+    def models(self) -> int:
+        """How many different models were solved, in all scenarios."""
+        return sum(costs.models for costs in self.costs)
+
+    def names_of(self, _: Aim | None) -> tuple[str, ...]:
+        """Return what the aim is called."""
+        return (str(self.aim),)
+
+    @property
     def engine(self) -> Engine:
         """What computes the responses of the nominal scene."""
         return self.nominal.engine

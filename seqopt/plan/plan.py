@@ -24,7 +24,7 @@ from seqopt.graph.states.states import States
 from seqopt.judge.certificate import TOLERANCE, Certificate, _known_gap
 from seqopt.plan._status import ENDS, FoundOrder, KeptPostures, Status, bare_summary
 from seqopt.plan.build import ShownBuild
-from seqopt.problem.problem import Aim, Problem, judged_by
+from seqopt.problem.problem import Problem, judged_by
 from seqopt.problem.requirements import LIMIT_TOLERANCE, Excess, _said_limits, overloads
 from seqopt.problem.standing import Standing
 from seqopt.responses._choices import window_models
@@ -141,11 +141,12 @@ class Plan(ShownBuild):
     @property
     def layers(self) -> Layers:
         """The layers of candidates that it was chosen from; a `ProblemError` says if none were."""
-        graph = self.graph.nominal if isinstance(self.graph, ScenarioLayers) else self.graph
-        if isinstance(graph, Layers):
-            return graph
-        chosen = "states, which have no candidates" if isinstance(graph, States) else "costs alone"
-        raise ProblemError(f"the plan has no moves to show: it was chosen from {chosen}")
+        graph = self.graph.alone_in_scene
+        if isinstance(graph, States):
+            raise ProblemError(
+                "the plan has no moves to show: it was chosen from states, which have no candidates"
+            )
+        return graph
 
     @property
     def states(self) -> States:
@@ -157,7 +158,7 @@ class Plan(ShownBuild):
     @property
     def _of_scene(self) -> States | Layers:
         """What it was chosen from, of the scene itself; a `ProblemError` if that is costs alone."""
-        return self.graph if isinstance(self.graph, States) else self.layers
+        return self.graph.alone_in_scene
 
     @property
     def engine(self) -> Engine:
@@ -191,13 +192,7 @@ class Plan(ShownBuild):
     @property
     def goals(self) -> tuple[str, ...]:
         """The names of what was made small, the most important first, then of what has budgets."""
-        if isinstance(self.graph, States):
-            return self.graph.names
-        if isinstance(self.problem, Instance):
-            return tuple(goal.name for goal in self.problem.goals)
-        if isinstance(self.graph, ScenarioLayers):
-            return (str(self.graph.aim),)
-        return ("minmax" if self.formulation.aim is Aim.PEAK else "sum",)
+        return self.graph.names_of(self.formulation.aim)
 
     @property
     def objective(self) -> dict[str, float]:
@@ -283,8 +278,7 @@ class Plan(ShownBuild):
             )
             left = 0.0 if self.certificate is None else self.certificate.gap
             within = f" within {left:.2g}" if TOLERANCE < left < inf else ""
-            among = getattr(self.graph, "among", "")
-            among = f" among candidates {among}" if among else ""
+            among = f" among candidates {self.graph.among}" if self.graph.among else ""
             return f"{values}, {self.status}{within}{among}"
         if self.certificate is None:
             values = ", ".join(f"{name} {value:.6g}" for name, value in self.objective.items())
@@ -321,13 +315,9 @@ class Plan(ShownBuild):
     @property
     def models(self) -> int:
         """How many different models were solved."""
-        if isinstance(self.graph, States):
-            return self.graph.models
-        if isinstance(self.graph, ScenarioLayers):
-            return sum(costs.models for costs in self.graph.costs)
         if self.looked_at is not None:
             return self.looked_at
-        return self.layers.evaluation.models if self.search is None else self._window_models
+        return self.graph.models if self.search is None else self._window_models
 
     @property
     def models_needed(self) -> int:

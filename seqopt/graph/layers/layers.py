@@ -178,6 +178,20 @@ class Layers(Shown):
         return self.schedule.left_out
 
     @property
+    def alone_in_scene(self) -> Layers:
+        """The same of the scene itself, whatever scenarios there are."""
+        return self
+
+    @property
+    def models(self) -> int:
+        """How many different models were solved."""
+        return self.evaluation.models
+
+    def names_of(self, aim: Aim | None) -> tuple[str, ...]:
+        """Return what the goal of an aim is called."""
+        return ("minmax" if aim is Aim.PEAK else "sum",)
+
+    @property
     def sums(self) -> LayeredCosts:
         """The costs whose sum over the build is minimized."""
         return self._sums[0]

@@ -109,6 +109,15 @@ class States(Shown):
         return (str(self.over),) if self.totals else tuple(map(str, self.goals))
 
     @property
+    def alone_in_scene(self) -> States:
+        """The same: its own engine is that of the scene itself."""
+        return self
+
+    def names_of(self, _: Aim | None) -> tuple[str, ...]:
+        """Return what every goal is called, then what has a budget."""
+        return self.names
+
+    @property
     def network(self) -> Network:
         """Of the scene that is built."""
         return self.engine.network
