@@ -222,7 +222,8 @@ def require_time(formulation: Formulation, time_limit: float) -> None:
     """
     if not isinstance(time_limit, Real) or not time_limit >= 0:
         raise ProblemError(f"time_limit is {short(time_limit)}; give seconds from 0")
-    if np.isfinite(time_limit) and not formulation.watched:
+    limited = formulation.watched or "seconds" in formulation.options
+    if np.isfinite(time_limit) and not limited:
         raise ProblemError(f"{formulation.name} takes no time limit; leave it out")
 
 

@@ -122,12 +122,14 @@ def on_the_way(plan: Plan) -> Plan:
 
 def _solve_all(graph: Choices, formulation: Formulation, run: Run) -> Plan:
     """Return the certified plan of a formulation that is given the costs of all choices."""
+    seconds: dict[str, float] = {}
     with run.clock.needed("computing the responses of all choices"):
         stages = graph.seconds(formulation.aim or Aim.SUM)  # of costs: solving is timed alone
-        found = compiled(graph, formulation.aim, alone=formulation.alone)
+        with timed(seconds, "compile"):
+            found = compiled(graph, formulation.aim, alone=formulation.alone)
     path = find_path(found.instance, formulation, run, found.offset)
     choice = found.choice([node for (node,) in path.selection.states])
-    seconds = dict(path.seconds)
+    seconds |= path.seconds | {"compile": seconds["compile"] + path.seconds["compile"]}
     with timed(seconds, "verify"):
         if path.certificate is not None:
             for layers in _from_cache(graph):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -44,11 +45,12 @@ def find_path(
     and no path was at hand.
     """
     formulation.require_options(run.options)
-    watch = Watch(run.left, _shifted(run.progress, offset))
-    seconds: dict[str, float] = {}
+    limit = min(run.left, run.options.get("seconds", math.inf))
+    watch = Watch(limit, _shifted(run.progress, offset))
+    seconds = {"compile": 0.0}
     with timed(seconds, "solve"):
         selection = _selected(instance, formulation, run, watch)
-    seconds |= {"compile": selection.compile_seconds}
+    seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
     certificate = None
     with timed(seconds, "verify"):
@@ -69,7 +71,7 @@ def _selected(instance: Instance, formulation: Formulation, run: Run, watch: Wat
     told = {"watch": watch} if formulation.watched else limit
     solve = partial(formulation.solve, instance, **run.options, **told)
     try:
-        with answered(watch.interrupt):
+        with answered(watch.interrupt) if formulation.watched else nullcontext():
             found = called(name, lambda: instance, StatePath, solve)
     except InfeasibleError as error:
         if not instance.caps:
@@ -85,6 +87,7 @@ def _selected(instance: Instance, formulation: Formulation, run: Run, watch: Wat
         raise
     selection = with_numbers(name, found, len(instance.goals))
     stopped = INTERRUPT if watch.interrupted else selection.stopped
+    watch.tell(selection.objective[0], selection.bound[0])  # one that is not watched tells nothing
     return replace(selection, stopped=stopped, trace=watch.trace)
 
 

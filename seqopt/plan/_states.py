@@ -31,7 +31,7 @@ from seqopt.graph.states.states import States
 from seqopt.judge._orders import finds_better_order
 from seqopt.judge.certificate import TOLERANCE
 from seqopt.judge.schedules import judge_schedule
-from seqopt.plan._guard import called, readable, require_proof, text, with_numbers
+from seqopt.plan._guard import called, readable, require_proof, require_time, text, with_numbers
 from seqopt.plan._infeasible import claimed, confirmed, without_order
 from seqopt.plan._paths import PROOF, find_path
 from seqopt.plan._status import FoundOrder
@@ -71,6 +71,7 @@ def solve_instance(instance: Instance, named: Formulation | str | None, run: Run
         raise ProblemError(
             f"{formulation.name}: instance {instance.name} does not fit; use {' or '.join(names)}"
         )
+    require_time(formulation, run.time_limit)
     found = find_path(instance, formulation, run)
     return Plan(
         instance, instance, formulation, found.selection, found.certificate, (), found.seconds

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Floats, Ints
-from seqopt.errors import InfeasibleError
+from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import PEAK, SUM, TAIL, Instance, _Cap, _Target
 from seqopt.graph.layers.costs import Budget, LayeredCosts
@@ -48,8 +48,11 @@ def compile_costs(
 
     ``alone``: what a search of one move alone is charged: ranks are those among its candidates;
     ``nodes``: what candidates are called. Raises `InfeasibleError`, naming the move, if no choice
-    is allowed.
+    is allowed; `ProblemError` if a budget is for other moves or candidates.
     """
+    for budget in budgets:
+        if budget.amounts.sizes != costs.sizes:
+            raise ProblemError(f"budget {budget.name!r} is for other moves or candidates")
     costs.continuable()
     pairs = zip(costs.shared, costs.single, strict=True)
     join = np.add if aim is Aim.SUM else np.maximum
