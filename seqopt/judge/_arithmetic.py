@@ -25,6 +25,10 @@ class Answer(NamedTuple):
     bounds: tuple[Claim, ...]
 
 
+class OverCapError(SolverError):
+    """A path takes more of a cap than is allowed."""
+
+
 BELOW = 1e-9  # by how much a path must be better, over the size of the value
 
 
@@ -126,7 +130,7 @@ def _spent(instance: Instance, path: _Walk) -> dict[str, float]:
         if cap.column is not None:
             own = float(instance.amounts[path.arcs, cap.column].sum())
         if not own <= cap.most + TOLERANCE * abs(cap.most):
-            raise SolverError(f"{cap.name} is {own:.9g}, more than the {cap.most:g} allowed")
+            raise OverCapError(f"{cap.name} is {own:.9g}, more than the {cap.most:g} allowed")
         out[cap.name] = own
     return out
 

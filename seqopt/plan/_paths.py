@@ -17,7 +17,7 @@ from seqopt.errors import InfeasibleError, SolverError
 from seqopt.graph.formulation import Finding, Formulation, FormulationKind, Run, Watch, timed
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
 from seqopt.graph.solution import StatePath
-from seqopt.judge._arithmetic import Answer, judge_path
+from seqopt.judge._arithmetic import Answer, OverCapError, judge_path
 from seqopt.judge._claims import Claim
 from seqopt.judge.certificate import TOLERANCE, Certificate
 from seqopt.plan._guard import called, with_numbers
@@ -86,6 +86,8 @@ def _selected(instance: Instance, formulation: Formulation, run: Run, watch: Wat
             raise KeyboardInterrupt(str(error)) from error
         raise
     selection = with_numbers(name, found, len(instance.goals))
+    if any(len(state) != 1 for state in selection.states):
+        raise SolverError(f"formulation {name} returned nonsense: a state is no node of the graph")
     stopped = INTERRUPT if watch.interrupted else selection.stopped
     watch.tell(selection.objective[0], selection.bound[0])  # one that is not watched tells nothing
     return replace(selection, stopped=stopped, trace=watch.trace)
@@ -121,7 +123,10 @@ def _path_judged(instance: Instance, formulation: Formulation, found: StatePath)
     """Return the certificate of a path, by what the formulation says proves its bounds."""
     nodes = [state[0] for state in found.states]
     answer = Answer("nodes", np.array(nodes), found.objective, tuple(_claims(instance, found)))
-    proof = judge_path(instance, answer)
+    try:
+        proof = judge_path(instance, answer)
+    except OverCapError as error:
+        raise SolverError(f"{error}; use a formulation that keeps budgets exactly") from None
     exact = formulation.kind is not FormulationKind.HEURISTIC and not found.stopped
     if exact and instance.is_plain and proof.gap > TOLERANCE:
         raise SolverError(
