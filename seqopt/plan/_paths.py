@@ -133,6 +133,9 @@ def _path_judged(instance: Instance, formulation: Formulation, found: StatePath)
             f"{formulation.name} promises the least, and no more than "
             f"{', '.join(f'{b:.9g}' for b in proof.bounds)} is proven"
         )
+    said, value = found.bound[0], proof.values[0]
+    if instance.is_plain and said > proof.bounds[0] + TOLERANCE * abs(value):
+        raise SolverError(f"the claimed bound {said:.9g} exceeds {proof.bounds[0]:.9g}")
     pairs = zip(proof.values, proof.bounds, found.bound, strict=True)
     left = [(v - min(v, max(b, said))) / (abs(v) or 1.0) for v, b, said in pairs]
     return replace(proof, claimed_gap=max(left))
