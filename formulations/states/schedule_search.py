@@ -143,7 +143,9 @@ class _Search:
             # later goals need all states that take as much: a wider search may spare them
             sets = comb(2 * len(problem.network.inner), problem.space.robots)
             many = len(problem.goals) > 1 and sets * problem.space.levels > MANY
-            for wider in (1, WIDER)[: 1 + many]:
+            for wider in (1, WIDER):
+                if wider > 1 and not many and (self.incumbent or self._options.dear):
+                    break  # it is worth its time where the first one found nothing
                 plans = [self.incumbent, self._first(floors, wider)]
                 found = min(filter(None, plans), key=lambda p: p.objective, default=None)
                 self.incumbent = found

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from formulations.layers.priced_paths import ACCURACY, layered_flow
-from seqopt.graph.layers.interface import CostProblem
 
+from formulations.overlap_flow import ACCURACY, unit_flow
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.judge.certificate import TOLERANCE
+from seqopt.graph.paths import TIED
+from tests.layered import Costs, answer
 
 INF = np.inf
 
@@ -34,14 +34,18 @@ def problem(*bounds):
     taken = amounts(
         ([30, 0, 50], [0, 0], [0, 0]), ([[0, 0, 0]], [[1, 2], [0, 0], [3, 0]], [[0, 0], [0, 0]])
     )
-    return CostProblem(costs, tuple(Budget(f"use {i}", *taken, b) for i, b in enumerate(bounds)))
+    return Costs(costs, tuple(Budget(f"use {i}", *taken, b) for i, b in enumerate(bounds)))
+
+
+def flow_through(costs):
+    return unit_flow(costs.compiled().instance.asked)
 
 
 ARCS = (
     *((0, (0, 0)), (0, (0, 2))),
-    *((1, (0, 0)), (1, (0, 1)), (1, (1, 0)), (1, (1, 1)), (1, (2, 0))),
+    *((1, (0, 0)), (1, (0, 1)), (1, (2, 0))),
     *((2, (0, 0)), (2, (0, 1)), (2, (1, 0)), (2, (1, 1))),
-)  # the move, and which candidates of the one before and of it
+)  # the move, and which candidates of the one before and of it; no path takes any other
 
 
 def flow_of(choice):
@@ -53,39 +57,41 @@ def flow_of(choice):
 ALLOWED = [(0, 0, 0), (0, 0, 1), (0, 1, 0), (0, 1, 1), (2, 0, 0), (2, 0, 1)]
 
 
-def test_arcs_are_the_pairs_that_are_allowed():
-    flow = layered_flow(problem())
+def test_arcs_are_the_pairs_on_paths():
+    compiled, flow = problem().compiled(), flow_through(problem())
+    pairs = zip(flow.graph.source, flow.graph.target, strict=True)
+    named = [tuple(compiled.candidates[[*pair]].tolist()) for pair in pairs]
+    assert named == [arc for _, arc in ARCS]
     assert flow.scale == 3003
-    cost = [1001, 3003, 11, 22, 13, 24, 15, 93, 208, 109, 210]
+    cost = [1001, 3003, 11, 22, 15, 93, 208, 109, 210]
     assert flow.cost * 3003 == pytest.approx(cost, rel=1e-14)
-    assert [mask.sum() for mask in flow.allowed] == [2, 5, 4]
-    assert (flow.amounts, flow.caps, flow.units, flow.names) == ((), (), (), ())
-    assert flow.feasible
+    assert (flow.takes, flow.caps, flow.units) == ((), (), ())
 
 
 @pytest.mark.parametrize("choice", ALLOWED)
 def test_a_choice_is_a_unit_flow_and_comes_back(choice):
     own = problem(90.0)
-    flow, arcs = layered_flow(own), flow_of(choice)
-    assert (flow.balance @ arcs).tolist() == flow.source.tolist() == [1, 0, 0, 0, 0, 0]
+    flow, arcs = flow_through(own), flow_of(choice)
+    assert (flow.balance @ arcs).tolist() == flow.source.tolist() == [1, 0, 0, 0, 0]
     assert flow.cost @ arcs * flow.scale == pytest.approx(own.sums.cost(choice), rel=1e-14)
-    assert flow.amounts[0] @ arcs * flow.units[0] == own.budgets[0].spent(choice)
-    assert flow.choice(arcs) == choice
-    assert flow.choice(0.6 * arcs + 0.4 * flow_of((2, 0, 0))) == choice
+    assert flow.takes[0] @ arcs * flow.units[0] == own.budgets[0].spent(choice)
+    assert own.compiled().choice(flow.path(arcs)) == choice
+    mixed = 0.6 * arcs + 0.4 * flow_of((2, 0, 0))
+    assert own.compiled().choice(flow.path(mixed)) == choice
 
 
 def test_what_is_no_path_is_out_of_balance():
     """One unit that ends with the second move, one that starts there, two, one that jumps."""
-    balance = layered_flow(problem()).balance
+    balance = flow_through(problem()).balance
     whole, moves = flow_of((0, 0, 0)), np.array([move for move, _ in ARCS])
     jumps = np.where(moves == 1, flow_of((2, 0, 0)), whole)
     for arcs in (whole * (moves < 2), whole * (moves > 0), whole + flow_of((2, 0, 1)), jumps):
-        assert (balance @ arcs).tolist() != [1, 0, 0, 0, 0, 0]
+        assert (balance @ arcs).tolist() != [1, 0, 0, 0, 0]
 
 
 @pytest.mark.parametrize(
     ("factor", "unit"),
-    [(1.0, 10.0), (0.2, 10.0), (0.19, 1.0), (2.0, 100.0), (1e-4, 1e-3), (-1.0, 10.0), (0.0, 1.0)],
+    [(1.0, 10.0), (0.2, 10.0), (0.19, 1.0), (2.0, 100.0), (1e-4, 1e-3), (0.0, 1.0)],
 )
 def test_amounts_are_of_order_one(factor, unit):
     """The largest amount is 50; its unit is the power of ten below it, or 1 without any."""
@@ -93,35 +99,37 @@ def test_amounts_are_of_order_one(factor, unit):
     taken = own.budgets[0]
     single, shared = (tuple(factor * a for a in part) for part in (taken.single, taken.shared))
     budget = replace(taken, single=single, shared=shared, bound=120.0)
-    flow = layered_flow(replace(own, budgets=(budget,)))
+    flow = flow_through(replace(own, budgets=(budget,)))
     assert flow.units == pytest.approx([unit], rel=1e-12)
     assert flow.caps == pytest.approx([120.0 / unit], rel=1e-12)
-    assert flow.amounts[0] * unit == pytest.approx(
-        factor * np.array([30, 50, 1, 2, 0, 0, 3, 0, 0, 0, 0]), rel=1e-12
+    assert flow.takes[0] * unit == pytest.approx(
+        factor * np.array([30, 50, 1, 2, 3, 0, 0, 0, 0]), rel=1e-12
     )
 
 
-def test_bounds_and_prices_are_in_the_units_of_costs_and_budgets():
-    flow = layered_flow(problem(90.0, 900.0))
+def test_bounds_are_in_the_unit_of_costs():
+    flow = flow_through(problem(90.0, 900.0))
     assert flow.bound(0.5) == 1501.5 - ACCURACY * 3003  # by the larger of value and scale
     assert flow.bound(-0.5) == -1501.5 - ACCURACY * 3003
     assert flow.bound(4.0) == 12012 - ACCURACY * 12012
     assert flow.bound(-4.0) == -12012 - ACCURACY * 12012
-    assert flow.prices([2.0, -3.0]) == {"use 0": 3003 / 10 * 2, "use 1": 3003 / 10 * -3}
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+def test_multipliers_are_costs_over_amounts(unit):
+    """What costs 1 takes 4, what costs 3 takes 2: a unit more of the budget would save 1."""
+    one = (np.zeros((1, 2)),)
+    costs = LayeredCosts((np.array([1.0, 3.0]),), one)
+    budget = Budget("use", (unit * np.array([4.0, 2.0]),), one, unit * 2.5)
+    for name in ("overlap_lp", "lagrangian"):
+        found = answer(Costs(costs, (budget,)), name)
+        assert found.bound == pytest.approx(2.5, rel=1e-6)
+        assert found.prices["use"] == pytest.approx(1.0 / unit, rel=1e-5)
 
 
 def test_costs_of_nothing_have_a_scale():
-    free = CostProblem(LayeredCosts(*amounts(([0, 0],), ([[0, 0]],))))
-    assert np.isfinite(layered_flow(free).cost).all()
-
-
-def test_when_a_choice_is_known_to_be_within_the_budgets():
-    """One budget is proven by a choice that takes the least; two may each need another."""
-    least = 31.0  # of the six choices
-    assert min(problem(1.0).budgets[0].spent(c) for c in ALLOWED) == least
-    assert layered_flow(problem(least)).feasible
-    assert not layered_flow(problem(least - 1e-9)).feasible  # within what solvers leave
-    assert not layered_flow(problem(99.0, 99.0)).feasible
+    free = Costs(LayeredCosts(*amounts(([0, 0],), ([[0, 0]],))))
+    assert np.isfinite(flow_through(free).cost).all()
 
 
 @pytest.mark.parametrize(
@@ -131,15 +139,16 @@ def test_a_budget_is_for_the_moves_and_candidates_of_the_problem(sizes):
     single = tuple(np.ones(size) for size in sizes)
     shared = tuple(np.ones(pair) for pair in zip((1, *sizes[:-1]), sizes, strict=True))
     with pytest.raises(ProblemError, match="budget 'other' is for other moves or candidates"):
-        layered_flow(replace(problem(), budgets=(Budget("other", single, shared, 99.0),)))
+        replace(problem(), budgets=(Budget("other", single, shared, 99.0),)).compiled()
 
 
-@pytest.mark.parametrize(("share", "hopeless"), [(0.99, False), (1.01, True)])
-def test_a_budget_that_no_choice_keeps_is_named(share, hopeless):
-    """Beyond the tolerance, over what the choices take at most: 50 and 3."""
-    own = problem(90.0, 31.0 - share * TOLERANCE * 53.0)
+@pytest.mark.parametrize(("less", "hopeless"), [(0.9 * TIED, False), (1e-4, True)])
+@pytest.mark.parametrize("name", ["labels", "lagrangian", "overlap_lp", "overlap_mip"])
+def test_a_budget_that_no_choice_keeps_is_named(name, less, hopeless):
+    """The least that a choice takes is 31; what is closer than rounding keeps the budget."""
+    own = problem(90.0, 31.0 * (1 - less))
     if hopeless:
         with pytest.raises(InfeasibleError, match=r"at least 31 of 'use 1', more than 30\.9"):
-            layered_flow(own)
+            answer(own, name)
     else:
-        assert not layered_flow(own).feasible
+        assert own.budgets[1].spent(answer(own, name).choice) == 31.0

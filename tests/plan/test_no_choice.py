@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from seqopt.graph.layers.interface import CostProblem
 
 from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -23,8 +22,9 @@ from seqopt.graph import formulation as registry
 from seqopt.graph.formulation import FormulationKind, find_formulation, formulations
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.solution import Selection
+from seqopt.graph.solution import StatePath
 from seqopt.network.build import build_network
+from seqopt.plan._layers import compiled
 from seqopt.plan.solving import solve
 from seqopt.responses import _blocks as batches
 from seqopt.scene.arch import ArchShape, arch_scene
@@ -32,6 +32,7 @@ from seqopt.scene.scene_file import save_scene
 from seqopt.sequence.three_robots import modified_sequential, three_robot_loop
 from seqopt.study.published import EQUATIONS
 from tests.builders import six_bricks
+from tests.layered import Costs, answer
 
 
 @pytest.mark.parametrize("count", [1, 2])
@@ -57,41 +58,55 @@ def problem():
     return candidate_layers(ComplianceEngine(network), three_robot_loop(network), EQUATIONS)
 
 
-TRUE = (0, 0, 0)
+NODES = (1,), (2,), (3,)
+PATH = StatePath(NODES, (1.0,), (0.0,))
 NONSENSE = {
     "None": None,
     "text": "overlap_dp",
     "a number": 3.0,
-    "a tuple": (TRUE, 1.0),
+    "a tuple": (NODES, 1.0),
     "an array": np.zeros(3),
-    "a class": Selection,
-    "choice None": Selection(None, 1.0),
-    "choice a number": Selection(3, 1.0),
-    "choice text": Selection("abc", 1.0),
-    "choice of floats": Selection((0.0, 1.0, 0.5), 1.0),
-    "choice of None": Selection((None, None, None), 1.0),
-    "choice of NaN": Selection((np.nan,) * 3, 1.0),
-    "choice nested": Selection(((0,), (0,), (0,)), 1.0),
-    "choice a table": Selection(np.zeros((3, 2)), 1.0),
-    "choice too short": Selection((0,), 1.0),
-    "choice too long": Selection((0,) * 9, 1.0),
-    "choice beyond": Selection((99, 0, 0), 1.0),
-    "choice below": Selection((-1, 0, 0), 1.0),
-    "choice beyond all bounds": Selection((10**30, 0, 0), 1.0),
-    "objective None": Selection(TRUE, None),
-    "objective text": Selection(TRUE, "least"),
-    "objective NaN": Selection(TRUE, np.nan),
-    "objective complex": Selection(TRUE, 1j),
-    "objective an array": Selection(TRUE, np.zeros(2)),
-    "objective beyond all bounds": Selection(TRUE, 10**400),
-    "bound None": Selection(TRUE, 1.0, bound=None),
-    "bound text": Selection(TRUE, 1.0, bound="low"),
-    "bound NaN": Selection(TRUE, 1.0, bound=np.nan),
-    "prices None": Selection(TRUE, 1.0, prices=None),
-    "prices text": Selection(TRUE, 1.0, prices={"a": "dear"}),
-    "seconds None": Selection(TRUE, 1.0, compile_seconds=None),
-    "seconds NaN": Selection(TRUE, 1.0, compile_seconds=np.nan),
-    "seconds below zero": Selection(TRUE, 1.0, compile_seconds=-1.0),
+    "a class": StatePath,
+    **{
+        f"{name} {said}": replace(PATH, **{name: value})
+        for name, values in {
+            "states": {
+                "None": None,
+                "a number": 3,
+                "text": "abc",
+                "of floats": ((0.0,), (1.0,), (0.5,)),
+                "of None": ((None,),) * 3,
+                "of NaN": ((np.nan,),) * 3,
+                "not nested": (1, 2, 3),
+                "nested twice": ((NODES,),) * 3,
+                "a table of floats": np.zeros((3, 2)),
+                "too short": ((1,),),
+                "too long": ((1,),) * 9,
+                "none": (),
+                "empty": ((), (), ()),
+                "of two nodes": ((1, 0), (2, 0), (3, 0)),
+                "beyond": ((10**6,), (2,), (3,)),
+                "below": ((-1,), (2,), (3,)),
+                "beyond all bounds": ((10**30,), (2,), (3,)),
+            },
+            "objective": {
+                "None": None,
+                "a number": 1.0,
+                "text": "least",
+                "of text": ("least",),
+                "NaN": (np.nan,),
+                "complex": (1j,),
+                "an array": (np.zeros(2),),
+                "beyond all bounds": (10**400,),
+                "of two goals": (1.0, 2.0),
+            },
+            "bound": {"None": None, "text": ("low",), "NaN": (np.nan,), "above": (2.0,)},
+            "prices": {"None": None, "text": ("dear",), "a mapping": {"a": "dear"}},
+            "stopped": {"None": None, "a number": 3},
+            "compile_seconds": {"None": None, "NaN": np.nan, "below zero": -1.0},
+        }.items()
+        for said, value in values.items()
+    },
 }
 
 
@@ -104,10 +119,11 @@ def test_a_formulation_that_returns_nonsense_has_failed(problem, what):
 
 
 def test_whole_numbers_of_any_kind_are_a_choice(problem):
-    true = find_formulation("overlap_dp").solve(problem)
-    odd = replace(true, choice=np.array(true.choice), objective=np.float64(true.objective))
-    made = replace(find_formulation("overlap_dp"), solve=lambda _: odd)
-    assert solve(problem, made).selection == true
+    exact = find_formulation("overlap_dp")
+    true = exact.solve(compiled(problem, exact.aim).instance)
+    odd = replace(true, states=np.array(true.states), objective=np.array(true.objective))
+    plan = solve(problem, replace(exact, solve=lambda _: odd))
+    assert plan.selection == solve(problem, exact).selection
 
 
 @pytest.mark.parametrize("error", [ZeroDivisionError("by\nzero"), KeyError("x"), OSError("gone")])
@@ -125,7 +141,7 @@ def says_so(_):
 
 
 def test_that_there_is_no_choice_is_not_believed(problem):
-    with pytest.raises(SolverError, match="no choice is allowed, and some are: no choice is with"):
+    with pytest.raises(SolverError, match="no path is allowed, and some are: no choice is with"):
         solve(problem, replace(find_formulation("overlap_dp"), solve=says_so))
 
 
@@ -152,7 +168,7 @@ def test_that_budgets_conflict_is_proven(bounds, kind, error, said):
         for k, bound in enumerate(bounds)
     )
     with pytest.raises(error, match=said) as caught:
-        solve(CostProblem(costs, budgets), formulation)
+        answer(Costs(costs, budgets), formulation)
     assert type(caught.value) is error
 
 
@@ -171,7 +187,7 @@ def test_a_heuristic_only_says_that_it_found_none(monkeypatch, kind, error, said
     budgets = tuple(Budget(f"b{k}", b, costs.shared, 2.5) for k, b in enumerate(both))
     formulation = replace(find_formulation("labels"), solve=says_so, kind=kind)
     with pytest.raises(error, match=said) as caught:
-        solve(CostProblem(costs, budgets), formulation)
+        answer(Costs(costs, budgets), formulation)
     assert type(caught.value) is error
 
 
@@ -228,7 +244,7 @@ def test_one_that_cannot_be_used_is_left_out_of_all_others(monkeypatch, tmp_path
     (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: odd\nVersion: 1.0\n")
     entries = "odd = math:pi\nodder = no_such_package:X\noddest = odd_formulation:X\n"
     (folder / "entry_points.txt").write_text(f"[seqopt.formulations]\n{entries}")
-    text = "from formulations.layers.cascade import FORMULATION as F\n"
+    text = "from formulations.cascade import FORMULATION as F\n"
     text += "from dataclasses import replace\nX = replace(F, kind='exact')\n"
     (tmp_path / "odd_formulation.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)

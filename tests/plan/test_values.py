@@ -6,22 +6,18 @@ from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
-from formulations.layers.priced_paths import layered_flow
-from seqopt.graph.layers.interface import CostProblem
 
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.solution import Selection
-from seqopt.judge.certificate import certify
-from seqopt.problem.problem import Aim
+from tests.layered import Costs, answer
 
 
 def made(cost=1.0):
     """One of each kind."""
     costs = LayeredCosts((np.array([cost, 2.0, 3.0]),), (np.zeros((1, 3)),))
     budget = Budget("use", costs.single, costs.shared, 9.0)
-    problem = CostProblem(costs, (budget,))
-    proof = certify(problem, Selection((0,), cost), Aim.SUM)
-    return costs, budget, problem, proof, layered_flow(problem)
+    instance = Costs(costs, (budget,)).compiled().instance
+    proof = answer(Costs(costs, (budget,)), "labels").certificate
+    return costs, budget, instance, instance.asked, proof
 
 
 @pytest.mark.parametrize("kind", range(5))

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from seqopt.graph.layers.interface import CostProblem
 
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import Finding, Watch, find_formulation
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.plan.solving import solve
+from tests.layered import Costs
 
 
 def test_only_what_is_better_is_told():
@@ -31,7 +31,8 @@ def test_a_finding_in_words():
 
 
 def problem():
-    return CostProblem(LayeredCosts((np.array([2.0, 1.0]),), (np.zeros((1, 2)),)))
+    costs = LayeredCosts((np.array([2.0, 1.0]),), (np.zeros((1, 2)),))
+    return Costs(costs).compiled().instance
 
 
 @pytest.mark.parametrize("limit", [-1, "1", np.nan, None])
