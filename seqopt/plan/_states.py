@@ -72,6 +72,8 @@ def solve_instance(instance: Instance, named: Formulation | str | None, run: Run
             f"{formulation.name}: instance {instance.name} does not fit; use {' or '.join(names)}"
         )
     require_time(formulation, run.time_limit)
+    if run.lazy:
+        raise ProblemError("an instance has all its costs; leave out lazy")
     found = find_path(instance, formulation, run)
     return Plan(
         instance, instance, formulation, found.selection, found.certificate, (), found.seconds
