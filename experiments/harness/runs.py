@@ -28,7 +28,7 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.formulation import Formulation, On, formulations
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.judge.certificate import least
+from seqopt.plan._layers import best_choice
 from seqopt.problem.problem import Aim
 from seqopt.sequence.three_robots import three_robot_loop
 
@@ -102,7 +102,7 @@ def _row(
 ) -> Row:
     plans = _repeated(repeats, lambda: solve(problem, formulation))
     seconds = shared | _medians(plans, ("compile", "solve", "verify"))
-    judged = _judged(reference, formulation.aim, plans[-1].selection.choice, seconds)
+    judged = _judged(reference, formulation.aim, plans[-1].choice, seconds)
     return {"formulation": formulation.name, **judged, "models": plans[-1].models_needed}
 
 
@@ -116,7 +116,7 @@ def _search_row(scene: Scene, engine: str, criterion: str, reference: Layers, re
     stages |= {"compile": 0.0, "solve": 0.0}  # choosing is part of the search
     plans = [plan for plan, _ in found]
     stages |= _medians(plans, ("respond", "rank", "verify"))
-    judged = _judged(reference, Aim.SUM, plans[-1].selection.choice, stages)
+    judged = _judged(reference, Aim.SUM, plans[-1].choice, stages)
     return {"formulation": NO_PROOF, **judged, "models": plans[-1].models}
 
 
@@ -134,7 +134,8 @@ def _judged(reference: Layers, aim: Aim, choice: tuple[int, ...], seconds: Times
 def worth(reference: Layers, aim: Aim, choice: tuple[int, ...]) -> tuple[float, float]:
     """Return the value of a choice by the reference's data, and its gap to the optimum there."""
     costs = aim.costs(reference)
-    value, bound = float(aim.value_of(costs, choice)), least(costs, aim)
+    best = best_choice(reference.schedule.scene.name, costs, aim)
+    value, bound = (float(aim.value_of(costs, each)) for each in (choice, best))
     return value, max(0.0, value - bound) / max(abs(bound), np.finfo(float).tiny)
 
 

@@ -50,7 +50,7 @@ from experiments.peers.parts.workload import (
 from seqopt import Network
 from seqopt.engines.interface import Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
-from seqopt.graph.layers.layers import Layers
+from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.report._style import BLUE, GRAY, VERMILION, name_panels, plain, styled
 from seqopt.study.published import paper_models
 
@@ -214,12 +214,12 @@ def summarize(rounds: pd.DataFrame, models: int) -> pd.DataFrame:
     return grouped[times].median().assign(**worst).reset_index()
 
 
-def paths(problem: Layers, names: list[str], rounds: int) -> pd.DataFrame:
+def paths(layers: LayeredCosts, names: list[str], rounds: int) -> pd.DataFrame:
     rows = []
     for name in names:
         solve = PATHS[name]
-        value = solve(problem)
-        seconds = best(partial(solve, problem), 1 if name in SLOW else rounds)
+        value = solve(layers)
+        seconds = best(partial(solve, layers), 1 if name in SLOW else rounds)
         rows.append({"tool": name, "seconds": seconds, "objective": value})
     table = pd.DataFrame(rows)
     first = table.iloc[0]
@@ -267,7 +267,7 @@ def experiment(options: Options) -> Finding:
     rounds = compete(net, cases, names, *((1, 3) if quick else (9, 10)))
     table = summarize(rounds, sum(len(c.grips) for c in cases))
     print(table.to_string(index=False, float_format="%.3g"))
-    ways = paths(problem, [n for n in PATHS if not quick or n not in SLOW], 1 if quick else 5)
+    ways = paths(problem.sums, [n for n in PATHS if not quick or n not in SLOW], 1 if quick else 5)
     print(ways.to_string(index=False, float_format="%.4g"))
     both = pd.concat({"models": table, "placement": ways}, names=["part"]).reset_index(level=0)
     without = f", without {', '.join(lacking)}; nothing stored" if lacking and not quick else ""

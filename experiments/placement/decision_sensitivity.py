@@ -181,7 +181,7 @@ def judge(problem: Layers, nominal: Decision) -> dict[str, float]:
         float(costs[np.isfinite(costs)].mean())
         for costs in (*problem.sums.single, *problem.sums.shared)
     )
-    row = {"changed": float(np.mean(np.not_equal(plan.selection.choice, chosen)))}
+    row = {"changed": float(np.mean(np.not_equal(plan.choice, chosen)))}
     row |= {"changed_in_window": 1 - float(np.mean(first))}
     row |= {"out_of_three": 1 - float(np.mean(three)), "best": best, "regret": regret}
     return row | {"relative_regret": regret / best, "average_regret": (average - best) / best}
@@ -191,7 +191,7 @@ def measure(scene: Scene, wanted: Iterator[tuple[str, float, int]]) -> pd.DataFr
     schedule, rows = three_robot_loop(build_network(scene)), []
     ways = [find_formulation(name) for name in ("overlap_dp", "cascade")]
     nominal = {
-        name: [way.solve(problem).choice for way in ways]
+        name: [solve(problem, way).choice for way in ways]
         for name, problem in problems(scene, schedule).items()
     }
     for kind, size, seed in wanted:

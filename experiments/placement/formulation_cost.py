@@ -54,12 +54,14 @@ from experiments.harness.scenes import arch25, half_circle
 from experiments.harness.timing import best
 from experiments.placement.parts.budget_cases import CASES, COMPARED, NO_BUDGET
 from experiments.placement.parts.formulation_charts import contest_chart, shape_chart
+from formulations.exhibits import _big_m, _epigraph, _loose, _tight
+from formulations.overlap_flow import _whole
 from formulations.solvers import anatomy, minimize_whole
 from seqopt import Network, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.formulation import On, Watch, find_formulation, formulations, trace_rows
 from seqopt.graph.layers.layers import Layers, candidate_layers
-from seqopt.judge.certificate import least
+from seqopt.plan._layers import best_choice, compiled
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion
 from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO
@@ -83,7 +85,8 @@ def compared(net: Network, criterion: Criterion, rounds: int) -> dict[str, float
     row["models"] = float(problem.evaluation.models)
     for name, formulation in formulations(On.LAYERS).items():
         if formulation.aim is Aim.SUM:
-            row[name] = best(partial(formulation.solve, problem), rounds)
+            graph = compiled(problem, Aim.SUM, alone=formulation.alone).instance
+            row[name] = best(partial(formulation.solve, graph), rounds)
             row[f"gap_{name}"] = solve(problem, formulation).certificate.gap
     return row
 
@@ -204,25 +207,32 @@ def proofs(options: Options) -> Finding:
 
 
 SHAPES = {
-    Aim.SUM: ("overlap_mip", "assignment_tight", "assignment_loose"),
-    Aim.PEAK: ("minimax_layer", "minimax_arc", "minimax_big_m"),
+    Aim.SUM: {"overlap_mip": _whole, "assignment_tight": _tight, "assignment_loose": _loose},
+    Aim.PEAK: {
+        "minimax_layer": partial(_epigraph, of_layers=True),
+        "minimax_arc": partial(_epigraph, of_layers=False),
+        "minimax_big_m": _big_m,
+    },
 }
 TIGHT = ("overlap_mip", "assignment_tight", "minimax_layer")
 LIMIT = 60.0  # s
 CLOSE, FAR, THIRD, FEW_NODES = 1e-3, 0.05, 1 / 3, 10
 
 
-def written(problem: Layers, name: str, limit: float) -> tuple[dict[str, object], pd.DataFrame]:
+def written(
+    problem: Layers, aim: Aim, name: str, limit: float
+) -> tuple[dict[str, object], pd.DataFrame]:
     """Return size, bound, nodes and time of a program, and what was found at which time."""
-    formulation = find_formulation(name)
-    costs = formulation.aim.costs(problem)
-    written = formulation.solve.write(problem)
+    costs = aim.costs(problem)
+    optimum = aim.value_of(costs, best_choice(name, costs, aim))
+    graph = compiled(problem, aim, alone=find_formulation(name).alone).instance.asked
+    written = SHAPES[aim][name](graph)
     size, relaxed = anatomy(written.program)
     watch, start = Watch(limit), time.perf_counter()
     found = minimize_whole(written.program, feasible=True, watch=watch, told=written.bound)
     seconds = time.perf_counter() - start
-    row = {"formulation": name, "aim": formulation.aim.value, **asdict(size)}
-    row |= {"optimum": least(costs, formulation.aim), "relaxed": written.bound(relaxed)}
+    row = {"formulation": name, "aim": aim.value, **asdict(size)}
+    row |= {"optimum": optimum, "relaxed": written.bound(relaxed)}
     row |= {"value": written.bound(found.value), "bound": written.bound(found.bound)}
     row |= {"nodes": found.nodes, "proven": not found.stopped, "seconds": seconds, "limit": limit}
     return row, pd.DataFrame(trace_rows(watch.trace)).assign(formulation=name)
@@ -233,7 +243,7 @@ def programs(network: Network, limit: float) -> Iterator[tuple[dict[str, object]
     for aim, criterion in ((Aim.SUM, EQUATIONS), (Aim.PEAK, WORST_RATIO)):
         problem = candidate_layers(engine, schedule, criterion)
         for name in SHAPES[aim]:
-            yield written(problem, name, limit)
+            yield written(problem, aim, name, limit)
 
 
 def shapes_hold(table: pd.DataFrame) -> bool:

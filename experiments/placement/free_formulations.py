@@ -34,15 +34,13 @@ from seqopt import CRITERIA, FreeRules, Plan, build_network, pose, solve, three_
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import TimeUpError
 from seqopt.graph.formulation import (
-    End,
     Formulation,
     FormulationKind,
     On,
-    Watch,
     find_formulation,
     formulations,
 )
-from seqopt.graph.solution import Selection, StatePath
+from seqopt.plan._layers import compiled
 from seqopt.plan.solving import graph_of
 from seqopt.problem.problem import Aim
 
@@ -68,18 +66,15 @@ def run(part: str, scene: str, aim: str, formulation: Formulation) -> tuple[Plan
     goals = aim if formulation.on is On.STATES else ()
     problem = pose(engine, moves, CRITERIA["worst-ratio-published"], goals)
     start = time.process_time()
-    limit = {"seconds": PATIENCE} if formulation.on is On.STATES else {"watch": Watch(PATIENCE)}
-    found = formulation.solve(graph_of(problem, formulation.on), **limit)
+    graph = graph_of(problem, formulation.on)
+    if formulation.on is On.LAYERS:
+        graph = compiled(graph, formulation.aim, alone=formulation.alone).instance
+    found = formulation.solve(graph, seconds=PATIENCE)
     seconds = time.process_time() - start
     layers, bricks = formulation.on is On.LAYERS, len(engine.network.scene.bricks)
-    proof = layers or (not early(found) and bricks <= PROVEN)
+    proof = layers or (not found.stopped and bricks <= PROVEN)
     told = replace(formulation, solve=lambda *_, **__: found)
     return solve(problem, told, proof=proof), seconds
-
-
-def early(found: Selection | StatePath) -> bool:
-    """Return whether a formulation was stopped before it could keep what it promises."""
-    return bool(found.stopped) if isinstance(found, StatePath) else found.end is not End.DONE
 
 
 def row(part: str, scene: str, aim: str, name: str, rounds: int = 3) -> dict[str, object]:
@@ -88,11 +83,11 @@ def row(part: str, scene: str, aim: str, name: str, rounds: int = 3) -> dict[str
     again = rounds - 1 if first < SHORT else 0
     times = [first, *(run(part, scene, aim, formulation)[1] for _ in range(again))]
     chosen, proof = plan.selection, plan.certificate
-    value, bound = (float(np.atleast_1d(each)[0]) for each in (chosen.objective, chosen.bound))
-    bound = bound if proof is None or early(chosen) else proof.bounds[0]
+    value, bound = chosen.objective[0], chosen.bound[0]
+    bound = bound if proof is None or chosen.stopped else proof.bounds[0]
     out = {"status": str(plan.status), "seconds": min(times), "value": value}
     out |= {"steps": len(plan.steps), "bound": bound, "gap": (value - bound) / value}
-    return out | {"models": plan.models, "states": sum(map(len, getattr(chosen, "visited", ())))}
+    return out | {"models": plan.models, "states": sum(map(len, chosen.visited))}
 
 
 def limited() -> None:

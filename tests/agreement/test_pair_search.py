@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from seqopt.graph.layers.interface import CostProblem
 
 from seqopt._cli.main import main
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -19,7 +18,7 @@ from seqopt.graph.formulation import End
 from seqopt.graph.layers._partial_costs import PartialCosts, least_possible
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.solution import Selection
+from seqopt.graph.solution import StatePath
 from seqopt.judge.certificate import certify_partial
 from seqopt.network.build import build_network
 from seqopt.plan.search._window_search import search_windows
@@ -30,6 +29,7 @@ from seqopt.problem.requirements import Limit
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS, WEIGHTED, WORST_RATIO
 from tests.builders import far_reaching
+from tests.layered import Costs, answer
 from tests.strategies import arches, problems
 
 CONDITIONAL = replace(EQUATIONS, ranked=Ranked.CONDITIONAL)
@@ -71,9 +71,9 @@ def test_the_optimum_is_that_of_all_pairs(engine25, name, criterion):
     lazy, whole = solve(posed(engine25, criterion), name, lazy=True), solve(problem, name)
     assert lazy.certificate.objective == pytest.approx(whole.certificate.objective, rel=1e-9)
     assert lazy.certificate.gap <= 1e-9
-    assert lazy.selection.end is End.DONE
+    assert lazy.ended is End.DONE
     value = whole.formulation.aim.value_of(
-        whole.formulation.aim.costs(problem), lazy.selection.choice
+        whole.formulation.aim.costs(problem), lazy.choice
     )
     assert value == pytest.approx(lazy.certificate.objective, rel=1e-12)
     assert lazy.models < whole.models
@@ -125,7 +125,7 @@ def test_stopped_before_it_has_a_choice_and_a_bound(engine25, name):
     stopped = solve(posed(engine25, WEIGHTED), name, lazy=True, time_limit=0)
     best = solve(posed(engine25, WEIGHTED), name).certificate.objective
     found = stopped.certificate
-    assert stopped.selection.end is End.STOPPED
+    assert stopped.ended is End.STOPPED
     assert found.bound <= best < found.objective
     assert found.gap == pytest.approx((found.objective - found.bound) / found.objective)
     assert stopped.summary()["status"] == "feasible"
@@ -139,7 +139,7 @@ def test_an_interrupt_leaves_a_choice_and_a_bound(engine25):
 
     came: list[int] = []
     found = solve(posed(engine25, WEIGHTED), "overlap_dp", lazy=True, progress=interrupt)
-    assert found.selection.end is End.INTERRUPTED
+    assert found.ended is End.INTERRUPTED
     assert 0 < found.certificate.bound < found.certificate.objective
 
 
@@ -180,7 +180,7 @@ def test_what_some_pairs_prove(problem, data, aim):
     assert part.best >= best - 1e-9 * abs(best) or np.isinf(part.best)
     assert least_possible(part) == pytest.approx(part.bound, **close)
     if np.isfinite(best):
-        plan = solve(CostProblem(costs), "overlap_dp" if aim is Aim.SUM else "minimax")
+        plan = answer(Costs(costs), "overlap_dp" if aim is Aim.SUM else "minimax")
         assert plan.certificate.objective == pytest.approx(best, **close)
 
 
@@ -188,13 +188,14 @@ def test_a_claim_that_is_not_proven_is_refused(engine25):
     row = np.array([3.0, np.nan])
     part = PartialCosts((np.zeros(2), np.ones(2)), ({}, {0: row}), 1.0, Aim.SUM)
     assert (part.bound, part.best) == (2.0, 4.0)
-    good = Selection((0, 0), 4.0, bound=2.0, end=End.STOPPED)
+    good = StatePath(((1, 0), (2, 0)), (4.0,), (2.0,), stopped="time")
     assert certify_partial(part, good, 4.0).gap == 0.5
     for wrong in (
-        replace(good, bound=3.0),
-        replace(good, objective=3.0),
-        replace(good, end=End.DONE),
-        replace(good, bound=np.nan),
+        replace(good, bound=(3.0,)),
+        replace(good, objective=(3.0,)),
+        replace(good, objective=(np.nan,)),
+        replace(good, stopped=""),
+        replace(good, bound=(np.nan,)),
     ):
         with pytest.raises(SolverError):
             certify_partial(part, wrong, 4.0)
@@ -223,9 +224,9 @@ def test_what_cannot_be_searched_lazily_is_refused(engine25, criterion, name, op
 
 
 def test_costs_that_are_given_and_free_schedules_have_nothing_to_save():
-    costs = CostProblem(LayeredCosts((np.ones(2),), (np.zeros((1, 2)),)))
+    costs = Costs(LayeredCosts((np.ones(2),), (np.zeros((1, 2)),)))
     with pytest.raises(ProblemError, match="leave out lazy"):
-        solve(costs, "overlap_dp", lazy=True)
+        solve(costs.compiled().instance, "overlap_dp", lazy=True)
 
 
 @pytest.mark.slow

@@ -70,7 +70,7 @@ def test_it_chooses_as_the_cascade_does(engine25, method, criterion):
         plan = solve(problem, name, **options)
         assert found.nodes == plan.nodes
         assert found.steps == plan.steps
-    fewest = window_models(schedule, found.selection.choice)
+    fewest = window_models(schedule, found.choice)
     for name, options in (("rank_search", {}), ("rank_search", {"horizon": 1})):
         assert solve(problem, name, proof=False, **options).nodes == found.nodes
     assert fewest == found.models == found.models_needed == plan.models_needed
@@ -83,7 +83,7 @@ def test_under_a_limit_that_binds_it_chooses_as_the_cascade_does(engine25, respo
     schedule, limits = three_robot_loop(engine25.network), [Limit(response, bound)]
     problem = candidate_layers(engine25, schedule, EQUATIONS, limits)
     found = search_windows(problem)
-    assert found.choice == solve(problem, "cascade").selection.choice
+    assert found.choice == solve(problem, "cascade").choice
     assert found.choice != search_windows(candidate_layers(engine25, schedule, EQUATIONS)).choice
 
 
@@ -93,7 +93,7 @@ def test_on_any_chain_it_chooses_as_the_cascade_does(scene):
     schedule = three_robot_loop(engine.network)
     problem = candidate_layers(engine, schedule, WEIGHTED)
     found = search_windows(problem)
-    assert found.choice == solve(problem, "cascade").selection.choice
+    assert found.choice == solve(problem, "cascade").choice
 
 
 def test_a_time_limit_ends_it_and_says_what_was_chosen(engine25):

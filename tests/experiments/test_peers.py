@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from seqopt.graph.layers.interface import CostProblem
 
 from experiments.peers import peers
 from experiments.peers.parts.chain import chain_of
@@ -16,8 +15,8 @@ from experiments.peers.parts.loops import LOOPS, kept, loop
 from experiments.peers.parts.workload import PATHS, Case, by_linprog, by_networkx, workload
 from experiments.peers.peers import difference
 from seqopt.engines.interface import Want, grip_columns
-from seqopt.graph.formulation import find_formulation
 from seqopt.graph.layers.costs import LayeredCosts
+from tests.layered import Costs, answer
 
 STATES = [(4, (1, 5, 7)), (17, (1, 20, 33)), (17, (1, 20, 21)), (25, (4, 47)), (25, (12, 13, 46))]
 
@@ -88,16 +87,16 @@ def test_general_tools_find_the_optimum_of_dynamic_programming(solve):
     single = [rng.standard_normal(size) for size in sizes]
     shared = [rng.standard_normal(pair) for pair in pairs]
     shared[2][rng.random(shared[2].shape) < 0.3] = np.inf
-    problem = CostProblem(LayeredCosts(tuple(single), tuple(shared)))
-    best = find_formulation("overlap_dp").solve(problem).objective
-    assert solve(problem) == pytest.approx(best, abs=1e-8)
+    costs = LayeredCosts(tuple(single), tuple(shared))
+    best = answer(Costs(costs)).certificate.objective
+    assert solve(costs) == pytest.approx(best, abs=1e-8)
 
 
 def test_networkx_agrees_on_the_arch(engine25):
     problem, cases = workload(engine25.network)
     assert sum(len(case.grips) for case in cases) == problem.evaluation.models == 8642
-    best = PATHS["NumPy, dynamic programming"](problem)
-    assert by_networkx(problem) == pytest.approx(best, rel=1e-12)
+    best = PATHS["seqopt, overlap_dp"](problem.sums)
+    assert by_networkx(problem.sums) == pytest.approx(best, rel=1e-12)
 
 
 def test_packages_that_are_not_installed_are_named(monkeypatch):

@@ -279,10 +279,12 @@ def test_whether_a_path_is_within_two_budgets_is_decided(graph, caps):
 
 
 def test_where_labels_are_too_many_it_is_open(monkeypatch):
-    """Two ways, each within one of two budgets, whose mean is within both."""
-    rows = np.array([0, 0], dtype=np.int32), np.array([1, 1], dtype=np.int32)
-    amounts = np.array([[1.0, 0.0, 4.0], [1.0, 4.0, 0.0]])
-    graph = Graph(*rows, amounts, (True, False, False), np.array([False, True]))
+    """Four ways, none within two budgets, the mean of two within both."""
+    rows = ([0, 0, 1, 1, 2, 2], [1, 2, 3, 3, 3, 3])
+    taken = [[0, 2], [2, 0], [0, 2], [4, 0], [0, 4], [2, 0]]
+    amounts = np.column_stack([np.ones(6), taken])
+    source, target = (np.array(row, dtype=np.int32) for row in rows)
+    graph = Graph(source, target, amounts, (True, False, False), np.arange(4) == 3)
     assert not is_beyond(graph, (3.0, 3.0))
     assert is_beyond(graph, (1.9, 1.9))  # no mixture is either
     with pytest.raises(InfeasibleError):

@@ -98,7 +98,7 @@ def test_exact_ones_equal_brute_force_under_every_objective(count, ranked, among
 @pytest.mark.parametrize("among", Among)
 def test_the_conditional_objective_is_what_a_search_of_one_move_goes_by(engine25, loop25, among):
     problem = candidate_layers(engine25, loop25, replace(CONDITIONAL, among=among))
-    choice = solve(problem, "cascade").selection.choice
+    choice = solve(problem, "cascade").choice
     for k in range(len(choice)):
         before = choice[k - 1] if k else 0
         charged = problem.sums.single[k] + problem.sums.shared[k][before]
@@ -110,7 +110,7 @@ def test_the_conditional_objective_is_what_a_search_of_one_move_goes_by(engine25
 def test_the_reference_arch_under_both(problem25):
     """The cascade loses nothing by being short of sight, and all by the change of objective."""
     cascade = solve(problem25, "cascade")
-    assert under_both(problem25, cascade.selection.choice) == {
+    assert under_both(problem25, cascade.choice) == {
         "pairs": pytest.approx(663.81, abs=0.01),
         "conditional": pytest.approx(664.5),
     }
@@ -118,7 +118,7 @@ def test_the_reference_arch_under_both(problem25):
     exact = solve(conditional, "overlap_dp").certificate
     assert exact.objective == pytest.approx(656.025)
     assert solve(conditional, "cascade").certificate.gap == pytest.approx(0.01275, abs=1e-5)
-    parts = split_gap(problem25, cascade.selection.choice)
+    parts = split_gap(problem25, cascade.choice)
     assert parts.gap == pytest.approx(cascade.certificate.gap)
     assert abs(parts.short_sight) < 1e-5
     assert parts.objective > 0.009
@@ -132,7 +132,7 @@ def test_the_reference_arch_under_both(problem25):
 def test_under_the_conditional_objective_sight_is_all_that_is_lost(engine25, loop25):
     problem = candidate_layers(engine25, loop25, CONDITIONAL)
     plan = solve(problem, "cascade")
-    parts = split_gap(problem, plan.selection.choice)
+    parts = split_gap(problem, plan.choice)
     assert parts.objective == 0
     assert parts.short_sight == pytest.approx(plan.certificate.gap) != 0
     assert under(problem, Ranked.CONDITIONAL) is problem
@@ -150,7 +150,7 @@ def test_nodes_that_cannot_be_taken_change_ranks(engine25, loop25):
 
 def test_without_ranks_there_is_one_objective(engine25, loop25):
     problem = candidate_layers(engine25, loop25, WEIGHTED)
-    choice = solve(problem, "cascade").selection.choice
+    choice = solve(problem, "cascade").choice
     assert under_both(problem, choice) == {"pairs": None, "conditional": None}
     assert split_gap(problem, choice) is None
 
@@ -159,7 +159,7 @@ def test_limits_hold_under_both(engine25, loop25):
     limit = Limit("F_largest", 300.0)
     for ranked in Ranked:
         problem = candidate_layers(engine25, loop25, replace(EQUATIONS, ranked=ranked), [limit])
-        choice = solve(problem, "overlap_dp").selection.choice
+        choice = solve(problem, "overlap_dp").choice
         for step in problem.evaluation.steps:
             assert step.responses["F_largest"][tuple(choice[m] for m in step.moves)] <= 300.0
         others = {r: np.isfinite(under(problem, r).sums.shared[5]) for r in Ranked}

@@ -226,7 +226,7 @@ def test_nonsense_has_failed(kind, change, proof):
 @pytest.mark.parametrize("reply", [None, "best", 3.0, (), np.zeros(3), StatePath])
 def test_what_is_no_selection_has_failed(kind, reply):
     with pytest.raises(
-        SolverError, match=r"formulation fake returned a .*, not a .*(Selection|StatePath)"
+        SolverError, match=r"formulation fake returned a .*, not a (StatePath|.*Selection)"
     ):
         asked(kind, lambda *_, **__: reply)
 
@@ -282,14 +282,14 @@ def test_scenarios_have_the_same_guard():
     real = seqopt.formulations()["minimax"]
 
     def changes(problem):
-        problem.peaks.single[0].setflags(write=True)
-        problem.peaks.single[0][0] += 1.0
+        problem.amounts.setflags(write=True)
+        problem.amounts[0, 0] += 1.0
         return real.solve(problem)
 
     for fake, said in (
         (changes, CHANGED),
-        (denies, "says that no choice is allowed, and some are"),
-        (lambda _: None, "returned a NoneType, not a Selection"),
+        (denies, "says that no path is allowed, and some are"),
+        (lambda _: None, "returned a NoneType, not a StatePath"),
     ):
         cheat = replace(real, solve=fake)
         with pytest.raises(SolverError, match=said):

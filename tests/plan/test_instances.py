@@ -232,7 +232,7 @@ def test_prices_prove_a_capped_sum_and_dearer_ones_less(compiled):
     one = compiled("capped")
     plan = seqopt.solve(one, "lagrangian")
     name = one.caps[0].name
-    price = plan.selection.prices[name]
+    ((price,),) = plan.selection.prices
     good = seqopt.judge_instance(one, plan.nodes, [{"prices": {name: price}}])
     assert good.bound <= good.objective
     less = replace(one, caps=(one.caps[0]._replace(most=0.5 * one.caps[0].most),))

@@ -20,8 +20,8 @@ from seqopt.errors import SeqoptError
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.instance import Instance
 from seqopt.graph.paths import fewest_moves, reached
-from seqopt.graph.solution import StatePath
-from seqopt.plan._states import _claims, able
+from seqopt.plan._paths import _claims
+from seqopt.plan._states import able
 
 OUTSIDE = ("HiGHS", "CP-SAT", "linopy")
 MOST_ARCS = 20_000  # of what outside solvers are given
@@ -52,21 +52,15 @@ def _own(one: Instance, solver: str, seconds: float) -> dict[str, object]:
     timed = formulation.watched or "seconds" in formulation.options
     plan = solve(one, formulation, time_limit=seconds if timed else math.inf)
     proof = plan.certificate
-    claims = []
-    if isinstance(plan.selection, StatePath):
-        claims = [_plain(claim) for claim in _claims(one, plan.selection)]
-        said = plan.selection.bound
-    else:
-        said = (plan.selection.bound,)
     return {
         "value": proof.values[0],
         "values": [*proof.values],
-        "bound": max(said[0], proof.bounds[0]),
+        "bound": max(plan.selection.bound[0], proof.bounds[0]),
         "proven": proof.bounds[0],
         "bounds": [*proof.bounds],
         "end": str(plan.status),
         "nodes": [*plan.nodes],
-        "claims": claims,
+        "claims": [_plain(claim) for claim in _claims(one, plan.selection)],
     }
 
 

@@ -8,15 +8,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.optimize import linprog
-from seqopt.graph.layers.interface import PlacementProblem
 
 from seqopt import Network, three_robot_loop
 from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Fields, Want, grip_columns
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.formulation import find_formulation
+from seqopt.graph.layers.compiled import compile_costs
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import Layers, candidate_layers
+from seqopt.problem.problem import Aim
 from seqopt.study.published import EQUATIONS
 
 SETTINGS = ("reactions", "criterion", "all fields")
@@ -123,13 +124,13 @@ GOAL = "goal"
 Node = tuple[int, int] | str
 
 
-def by_networkx(problem: PlacementProblem) -> float:
+def by_networkx(layers: LayeredCosts) -> float:
     """Return the least cost as a shortest path through the layers (networkx, Dijkstra).
 
     Every arc is raised by the same amount where costs are negative: all paths are equally long.
     """
     graph: nx.DiGraph[Node] = nx.DiGraph()
-    costs = _arcs(problem.sums)
+    costs = _arcs(layers)
     raised = max(0.0, -min(float(cost.min()) for cost in costs))
     for layer, cost in enumerate(costs):
         for i, j in zip(*np.nonzero(np.isfinite(cost)), strict=True):
@@ -139,11 +140,11 @@ def by_networkx(problem: PlacementProblem) -> float:
     return float(nx.dijkstra_path_length(graph, (0, 0), GOAL)) - raised * len(costs)
 
 
-def by_linprog(method: Literal["highs-ds", "highs-ipm"]) -> Callable[[PlacementProblem], float]:
+def by_linprog(method: Literal["highs-ds", "highs-ipm"]) -> Callable[[LayeredCosts], float]:
     """Return a solution of the unit flow of least cost by SciPy's HiGHS, simplex or interior."""
 
-    def solve(problem: PlacementProblem) -> float:
-        costs = _arcs(problem.sums)
+    def solve(layers: LayeredCosts) -> float:
+        costs = _arcs(layers)
         masks = [np.isfinite(cost) for cost in costs]
         price = np.concatenate([cost[m] for cost, m in zip(costs, masks, strict=True)])
         starts = np.cumsum([0, *(len(cost) for cost in costs), costs[-1].shape[1]])
@@ -164,18 +165,23 @@ def by_linprog(method: Literal["highs-ds", "highs-ipm"]) -> Callable[[PlacementP
     return solve
 
 
-def by_formulation(name: str) -> Callable[[PlacementProblem], float]:
+def by_formulation(name: str) -> Callable[[LayeredCosts], float]:
     which = find_formulation(name)
-    return lambda problem: float(which.solve(problem).objective)
+
+    def solve(layers: LayeredCosts) -> float:
+        graph = compile_costs(name, layers, Aim.SUM)
+        return float(which.solve(graph.instance).objective[0]) + graph.offset
+
+    return solve
 
 
-def _arcs(placement: LayeredCosts) -> list[np.ndarray]:
-    pairs = zip(placement.shared, placement.single, strict=True)
+def _arcs(layers: LayeredCosts) -> list[np.ndarray]:
+    pairs = zip(layers.shared, layers.single, strict=True)
     return [shared + single for shared, single in pairs]
 
 
-PATHS: dict[str, Callable[[PlacementProblem], float]] = {
-    "NumPy, dynamic programming": by_formulation("overlap_dp"),
+PATHS: dict[str, Callable[[LayeredCosts], float]] = {
+    "seqopt, overlap_dp": by_formulation("overlap_dp"),
     "networkx, Dijkstra": by_networkx,
     "HiGHS, linear program, simplex": by_linprog("highs-ds"),
     "HiGHS, linear program, interior point": by_linprog("highs-ipm"),

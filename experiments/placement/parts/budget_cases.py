@@ -20,11 +20,11 @@ from experiments.harness.runs import scene_named
 from seqopt import CRITERIA, build_network, solve, three_robot_loop
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, SeqoptError
-from seqopt.graph.formulation import Formulation, Watch, find_formulation
+from seqopt.graph.formulation import End, Formulation, Watch, find_formulation
 from seqopt.graph.layers.costs import Budget
 from seqopt.graph.layers.layers import Layers, candidate_layers, steps_over, travel
-from seqopt.graph.solution import Selection
-from seqopt.judge.certificate import judge
+from seqopt.graph.solution import StatePath
+from seqopt.plan._layers import compiled
 
 COUNTED = ("F_largest", "M_sup")
 COMPARED = ("equations-2-3", "weighted")
@@ -48,7 +48,7 @@ def posed(bricks: int, criterion: str, case: str) -> Layers:
     also = () if case == NO_BUDGET else COUNTED
     loop = three_robot_loop(network)
     problem = candidate_layers(ComplianceEngine(network), loop, CRITERIA[criterion], also=also)
-    choice = solve(problem, "overlap_dp").selection.choice
+    choice = solve(problem, "overlap_dp").choice
     if case == NO_BUDGET:
         return problem
     kept = []
@@ -73,14 +73,15 @@ def _whole(problem: Layers, choice: tuple[int, ...]) -> list[Budget]:
 
 def timed(
     problem: Layers, formulation: Formulation, limit: float
-) -> tuple[Selection | SeqoptError, float]:
+) -> tuple[StatePath | SeqoptError, float]:
     """Return what a formulation chooses, or how it fails, and the seconds of the processor."""
     formulation.aim.costs(problem)
     took: list[float] = []
     while not took or (took[0] < SHORT and len(took) < ROUNDS):
         start = time.process_time()
         try:
-            found: Selection | SeqoptError = formulation.solve(problem, watch=Watch(limit))
+            graph = compiled(problem, formulation.aim, alone=formulation.alone).instance
+            found: StatePath | SeqoptError = formulation.solve(graph, watch=Watch(limit))
         except SeqoptError as error:
             found = error
         took.append(time.process_time() - start)
@@ -94,16 +95,16 @@ def row(problem: Layers, name: str, limit: float) -> dict[str, object]:
     if isinstance(found, SeqoptError):
         infeasible = isinstance(found, InfeasibleError)
         return out | {"end": "infeasible" if infeasible else "no choice", "said": str(found)}
-    out |= {"end": found.end.value, "bound": found.bound}
-    start = time.process_time()
+    out |= {"end": (End.STOPPED if found.stopped else End.DONE).value, "bound": found.bound[0]}
+    told = replace(formulation, solve=lambda *_, **__: found)
     try:
-        proof = judge(problem, found, formulation)
+        plan = solve(problem, told)
     except SeqoptError as error:  # a relaxation may follow a choice that exceeds a budget
         return out | {"end": "no choice", "said": str(error)}
     return out | {
-        "objective": proof.objective,
-        "proven_gap": proof.gap,
-        "verify": time.process_time() - start,
+        "objective": plan.certificate.objective,
+        "proven_gap": plan.certificate.gap,
+        "verify": plan.seconds["verify"],
     }
 
 
