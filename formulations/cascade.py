@@ -31,6 +31,7 @@ from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import FormulationKind, On, Reads, Watch
 from seqopt.graph.graph import Graph
+from seqopt.graph.paths import lexicographic, moves_along
 from seqopt.problem.problem import Aim
 
 CHARGES = ("later", "earlier")
@@ -59,6 +60,21 @@ def greedy(graph: Graph, charged: Floats) -> tuple[int, ...]:
         state = int(graph.target[moves][np.argmin(charged[moves])])
         path.append(state)
     return tuple(path)
+
+
+def at_hand(graph: Graph) -> tuple[int, ...]:
+    """Return a path within the caps that takes little time: what is cheapest now, or least capped.
+
+    Empty if none of these is within all caps.
+    """
+    ahead, every = onward(graph), np.ones(graph.states, dtype=bool)
+    ways = [greedy(ahead, ahead.amounts[:, 0])]
+    ways += [lexicographic(graph.bare(c, every)).path for c in range(graph.goals, len(graph.peaks))]
+    for path in ways:
+        taken = graph.amounts[moves_along(graph, path)][:, graph.goals :].sum(axis=0)
+        if (taken <= np.array(graph.caps)).all():
+            return path
+    return ()
 
 
 def _charged(graph: Graph, charge: str) -> Floats:

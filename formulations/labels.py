@@ -34,11 +34,12 @@ from __future__ import annotations
 
 from formulations.choice import Choice
 from formulations.on_graph import on_graph
+from formulations.path_dp import shortest
 from seqopt.errors import ProblemError
 from seqopt.graph._budgets import within_budgets
 from seqopt.graph.formulation import FormulationKind, On, Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import lexicographic, strictly_below
+from seqopt.graph.paths import strictly_below
 from seqopt.problem.problem import Aim
 
 
@@ -59,7 +60,7 @@ def relaxed(graph: Graph, watch: Watch) -> Choice:
 
 def _chosen(graph: Graph, watch: Watch, most: int) -> Choice:
     if not graph.caps:
-        return Choice(*lexicographic(graph))
+        return shortest(graph, watch)
     found = within_budgets(graph, graph.caps, watch, most)
     goals = zip(found.values[: graph.goals], found.bounds, strict=False)
     is_open = any(bound < strictly_below(value) for value, bound in goals)

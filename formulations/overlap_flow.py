@@ -33,15 +33,15 @@ import cvxpy as cp
 import numpy as np
 from scipy import sparse
 
-from formulations.cascade import greedy
-from formulations.choice import Choice, Choose, onward
+from formulations.cascade import at_hand
+from formulations.choice import Choice, Choose
 from formulations.on_graph import on_graph
 from formulations.solvers import minimize, minimize_whole
 from seqopt.arrays import Floats
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import FormulationKind, On, Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import fewest_moves, moves_along
+from seqopt.graph.paths import fewest_moves
 from seqopt.problem.problem import Aim
 
 ACCURACY = 1e-7  # how far a reported optimum may lie above the true one, relative to the larger of
@@ -179,13 +179,6 @@ def by_integers(write: Callable[[Graph], WholeProgram]) -> Choose:
         return Choice(path, bound, optimum.stopped, compile_seconds=seconds)
 
     return choose
-
-
-def at_hand(graph: Graph) -> tuple[int, ...]:
-    """Return a path within the budgets that took no search; empty if it is not within them."""
-    path = greedy(onward(graph), onward(graph).amounts[:, 0])
-    taken = graph.amounts[moves_along(graph, path)][:, graph.goals :].sum(axis=0)
-    return path if (taken <= np.array(graph.caps)).all() else ()
 
 
 def _whole(graph: Graph) -> WholeProgram:

@@ -28,17 +28,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from formulations.cascade import at_hand
 from formulations.choice import Choice
 from formulations.on_graph import on_graph
 from seqopt.graph.formulation import On, Watch
 from seqopt.graph.graph import Graph
-from seqopt.graph.paths import fewest_moves, lexicographic
+from seqopt.graph.paths import lexicographic
 from seqopt.problem.problem import Aim
 
 
-def _shortest(graph: Graph, watch: Watch) -> Choice:
+def shortest(graph: Graph, watch: Watch) -> Choice:
+    """Return the best path; one that is at hand where time is over."""
     if watch.over:
-        return Choice(fewest_moves(graph), stopped=True)
+        return Choice(at_hand(graph), stopped=True)
     return Choice(*lexicographic(graph))
 
 
@@ -46,15 +48,15 @@ def _least_peak(graph: Graph, watch: Watch) -> Choice:
     """Return the path of least peak, among these that of the least sum of the same amounts."""
     twice = np.column_stack([graph.amounts, graph.amounts[:, :1]])
     peaks = (True, *graph.peaks[1:], False)
-    found = _shortest(Graph(graph.source, graph.target, twice, peaks, graph.ends), watch)
+    found = shortest(Graph(graph.source, graph.target, twice, peaks, graph.ends), watch)
     return found._replace(bounds=found.bounds[:-1])
 
 
 PATH_DP = on_graph(
-    "path_dp", "dynamic programming over all states, one goal after the other", _shortest
+    "path_dp", "dynamic programming over all states, one goal after the other", shortest
 )
 OVERLAP_DP = on_graph(
-    "overlap_dp", "full overlap, dynamic programming", _shortest, on=On.LAYERS, aim=Aim.SUM
+    "overlap_dp", "full overlap, dynamic programming", shortest, on=On.LAYERS, aim=Aim.SUM
 )
 MINIMAX = on_graph(
     "minimax", "smallest worst cost over the build", _least_peak, on=On.LAYERS, aim=Aim.PEAK
@@ -62,6 +64,6 @@ MINIMAX = on_graph(
 SCENARIO_SEARCH = on_graph(
     "scenario_search",
     "totals over scenarios, by weights and labels that they bound",
-    _shortest,
+    shortest,
     on=On.SCENARIOS,
 )

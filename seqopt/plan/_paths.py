@@ -13,7 +13,7 @@ import numpy as np
 
 from seqopt._interrupts import answered
 from seqopt.arrays import Floats
-from seqopt.errors import InfeasibleError, SolverError
+from seqopt.errors import InfeasibleError, SolverError, TimeUpError
 from seqopt.graph.formulation import Finding, Formulation, FormulationKind, Run, Watch, timed
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
 from seqopt.graph.solution import StatePath
@@ -49,7 +49,7 @@ def find_path(
     watch = Watch(limit, _shifted(run.progress, offset))
     seconds = {"compile": 0.0}
     with timed(seconds, "solve"):
-        selection = _selected(instance, formulation, run, watch)
+        selection = _selected(instance, formulation, run, watch, offset)
     seconds["compile"] = selection.compile_seconds
     seconds["solve"] -= selection.compile_seconds
     certificate = None
@@ -64,7 +64,9 @@ def find_path(
     return FoundPath(selection, certificate, seconds)
 
 
-def _selected(instance: Instance, formulation: Formulation, run: Run, watch: Watch) -> StatePath:
+def _selected(
+    instance: Instance, formulation: Formulation, run: Run, watch: Watch, offset: float
+) -> StatePath:
     """Return what a formulation says, with numbers where numbers belong; or why there is none."""
     name = formulation.name
     limit = {} if math.isinf(run.left) else {"seconds": run.left}
@@ -81,6 +83,10 @@ def _selected(instance: Instance, formulation: Formulation, run: Run, watch: Wat
         from seqopt.plan._infeasible import refusal  # noqa: PLC0415  # seldom needed
 
         raise refusal(instance, name, exact=formulation.looks_at_all) from None
+    except TimeUpError as error:
+        low = watch.bound + offset
+        said = f"{error} (no path is below {low:.6g})" if math.isfinite(low) else str(error)
+        raise (KeyboardInterrupt if watch.interrupted else TimeUpError)(said) from error
     except SolverError as error:
         if watch.interrupted:
             raise KeyboardInterrupt(str(error)) from error
