@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise, product
+from typing import NamedTuple
 
 import numpy as np
 import pytest
-from formulations.scenarios import scenario_search
-from formulations.scenarios.scenario_program import _solve_program
-from formulations.scenarios.scenario_search import _close_gap, best_weights
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import seqopt
+from formulations._weights import best_weights
+from formulations.path_dp import SCENARIO_SEARCH
+from formulations.scenario_program import solve_program
+from formulations.states._totals import _Paths, cheapest_by, least_total
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
-from seqopt.graph.formulation import Watch
+from seqopt.graph.formulation import Run, Watch, as_formulation
+from seqopt.graph.layers.compiled import compile_costs, compile_totals
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
 from seqopt.graph.scenarios import (
@@ -24,9 +27,8 @@ from seqopt.graph.scenarios import (
     ScenarioLayers,
     in_scenarios,
     largest_of,
-    scenario_arcs,
 )
-from seqopt.graph.solution import Selection
+from seqopt.plan._paths import find_path
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.plan.solving import graph_of, layers_of
 from seqopt.problem.problem import WORST_PEAK, WORST_TOTAL, Aim, RobustAim, cvar, parse_robust
@@ -58,25 +60,24 @@ def many(draw, most_moves=4, most_candidates=4):
     return tuple(layers() for _ in range(draw(st.integers(1, 6))))
 
 
-class Posed(ScenarioLayers):
-    """Layers over scenarios that are given by their costs alone."""
+class Found(NamedTuple):
+    """A choice, what is claimed of it, and what is proven."""
 
-    def __init__(self, layers, aim):
-        super().__init__(None, (), aim)
-        vars(self)["given"] = layers
+    choice: tuple[int, ...]
+    selection: object
+    certificate: object
 
-    def layered(self, aim):
-        return self.given
 
-    def seconds(self, aim):
-        return {}
-
-    @property
-    def from_cache(self):
-        return ()  # nothing that a cache said
-
-    def steps(self, choice):
-        return ()
+def solved(layers, aim, formulation=None, time_limit=np.inf):
+    """The judged answer for layers over scenarios that are given by their costs alone."""
+    largest = largest_of(layers)  # says if no choice is allowed in all scenarios
+    made, name = compile_totals("drawn", layers, aim), "scenario_search"
+    if aim == WORST_PEAK:
+        made, name = compile_costs("drawn", largest, Aim.PEAK), "minimax"
+    run = Run(time_limit)
+    found = find_path(made.instance, as_formulation(formulation or name), run, made.offset)
+    choice = made.choice([node for (node,) in found.selection.states])
+    return Found(choice, found.selection, found.certificate)
 
 
 def robust(problem, scenes, aim):
@@ -111,16 +112,16 @@ def test_plans_agree_with_brute_force(aim, layers):
     found = values(layers, aim)
     if not found:
         with pytest.raises(InfeasibleError, match=f"over all {len(layers)} scenarios, move"):
-            seqopt.solve(Posed(layers, aim))
+            solved(layers, aim)
         return
-    plan = seqopt.solve(Posed(layers, aim))
+    plan = solved(layers, aim)
     best = min(found.values())
     proof = plan.certificate
     assert proof.objective == pytest.approx(best, abs=1e-6)
     assert found[plan.choice] == pytest.approx(proof.objective, abs=1e-9)
-    assert proof.bound <= plan.selection.bound + 1e-9 <= best + 2e-9
-    assert plan.status.endswith("optimal")
-    assert plan.status == "claimed optimal" or proof.gap <= 1e-6
+    assert proof.bound <= plan.selection.bound[0] + 1e-9 <= best + 2e-9
+    assert proof.claimed_gap <= 1e-6
+    assert not plan.selection.stopped
 
 
 @pytest.mark.parametrize("aim", AIMS[1:], ids=str)
@@ -129,23 +130,25 @@ def test_plans_agree_with_brute_force(aim, layers):
 def test_plans_agree_with_the_program(aim, layers):
     if not values(layers, aim):
         return
-    plan = seqopt.solve(Posed(layers, aim))
-    most = aim.most(len(layers))
-    assert _solve_program(layers, most, whole=True).objective == pytest.approx(
-        plan.certificate.objective, abs=1e-5
-    )
-    relaxed = _solve_program(layers, most, whole=False).objective
+    plan = solved(layers, aim)
+    most, compiled = aim.most(len(layers)), compile_totals("drawn", layers, aim)
+    graph, offset = compiled.instance.asked, compiled.offset
+    value = solve_program(graph, most, whole=True)[1] + offset
+    assert value == pytest.approx(plan.certificate.objective, abs=1e-5)
+    relaxed = solve_program(graph, most, whole=False)[1] + offset
     assert relaxed == pytest.approx(plan.certificate.bound, abs=1e-4 * max(1.0, abs(relaxed)))
 
 
 @pytest.mark.parametrize("aim", AIMS[1:], ids=str)
-@given(layers=many(), width=st.integers(1, 3))
+@given(layers=many(), most=st.integers(1, 3))
 @settings(max_examples=12)
-def test_a_narrow_search_still_has_a_valid_bound(aim, layers, width):
+def test_a_search_of_few_labels_still_has_a_valid_bound(aim, layers, most):
     found = values(layers, aim)
     if found:
-        plan = seqopt.solve(Posed(layers, aim), "scenario_search", width=width)
-        assert plan.selection.bound <= min(found.values()) + 1e-9
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("formulations.states._totals.LABELS", most)
+            plan = solved(layers, aim, "scenario_search")
+        assert plan.selection.bound[0] <= min(found.values()) + 1e-9
         assert plan.certificate.objective >= min(found.values()) - 1e-9
 
 
@@ -155,11 +158,10 @@ def test_a_narrow_search_still_has_a_valid_bound(aim, layers, width):
 def test_a_plan_that_has_no_time_is_feasible_and_its_bound_valid(aim, layers):
     found = values(layers, aim)
     if found:
-        name = "minimax" if aim == WORST_PEAK else "scenario_search"
-        limit = {} if aim == WORST_PEAK else {"time_limit": 0.0}
-        plan = seqopt.solve(Posed(layers, aim), name, **limit)
+        plan = solved(layers, aim, time_limit=0.0)
+        assert plan.selection.stopped == "time"
         assert plan.choice in found
-        assert plan.selection.bound <= min(found.values()) + 1e-9
+        assert plan.selection.bound[0] <= min(found.values()) + 1e-9
 
 
 @given(layers=many())
@@ -168,7 +170,7 @@ def test_aims_are_ordered(layers):
     """The mean is at most any mean of the worst, and these at most the worst."""
     if values(layers, WORST_TOTAL):
         worth = [
-            seqopt.solve(Posed(layers, aim)).certificate.objective
+            solved(layers, aim).certificate.objective
             for aim in (*AIMS[2:], WORST_TOTAL)
         ]
         assert all(a <= b + 1e-7 for a, b in pairwise(worth))
@@ -194,45 +196,48 @@ def test_one_scenario_is_the_nominal_problem():
 # negative controls: a wrong claim is seen
 
 
-def claimed(monkeypatch, found):
-    monkeypatch.setattr(scenario_search, "_close_gap", lambda *_: found)
-
-
 LAYERS = tuple(
     LayeredCosts((np.array(single),), (np.zeros((1, 2)),)) for single in ([3.0, 1.0], [0.0, 4.0])
 )
 
 
 @pytest.mark.parametrize(
-    ("found", "match"),
+    ("claim", "match"),
     [
-        (Selection((0,), 2.5, 2.0), "objective is 3, not 2.5 as claimed"),
-        (Selection((1,), 4.0, 4.5), "bound is 4.5, above the objective 4"),
+        ({"objective": (2.5,), "bound": (2.0,)}, "is 3, not 2.5 as claimed"),
+        ({"states": ((2,),), "objective": (4.0,), "bound": (4.5,)}, "a bound is above its value"),
     ],
 )
-def test_a_false_claim_is_refused(monkeypatch, found, match):
-    assert seqopt.solve(Posed(LAYERS, WORST_TOTAL)).certificate.objective == 3.0
-    claimed(monkeypatch, found)
+def test_a_false_claim_is_refused(claim, match):
+    assert solved(LAYERS, WORST_TOTAL).certificate.objective == 3.0
     with pytest.raises(SolverError, match=match):
-        seqopt.solve(Posed(LAYERS, WORST_TOTAL))
+        solved(LAYERS, WORST_TOTAL, claiming(**claim))
 
 
-def test_weights_that_do_not_fit_the_aim_prove_nothing(monkeypatch):
+def claiming(**claim):
+    """The search over scenarios, of whose answer something is changed."""
+
+    def solve(instance):
+        return replace(SCENARIO_SEARCH.solve(instance), **claim)
+
+    return replace(SCENARIO_SEARCH, solve=solve)
+
+
+@pytest.mark.parametrize("weights", [(1.0, 0.0), (0.7, 0.7), (-0.5, 0.5)])
+def test_weights_that_do_not_fit_the_aim_prove_nothing(weights):
     aim = cvar(0.0)
-    found = best_weights(scenario_arcs(LAYERS, aim), Watch())
-    unfit = replace(found, weights=np.array([1.0, 0.0]))
-    monkeypatch.setattr(scenario_search, "best_weights", lambda *_: unfit)
-    with pytest.raises(SolverError, match="do not fit the aim"):
-        seqopt.solve(Posed(LAYERS, aim))
+    assert solved(LAYERS, aim).certificate.gap == 0.0
+    with pytest.raises(SolverError, match="weights: "):
+        solved(LAYERS, aim, claiming(prices=(weights,)))
 
 
 def test_the_gap_that_weights_leave_is_real_here():
     """Half of either scenario proves 2; no choice is better than 3."""
-    arcs = scenario_arcs(LAYERS, WORST_TOTAL)
-    weighed = best_weights(arcs, Watch())
+    graph = compile_totals("two", LAYERS, WORST_TOTAL).instance.asked
+    cheapest = cheapest_by(SCENARIO_SEARCH.solve.choose, Watch())
+    weighed = best_weights(_Paths(graph, WORST_TOTAL, cheapest), Watch())
     assert weighed.bound == pytest.approx(2.0)
-    searched = _close_gap(arcs, weighed, Watch())
-    assert searched.bound == pytest.approx(3.0)
+    assert least_total(graph, WORST_TOTAL, cheapest, Watch()).bound == pytest.approx(3.0)
 
 
 # scenes
@@ -322,7 +327,7 @@ def test_peaks_of_scenarios_join_into_one():
     found = graph_of(robust(problem, some, WORST_PEAK))
     layers = found.layered(Aim.PEAK)
     joined = largest_of(layers)
-    choice = seqopt.solve(problem, "overlap_dp").selection.choice
+    choice = seqopt.solve(problem, "overlap_dp").choice
     assert joined.worst(choice) == max(costs.worst(choice) for costs in layers)
     assert isinstance(found, ScenarioLayers)
     assert isinstance(found.costs[0], ScenarioCosts)

@@ -227,7 +227,7 @@ def _ways(problem: Problem) -> list[_Way]:
         raise ProblemError(
             f"speed: it is measured where grips or states are chosen, not {on.value}"
         )
-    known = [f for f in formulations(on).values() if f.aim is not Aim.PEAK]  # another aim, with gaps of its own
+    known = [f for f in formulations(on).values() if f.aim is not Aim.PEAK]  # of another aim
     unproven = [_Way(f, proof=False) for f in known if f.name == UNPROVEN[on]]
     return [*map(_Way, known), *unproven]
 
