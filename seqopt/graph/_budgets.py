@@ -219,6 +219,8 @@ def _least_sum(
 def _next_prices(planes: Sequence[tuple[float, Floats]], caps: Floats) -> tuple[Floats, float]:
     """Return the prices under which the cheapest of the paths met is dearest, and what it takes."""
     costs, over = map(np.array, zip(*planes, strict=True))
+    if len(caps) == 1:
+        return _highest_of_lines(costs, over[:, 0], caps)
     size = np.maximum(np.abs(caps), np.abs(over).max(axis=0, initial=0.0))
     size[size == 0] = 1.0
     largest = DEAREST * (np.abs(costs).max(initial=0.0) or 1.0)
@@ -231,6 +233,19 @@ def _next_prices(planes: Sequence[tuple[float, Floats]], caps: Floats) -> tuple[
     if found.x is None or found.fun is None:
         return np.zeros(len(caps)), -np.inf
     return np.maximum(found.x[:-1], 0.0) / size, float(-found.fun)
+
+
+def _highest_of_lines(costs: Floats, over: Floats, caps: Floats) -> tuple[Floats, float]:
+    """Return the same of one budget: where two of the lines meet, or at an end."""
+    size = max(float(np.abs(caps).max()), float(np.abs(over).max())) or 1.0
+    most = DEAREST * (float(np.abs(costs).max(initial=0.0)) or 1.0) / size
+    with np.errstate(divide="ignore", invalid="ignore"):
+        meet = (costs[:, None] - costs) / (over - over[:, None])
+    inside = np.isfinite(meet) & (meet > 0) & (meet < most)
+    at = np.concatenate([[0.0, most], np.unique(meet[inside])])
+    lowest = (costs[:, None] + over[:, None] * at).min(axis=0)
+    best = int(np.argmax(lowest))
+    return at[best : best + 1], float(lowest[best])
 
 
 def _cheapest(graph: Graph, costs: Floats) -> Ints | None:
