@@ -31,6 +31,7 @@ import numpy as np
 from formulations.cascade import at_hand
 from formulations.choice import Choice
 from formulations.on_graph import on_graph
+from seqopt.errors import ProblemError
 from seqopt.graph.formulation import On, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import lexicographic
@@ -46,6 +47,11 @@ def shortest(graph: Graph, watch: Watch) -> Choice:
 
 def _least_peak(graph: Graph, watch: Watch) -> Choice:
     """Return the path of least peak, among these that of the least sum of the same amounts."""
+    if not graph.peaks[0]:
+        raise ProblemError(
+            "minimax: a sum comes first, and no largest cost; use scenario_search over scenarios, "
+            "path_dp or overlap_dp elsewhere"
+        )
     twice = np.column_stack([graph.amounts, graph.amounts[:, :1]])
     peaks = (True, *graph.peaks[1:], False)
     found = shortest(Graph(graph.source, graph.target, twice, peaks, graph.ends), watch)

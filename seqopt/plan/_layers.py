@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -37,6 +38,7 @@ from seqopt.sequence.steps import Step
 from seqopt.work._clock import INTERRUPT
 
 CHOOSES = {Aim.PEAK: "minimax", Aim.SUM: "overlap_dp"}  # of one scenario, without budgets
+EFFORT = ("seconds", "max_memory")  # of any formulation; responses have a memory of their own
 Choices = Layers | ScenarioLayers
 
 
@@ -67,6 +69,9 @@ def solve_layers(graph: Choices, formulation: Formulation, run: Run) -> Plan:
     require_fit(graph.budgets, formulation, run.options)
     require_time(formulation, run.time_limit)
     require_time(formulation, run.clock.left)
+    limit = min(run.time_limit, run.options.get("seconds", math.inf))
+    own = {name: value for name, value in run.options.items() if name not in EFFORT}
+    run = replace(run, options=own, time_limit=limit)
     if isinstance(graph, Layers):
         graph.require_possible()
     else:
