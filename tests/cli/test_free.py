@@ -87,7 +87,8 @@ def test_the_margin_search_plan_is_in_degrees(capsys, tmp_path, arch):
         (["--robots", "rob9,rob1"], 2, "robot 'rob9' does not exist"),
         (["--option", "width=0"], 2, "options width=0, growth=1.1: give a whole number"),
         (["--option", "speed=1"], 2, "--option speed=1: schedule_search has width"),
-        (["--formulation", "minimax"], 2, "minimax is for open grips in layers"),
+        (["--formulation", "minimax", "--aim", "steps"], 2, "minimax: a sum comes first"),
+        (["--formulation", "pareto_zones"], 2, "pareto_zones is for Pareto sets"),
         (["--criteria", "equations-2-3"], 2, "it ranks the choices of a move"),
         (["--tilt", "3"], 2, "--tilt: it goes with --stands"),
         (["--stands", "jelly"], 2, "--stands jelly: give epoxy, dry, or bond="),
@@ -245,7 +246,7 @@ def test_the_best_order_is_written_with_its_scene(capsys, tmp_path, arch):
     ("words", "said"),
     [
         (["--schedule", "loop"], "orders, and steps or regrips in a Pareto set, go with the free"),
-        (["--schedule", "free", "--formulation", "minimax"], "or order_search"),
+        (["--schedule", "free", "--formulation", "pareto_zones"], "or order_search"),
         (["--schedule", "free", "--max-memory", "2GB"], "--max-memory: the search of orders has"),
         (["--schedule", "free", "--option", "depth=3"], "depth"),
     ],

@@ -17,7 +17,7 @@ from seqopt._cli.commands import analyze, optimize, pareto, replan
 from seqopt._cli.main import main
 from seqopt.errors import TimeUpError
 from seqopt.graph.formulation import End
-from seqopt.plan import _layers, _states
+from seqopt.plan import _paths, _states
 from seqopt.plan._studies.fewest_props import fewest_props
 from seqopt.plan.front import find_front
 from seqopt.plan.plan import Status
@@ -82,7 +82,7 @@ def in_the_midst(monkeypatch, module, name, how):
     ("how", "why", "status"), [(TimeoutError, TIME, 0), (KeyboardInterrupt, INTERRUPT, 130)]
 )
 @pytest.mark.parametrize(
-    ("words", "module", "judge"), [(FREE, _states, "judge_schedule"), (LOOP, _layers, "judge")]
+    ("words", "module", "judge"), [(FREE, _states, "judge_schedule"), (LOOP, _paths, "judge_path")]
 )
 def test_a_proof_that_is_ended_leaves_what_is_claimed(
     tmp_path, monkeypatch, words, module, judge, how, why, status

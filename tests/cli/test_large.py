@@ -16,7 +16,7 @@ import pytest
 from seqopt._cli.main import main
 from seqopt._cli.values import parse_size
 from seqopt.errors import ProblemError
-from seqopt.plan import _layers as layers
+from seqopt.plan import _paths as paths
 from seqopt.scene.scene_file import save_scene
 from tests.builders import ROOT, small_arch
 from tests.commands import beside_models
@@ -252,12 +252,12 @@ def test_an_interrupted_choice_is_written_with_its_bound(capsys, monkeypatch, tm
 
 def test_an_interrupt_ends_all_that_is_compared(capsys, monkeypatch):
     """One plan that was interrupted does not let the next begin."""
-    select = layers.select
+    selected = paths._selected
 
-    def interrupted(formulation, problem, watch, **options):
+    def interrupted(instance, formulation, run, watch, *more):
         watch.interrupt()
-        return select(formulation, problem, watch, **options)
+        return selected(instance, formulation, run, watch, *more)
 
-    monkeypatch.setattr(layers, "select", interrupted)
+    monkeypatch.setattr(paths, "_selected", interrupted)
     assert main(["compare"]) == 130
     assert capsys.readouterr().err == "seqopt: interrupted\n"
