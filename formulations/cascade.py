@@ -62,14 +62,16 @@ def greedy(graph: Graph, charged: Floats) -> tuple[int, ...]:
     return tuple(path)
 
 
-def at_hand(graph: Graph) -> tuple[int, ...]:
-    """Return a path within the caps that takes little time: what is cheapest now, or least capped.
+def at_hand(graph: Graph, *ways: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the first path within the caps: of some, what is cheapest now, what is least capped.
 
     Empty if none of these is within all caps.
     """
     ahead, every = onward(graph), np.ones(graph.states, dtype=bool)
-    ways = [greedy(ahead, ahead.amounts[:, 0])]
-    ways += [lexicographic(graph.bare(c, every)).path for c in range(graph.goals, len(graph.peaks))]
+    ways += (greedy(ahead, ahead.amounts[:, 0]),)
+    ways += tuple(
+        lexicographic(graph.bare(c, every)).path for c in range(graph.goals, len(graph.peaks))
+    )
     for path in ways:
         taken = graph.amounts[moves_along(graph, path)][:, graph.goals :].sum(axis=0)
         if (taken <= np.array(graph.caps)).all():

@@ -15,7 +15,8 @@ the step that the two share. ``overlap_lp`` (Clarabel) takes :math:`y \ge 0`. Wi
 matrix is totally unimodular and an optimal vertex is a path. An interior-point answer is a mixture
 where costs tie: the path follows the largest flow, every move of which lies on a best path. The
 duals of the budgets are their multipliers: what one more unit of each would save. With budgets the
-value is a bound and the path, if it is within them, need not be the best.
+value is a bound and the path, if it is within them, need not be the best; if it is not, one that
+took no search is taken.
 
 ``overlap_mip`` (HiGHS) takes :math:`y \in \{0, 1\}`: exact, with budgets. It earns its price where
 these couple all moves: a cap on robot travel, on how often a robot is used, on the count of steps
@@ -131,7 +132,7 @@ def _relaxed(graph: Graph, watch: Watch) -> Choice:
     prices = tuple(flow.scale / u * d for u, d in zip(flow.units, duals, strict=True))
     path = flow.path(np.asarray(arcs.value))
     return Choice(
-        path,
+        at_hand(graph, path) or path,
         (flow.bound(optimum.value),),
         prices=(prices,),
         compile_seconds=optimum.compile_seconds,
