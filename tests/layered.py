@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 
-from seqopt.graph.formulation import Run, as_formulation
+from seqopt.graph.formulation import Formulation, FormulationKind, Run, as_formulation
 from seqopt.graph.layers.compiled import compile_costs
 from seqopt.graph.layers.costs import Budget, LayeredCosts
+from seqopt.graph.solution import StatePath
+from seqopt.plan._guard import require_fit
 from seqopt.plan._paths import find_path
 from seqopt.problem.problem import Aim
 
@@ -20,13 +22,30 @@ class Costs:
 
     sums: LayeredCosts
     budgets: tuple[Budget, ...] = ()
+    alone: LayeredCosts | None = None  # as a search of one move sees them; by default the same
 
     @property
     def peaks(self):
         return self.sums
 
     def compiled(self, aim=Aim.SUM):
-        return compile_costs("drawn", self.sums, aim, self.budgets, alone=self.sums)
+        return compile_costs("drawn", self.sums, aim, self.budgets, self.alone or self.sums)
+
+    def worth(self, choice, aim=Aim.SUM):
+        return self.sums.cost(choice) if aim is Aim.SUM else self.sums.worst(choice)
+
+    def within(self, aim=Aim.SUM):
+        """What every choice within limits and budgets is worth."""
+        worths = {c: self.worth(c, aim) for c in product(*map(range, self.sums.sizes))}
+        return {
+            choice: worth
+            for choice, worth in worths.items()
+            if np.isfinite(worth) and all(b.spent(choice) <= b.bound for b in self.budgets)
+        }
+
+    def best(self, aim=Aim.SUM):
+        """The least value within budgets, infinite if there is none."""
+        return min(self.within(aim).values(), default=np.inf)
 
 
 @dataclass(frozen=True)
@@ -40,17 +59,73 @@ class Answer:
     stopped: str = ""
     trace: tuple = ()
     certificate: object = None
+    compile_seconds: float = 0.0
 
 
-def answer(costs, formulation="overlap_dp", *, aim=None, proof=True, time_limit=np.inf, **options):
+def aim_of(formulation):
+    return formulation.aim or Aim.SUM
+
+
+def answer(
+    costs,
+    formulation="overlap_dp",
+    *,
+    aim=None,
+    proof=True,
+    time_limit=np.inf,
+    progress=None,
+    **options,
+):
     """The judged answer of a formulation, by name or itself, for costs."""
     formulation = as_formulation(formulation)
-    compiled = costs.compiled(aim or formulation.aim or Aim.SUM)
-    run = partial(Run, proof=proof, time_limit=time_limit)(options=options)
+    require_fit(costs.budgets, formulation, options)
+    compiled = costs.compiled(aim or aim_of(formulation))
+    run = Run(time_limit, progress, proof, options=options)
     found = find_path(compiled.instance, formulation, run, compiled.offset)
     claimed = found.selection
     caps = [cap.name for cap in compiled.instance.caps]
     prices = dict(zip(caps, claimed.prices[0] if claimed.prices else (), strict=False))
     choice = compiled.choice([node for (node,) in claimed.states])
     told = claimed.objective[0], claimed.bound[0], prices, claimed.stopped, claimed.trace
-    return Answer(choice, *told, found.certificate)
+    return Answer(choice, *told, found.certificate, claimed.compile_seconds)
+
+
+def changed(formulation, change):
+    """A formulation of whose answers, paths through an instance, something is changed."""
+    formulation = as_formulation(formulation)
+
+    def solve(problem, *, watch=None):
+        return change(formulation.solve(problem, watch=watch))
+
+    return replace(formulation, solve=solve)
+
+
+def path_of(compiled, choice):
+    """The nodes that a choice stands for; a candidate that no path passes has none."""
+    levels = compiled.instance.levels
+    nodes = []
+    for level, candidate in enumerate(choice, start=1):
+        nodes += np.flatnonzero((levels == level) & (compiled.candidates == candidate)).tolist()
+    return tuple(nodes)
+
+
+def told(
+    costs,
+    choice,
+    objective,
+    bound=-np.inf,
+    *,
+    prices=(),
+    kind=FormulationKind.HEURISTIC,
+    aim=Aim.SUM,
+    stopped="",
+):
+    """A formulation that answers as it is told, whatever is true."""
+    offset = costs.compiled(aim).offset
+
+    def solve(instance):
+        states = tuple((node,) for node in path_of(costs.compiled(aim), choice))
+        values = (objective - offset,), (bound - offset,)
+        return StatePath(states, *values, prices=(tuple(prices),), stopped=stopped)
+
+    return Formulation("told", "", kind, aim, solve, takes_budgets=True)
