@@ -20,7 +20,7 @@ import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
 from seqopt.arrays import Floats, Ints
-from seqopt.errors import InfeasibleError, NothingFoundError, SolverError
+from seqopt.errors import InfeasibleError, NothingFoundError, SolverError, TimeUpError
 from seqopt.graph._labels import LabelSearch, cheapest_within, ground
 from seqopt.graph.duality import ROUNDING, least_sum
 from seqopt.graph.formulation import Watch
@@ -72,7 +72,7 @@ def within_budgets(
     """
     watch, goals = watch or Watch(), len(graph.peaks) - len(caps)
     limited = [*zip(range(goals, len(graph.peaks)), caps, strict=True)]
-    bounds, prices, best = [], [], _some_path(graph, caps)
+    bounds, prices, best = [], [], _some_path(graph, caps, watch)
     for goal in range(goals):
         if graph.peaks[goal]:
             bound, price, way = _least_worst(graph, goal, limited)
@@ -97,7 +97,7 @@ def within_budgets(
     return Within(best.states, values, (*least, *values[goals:]), tuple(prices))
 
 
-def _some_path(graph: Graph, caps: Sequence[float]) -> _Path:
+def _some_path(graph: Graph, caps: Sequence[float], watch: Watch) -> _Path:
     """Return a path whose last columns are within caps."""
     goals = len(graph.peaks) - len(caps)
     limited = [*zip(range(goals, len(graph.peaks)), caps, strict=True)]
@@ -108,8 +108,11 @@ def _some_path(graph: Graph, caps: Sequence[float]) -> _Path:
     if found.bound <= _rounding(graph, found.prices, caps):
         nothing, most = np.zeros(len(graph.source)), [tied(cap) for cap in caps]
         asked = ground(graph, nothing, graph.amounts[:, goals:], most, found.prices)
-        met = cheapest_within(asked, NONE, Watch(), LABELS, any_path=True)
+        until = Watch(watch.left)  # it is told no costs that are none
+        met = cheapest_within(asked, NONE, until, LABELS, any_path=True)
         path = _path(graph, met.moves)
+        if path is None and until.over:
+            raise TimeUpError("no path within all caps was found yet; give more")
         if path is None and np.isfinite(met.bound):
             raise NothingFoundError(
                 "mixtures of plans are within all budgets, and no plan was found that is; raise one"
