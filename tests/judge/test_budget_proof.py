@@ -10,42 +10,42 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from seqopt.graph.layers.interface import CostProblem
 
-from seqopt.errors import InfeasibleError, SolverError
+from seqopt.errors import InfeasibleError, SolverError, TimeUpError
 from seqopt.graph.formulation import End, FormulationKind, On, formulations
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.layers import steps_over, travel
 from seqopt.judge import _budget_proof as budget_proof
-from seqopt.judge._budget_proof import least_within
+from seqopt.judge._budget_proof import case_of, least_within
 from seqopt.plan._infeasible import smallest_conflict
 from seqopt.plan.solving import solve
+from tests.layered import Costs, answer
 from tests.strategies import budgeted
 
 TAKERS = {name: found for name, found in formulations(On.LAYERS).items() if found.takes_budgets}
 
 
-def within(problem, budgets=None):
-    """The allowed choices within budgets and what they cost."""
-    budgets = problem.budgets if budgets is None else budgets
-    return {
-        choice: problem.sums.cost(choice)
-        for choice in product(*map(range, problem.sums.sizes))
-        if np.isfinite(problem.sums.cost(choice))
-        and all(b.spent(choice) <= b.bound for b in budgets)
-    }
+def bounded(problem, value, claimed):
+    """What the judge proves of costs, given the value of a choice and claimed multipliers."""
+    compiled = problem.compiled()
+    instance = compiled.instance
+    limited = [(cap.column, cap.most) for cap in instance.caps]
+    costs = instance.amounts[:, 0]
+    case, sizes = case_of(instance.graph, costs, limited, value - compiled.offset)
+    prices = np.array([claimed.get(cap.name, 0.0) for cap in instance.caps]) * sizes
+    return least_within(case, np.maximum(prices, 0.0), laid_down=True)[0] + compiled.offset
 
 
 @pytest.mark.parametrize("most", [1, 5_000])
 @given(problem=budgeted(), price=st.floats(0, 5))
 @settings(max_examples=30)
 def test_no_choice_costs_less_than_is_proven(problem, price, most):
-    found = within(problem)
+    found = problem.within()
     claimed = {budget.name: price for budget in problem.budgets}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(budget_proof, "MOST", most)
         for value in {*found.values()}:
-            bound = least_within(problem, value, claimed, max(value, 1.0))
+            bound = bounded(problem, value, claimed)
             assert bound <= min(found.values()) + 1e-6
             if most > 1:
                 assert bound == pytest.approx(min(found.values()), abs=1e-6)
@@ -54,16 +54,19 @@ def test_no_choice_costs_less_than_is_proven(problem, price, most):
 @given(problem=budgeted())
 @settings(max_examples=30)
 def test_the_smallest_conflict(problem):
-    if not within(problem, ()):
+    def within(budgets):
+        return replace(problem, budgets=tuple(budgets)).within()
+
+    if not within(()):
         return
-    found = smallest_conflict(problem)
+    found = [cap.name for cap in smallest_conflict(problem.compiled().instance)]
     sizes = [
         count
         for count in range(1, len(problem.budgets) + 1)
-        if any(not within(problem, some) for some in combinations(problem.budgets, count))
+        if any(not within(some) for some in combinations(problem.budgets, count))
     ]
     assert len(found) == (sizes[0] if sizes else 0)
-    assert not found or not within(problem, found)
+    assert not found or not within(b for b in problem.budgets if b.name in found)
 
 
 def tied(rng):
@@ -84,7 +87,7 @@ def tied(rng):
         budget = Budget(name, *parts([0.1, 0.2, 0.3, 1.0, 2.0]), 0.0)
         bound = budget.spent(chosen) - rng.choice([0.0, 0.0, 0.0, 0.05])
         budgets.append(replace(budget, bound=bound))
-    return CostProblem(LayeredCosts(*parts([1.85, 3.7, 3.7, 1e-3])), tuple(budgets))
+    return Costs(LayeredCosts(*parts([1.85, 3.7, 3.7, 1e-3])), tuple(budgets))
 
 
 def exactly_within(problem):
@@ -112,7 +115,7 @@ def test_none_is_within_only_where_enumeration_finds_none(name, draws):
         problem = tied(rng)
         found = exactly_within(problem)
         try:
-            proof = solve(problem, name).certificate
+            proof = answer(problem, name).certificate
         except InfeasibleError:
             assert not found, problem
             refused += 1
@@ -129,9 +132,9 @@ def test_none_is_within_only_where_enumeration_finds_none(name, draws):
 def test_a_choice_exactly_at_its_budget_is_within():
     none = (np.zeros((1, 2)),)
     costs = LayeredCosts((np.array([3.7, 1.85]),), none)
-    problem = CostProblem(costs, (Budget("use", (np.array([1.0, 2.0]),), none, 1.0),))
+    problem = Costs(costs, (Budget("use", (np.array([1.0, 2.0]),), none, 1.0),))
     for name in TAKERS:
-        assert solve(problem, name).selection.choice == (0,)
+        assert answer(problem, name).choice == (0,)
 
 
 def test_what_rounding_puts_above_a_bound_is_not_proven_to_exceed_it():
@@ -139,14 +142,14 @@ def test_what_rounding_puts_above_a_bound_is_not_proven_to_exceed_it():
     pairs = (np.zeros((1, 2)), np.zeros((2, 1)))
     use = (np.array([0.1, 0.0]), np.array([1.1]))
     costs = LayeredCosts((np.array([1.0, 2.0]), np.zeros(1)), pairs)
-    problem = CostProblem(costs, (Budget("use", use, pairs, 1.2),))
+    problem = Costs(costs, (Budget("use", use, pairs, 1.2),))
     assert problem.budgets[0].spent((0, 0)) > 1.2
-    assert least_within(problem, 2.0, {}, 2.0) == pytest.approx(1.0)
-    assert least_within(problem, 2.0, {"use": 1e17}, 2.0) <= 1.0 + 1e-6
+    assert bounded(problem, 2.0, {}) == pytest.approx(1.0)
+    assert bounded(problem, 2.0, {"use": 1e17}) <= 1.0 + 1e-6
     only = replace(problem.budgets[0], single=(np.array([0.1, 0.1]), np.array([1.1])))
-    assert smallest_conflict(replace(problem, budgets=(only,))) == ()
+    assert smallest_conflict(replace(problem, budgets=(only,)).compiled().instance) == ()
     for name in ("labels", "overlap_mip"):
-        assert solve(problem, name).selection.choice == (0, 0)
+        assert answer(problem, name).choice == (0, 0)
 
 
 def test_budgets_that_conflict_are_named(problem25):
@@ -171,14 +174,14 @@ def test_few_labels_stop_with_a_bound(problem25):
         budgets=(travel(problem25, 18.0), steps_over(problem25, "F_largest", 250.0, 18.0)),
     )
     best = solve(capped, "labels")
-    assert best.selection.end is End.DONE
+    assert best.ended is End.DONE
     assert best.certificate.claimed_gap <= 1e-6
     few = solve(capped, "labels", most=8)
-    assert few.selection.bound <= best.certificate.objective <= few.certificate.objective
-    assert few.selection.end is End.STOPPED or few.selection.bound == few.selection.objective
+    assert few.selection.bound[0] <= best.certificate.objective <= few.certificate.objective
+    assert few.ended is End.STOPPED or few.selection.bound == few.selection.objective
     assert few.certificate.claimed_gap < 0.02
     tight = replace(capped, budgets=(*capped.budgets, travel(problem25, 11.4)))
-    with pytest.raises(SolverError, match="before any choice within all budgets was found"):
+    with pytest.raises(TimeUpError, match="no path within all caps was found yet"):
         solve(tight, "labels", most=1, time_limit=0)
 
 
@@ -189,15 +192,13 @@ def test_what_a_budget_costs(problem25):
     plans = [solve(problem, "labels") for problem in capped]
     proofs = [plan.certificate for plan in plans]
     values = [proof.objective for proof in proofs]
-    prices = [plan.selection.prices["robot travel [m]"] for plan in plans]
+    prices = [plan.selection.prices[0][0] for plan in plans]
     assert values == sorted(values, reverse=True)
     assert all(p.spent["robot travel [m]"] <= b for p, b in zip(proofs, bounds, strict=True))
     assert all(proof.gap <= 1e-6 for proof in proofs)
     assert prices == sorted(prices, reverse=True)
     assert prices[-1] == 0
-    relaxed = [
-        solve(problem, "lagrangian").selection.prices["robot travel [m]"] for problem in capped[:2]
-    ]
+    relaxed = [solve(problem, "lagrangian").selection.prices[0][0] for problem in capped[:2]]
     np.testing.assert_allclose(relaxed, prices[:2])
     with pytest.raises(InfeasibleError):
         solve(replace(problem25, budgets=(travel(problem25, 10.0),)), "labels")
@@ -212,11 +213,11 @@ def test_a_budget_without_a_bound_is_none(problem25):
 
 def test_the_bound_holds_where_costs_have_both_signs():
     rng = np.random.default_rng(3)
-    costs = CostProblem(_random(rng, 4, 6).sums)
+    costs = Costs(_random(rng, 4, 6).sums)
     assert costs.sums.sizes == (6,) * 4
     capped = _random(rng, 4, 6)
-    found = within(capped)
-    plan = solve(capped, "labels")
+    found = capped.within()
+    plan = answer(capped, "labels")
     assert plan.certificate.objective == pytest.approx(min(found.values()))
     assert plan.certificate.gap <= 1e-6
 
@@ -230,4 +231,4 @@ def _random(rng, moves, size):
         )
         return single, shared
 
-    return CostProblem(LayeredCosts(*parts()), (Budget("use", *parts(), -2.0),))
+    return Costs(LayeredCosts(*parts()), (Budget("use", *parts(), -2.0),))
