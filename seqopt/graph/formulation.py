@@ -65,7 +65,7 @@ class Finding:
     @property
     def gap(self) -> float:
         """What the bound leaves open, over the size of the objective; infinite if either lacks."""
-        left = self.objective - self.bound
+        left = max(self.objective - self.bound, 0.0)  # it may be above by rounding
         return left / max(abs(self.objective), abs(self.bound)) if left else 0.0
 
     def __str__(self) -> str:
