@@ -8,7 +8,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-from seqopt.graph.layers.interface import CostProblem
 
 import seqopt
 from seqopt.engines.interface import Want
@@ -18,11 +17,11 @@ from seqopt.graph.layers._partial_costs import PartialCosts
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.orders import AllOrders, OrderStates
 from seqopt.graph.paths import keep_best, least_peak
-from seqopt.graph.solution import Selection
+from seqopt.graph.solution import StatePath
 from seqopt.graph.states._visits import explore, floors_of_goals
 from seqopt.graph.states.states import build_states
 from seqopt.judge import _budget_proof as budget_proof
-from seqopt.judge._budget_proof import least_within
+from seqopt.judge._budget_proof import case_of, least_within
 from seqopt.judge._orders import finds_better_order
 from seqopt.judge._proof import Passable, Proof
 from seqopt.judge.certificate import TOLERANCE, certify_partial
@@ -34,6 +33,7 @@ from seqopt.responses.quantities import CHOSEN_BY
 from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.rules import Ending, FreeRules, with_robots
 from tests.builders import small_arch
+from tests.layered import Costs
 
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
 FREE_RULES = FreeRules()
@@ -127,13 +127,8 @@ def signed_problem(rng, moves=3, size=5):
         return tuple(rng.normal(size=size) for _ in pairs), tuple(rng.normal(size=p) for p in pairs)
 
     budgets = tuple(Budget(name, *parts(), float(rng.uniform(-4, 2))) for name in ("one", "two"))
-    problem = CostProblem(LayeredCosts(*parts()), budgets)
-    found = [
-        problem.sums.cost(choice)
-        for choice in product(range(size), repeat=moves)
-        if all(budget.spent(choice) <= budget.bound for budget in budgets)
-    ]
-    return problem, sorted(found)
+    problem = Costs(LayeredCosts(*parts()), budgets)
+    return problem, sorted(problem.within().values())
 
 
 @pytest.mark.parametrize("most", [1, 3])
@@ -146,9 +141,13 @@ def test_what_is_set_aside_counts_and_prices_are_not_negative(monkeypatch, most,
     proven = 0
     for _ in range(10):
         problem, found = signed_problem(rng)
+        compiled = problem.compiled()
+        graph, costs = compiled.instance.graph, compiled.instance.amounts[:, 0]
+        limited = [(cap.column, cap.most) for cap in compiled.instance.caps]
         for price, value in product((-3.0, 0.0, 5.0), found[:3]):
-            claimed = {"one": price, "two": -price}
-            bound = least_within(problem, value, claimed, max(abs(value), 1.0))
+            case, sizes = case_of(graph, costs, limited, value - compiled.offset)
+            claimed = np.maximum([price, -price], 0.0) * sizes  # as the judge of paths reads them
+            bound = least_within(case, claimed, laid_down=True)[0] + compiled.offset
             assert bound <= found[0] + 1e-6
             proven += bound > found[0] - 0.5
     assert proven
@@ -163,13 +162,13 @@ def test_what_some_pairs_prove_is_all_that_may_be_claimed(aim, best, bound):
     part = PartialCosts((np.full(2, 2.0), np.array([1.0, 1.5])), ({}, {0: ROW, 1: ROW}), 1.0, aim)
     part = part if aim is Aim.PEAK else replace(part, rows=({}, {0: ROW}))
     assert (part.best, part.bound) == (best, bound)
-    claimed = Selection((0, 0), best, bound=bound, end="stopped")
+    claimed = StatePath(((0,), (0,)), (best,), (bound,), stopped="time")
     proof = certify_partial(part, claimed, best)
     assert (proof.bound, proof.gap) == (bound, (best - bound) / best)
-    certify_partial(part, replace(claimed, bound=bound + 0.9 * TOLERANCE * best), best)
+    certify_partial(part, replace(claimed, bound=(bound + 0.9 * TOLERANCE * best,)), best)
     for more in (1.1 * TOLERANCE * best, 0.1 * bound, bound, np.inf):
         with pytest.raises(SolverError, match="claimed bound"):
-            certify_partial(part, replace(claimed, bound=bound + more), best)
+            certify_partial(part, replace(claimed, bound=(bound + more,)), best)
 
 
 def test_what_was_left_out_for_a_threshold_bounds_all_orders():
