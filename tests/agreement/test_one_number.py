@@ -18,8 +18,8 @@ import seqopt
 from seqopt.errors import InfeasibleError, ProblemError
 from seqopt.graph.formulation import FormulationKind, On, exhibits, formulations
 from seqopt.graph.layers.layers import steps_over, travel
-from seqopt.judge.schedules import plan_values
 from seqopt.instances.compiled import compile_instance
+from seqopt.judge.schedules import plan_values
 from seqopt.plan.solving import layers_of, states_of
 from seqopt.problem.criteria import StepCost, WeightedSum
 from seqopt.problem.problem import Aim

@@ -72,9 +72,7 @@ def test_the_optimum_is_that_of_all_pairs(engine25, name, criterion):
     assert lazy.certificate.objective == pytest.approx(whole.certificate.objective, rel=1e-9)
     assert lazy.certificate.gap <= 1e-9
     assert lazy.ended is End.DONE
-    value = whole.formulation.aim.value_of(
-        whole.formulation.aim.costs(problem), lazy.choice
-    )
+    value = whole.formulation.aim.value_of(whole.formulation.aim.costs(problem), lazy.choice)
     assert value == pytest.approx(lazy.certificate.objective, rel=1e-12)
     assert lazy.models < whole.models
     assert lazy.summary()["status"] == "optimal"

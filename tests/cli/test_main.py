@@ -324,7 +324,7 @@ def test_the_loop_of_two_is_compared_where_there_is_no_third(capsys, tmp_path):
         (("--schedule", "three-robot", "--robots", "rob1,rob2"), "three-robot takes three"),
         (("--formulation", "overlap_dp", "--robots", "rob1,,rob2"), "robot '' does not exist"),
         (("--formulation", "simplex"), "formulation 'simplex'"),
-        (("--formulation", "beam", "--option", "depth=3"), "--option depth=3: beam has seconds, max_memory, width"),
+        (("--formulation", "beam", "--option", "depth=3"), "--option depth=3: beam has seconds"),
         (("--formulation", "beam", "--option", "width=wide"), "width is 'wide'; give an int"),
         (("--formulation", "beam", "--option", "width=0"), "width is 0"),
         (("--formulation", "overlap_dp", "--criteria", "beauty"), "--criteria beauty"),

@@ -83,6 +83,12 @@ def test_a_formulation_that_changes_what_it_is_judged_by_is_refused(cheat):
     assert seqopt.solve(small(), "overlap_dp").certificate.objective == 3.0
 
 
+def test_costs_that_change_while_they_are_judged_are_seen(monkeypatch):
+    monkeypatch.setattr("seqopt.judge._arithmetic.proven", lambda *_: 99.0)
+    with pytest.raises(SolverError, match="the bound 99 is above the path's 3"):
+        seqopt.solve(small(), "overlap_dp")
+
+
 def test_an_optimum_within_budgets_is_proven_or_claimed(engine25, monkeypatch):
     criterion = seqopt.CRITERIA["worst-ratio-published"]
     problem = candidate_layers(engine25, seqopt.three_robot_loop(engine25.network), criterion)

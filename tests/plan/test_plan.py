@@ -158,7 +158,11 @@ def test_the_short_cut_does_what_the_long_way_does(arch25, engine25):
         ({"criterion": "ranks"}, ProblemError, "give one of equations-2-3"),
         ({"formulation": "dp"}, ProblemError, "give one of beam, best_first, cascade"),
         ({"width": 3}, ProblemError, "option width: overlap_dp has seconds, max_memory"),
-        ({"formulation": "beam", "horizon": 3}, ProblemError, "option horizon: beam has seconds, max_memory, width"),
+        (
+            {"formulation": "beam", "horizon": 3},
+            ProblemError,
+            "option horizon: beam has seconds, max_memory",
+        ),
         ({"engine": "x"}, seqopt.SeqoptError, "known are auto"),
     ],
 )

@@ -22,12 +22,7 @@ from seqopt.graph.formulation import Run, Watch, as_formulation
 from seqopt.graph.layers.compiled import compile_costs, compile_totals
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.graph.scenarios import (
-    ScenarioCosts,
-    ScenarioLayers,
-    in_scenarios,
-    largest_of,
-)
+from seqopt.graph.scenarios import ScenarioCosts, ScenarioLayers, in_scenarios, largest_of
 from seqopt.plan._paths import find_path
 from seqopt.plan.out_of_sample import judge_unseen
 from seqopt.plan.solving import graph_of, layers_of
@@ -169,10 +164,7 @@ def test_a_plan_that_has_no_time_is_feasible_and_its_bound_valid(aim, layers):
 def test_aims_are_ordered(layers):
     """The mean is at most any mean of the worst, and these at most the worst."""
     if values(layers, WORST_TOTAL):
-        worth = [
-            solved(layers, aim).certificate.objective
-            for aim in (*AIMS[2:], WORST_TOTAL)
-        ]
+        worth = [solved(layers, aim).certificate.objective for aim in (*AIMS[2:], WORST_TOTAL)]
         assert all(a <= b + 1e-7 for a, b in pairwise(worth))
 
 
