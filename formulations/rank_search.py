@@ -70,15 +70,17 @@ def _enumerate(graph: Graph, state: int, horizon: int) -> _Ways:
     moves = np.arange(len(graph.source))[graph.moves_from(state)]
     alone = graph.amounts[moves, 0] if graph.alone is None else graph.alone[moves].sum(axis=1)
     ways = _Ways(alone, graph.target[moves][:, None].astype(np.int64))
+    out = np.bincount(graph.source, minlength=graph.states)
     for _ in range(horizon - 1):
         if graph.ends[ways.states[:, -1]].all():
             break
-        row, moves = moves_out(graph, ways.states[:, -1])
-        if len(row) > MOST:
+        count = int(out[ways.states[:, -1]].sum())
+        if count > MOST:
             raise ProblemError(
-                f"rank_search: {len(row):.2g} combinations of {horizon} moves; lower the horizon "
-                f"(at most {MOST:.0e} are enumerated)"
+                f"rank_search: {count:.2g} combinations of {ways.states.shape[1] + 1} moves; "
+                f"lower the horizon (at most {MOST:.0e} are enumerated)"
             )
+        row, moves = moves_out(graph, ways.states[:, -1])
         more = graph.amounts[moves, 0]
         cost = np.maximum(ways.cost[row], more) if graph.peaks[0] else ways.cost[row] + more
         states = np.column_stack([ways.states[row], graph.target[moves]])
