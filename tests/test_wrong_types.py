@@ -15,8 +15,6 @@ from seqopt.engines.frame import FrameEngine
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.errors import SeqoptError
 from seqopt.graph.layers.layers import candidate_layers
-from seqopt.judge.certificate import judge
-from seqopt.plan._guard import require_fit
 from seqopt.problem.criteria import RankSum, WeightedSum, WorstRatio
 from seqopt.scene.parts import Anywhere, Robot
 from tests.builders import six_bricks
@@ -56,9 +54,13 @@ def test_what_is_meant_is_taken(tmp_path):
     assert dry == seqopt.assess_steps(NETWORK, steps, seqopt.DRY)
     limit = seqopt.Limit("T_max", 1e6)
     assert seqopt.pose(ENGINE, LOOP, EQUATIONS, limits=limit).limits == (limit,)
-    selection = seqopt.formulations()["overlap_dp"].solve(PROBLEM)
-    assert judge(PROBLEM, selection, "overlap_dp").gap == 0.0
-    require_fit(PROBLEM, "beam", {"width": 3})
+    own = seqopt.formulations()["overlap_dp"]
+    for given in ("overlap_dp", own):
+        assert seqopt.solve(PROBLEM, given).certificate.gap == 0.0
+    assert (
+        seqopt.solve(PROBLEM, "beam", width=3).choice
+        == seqopt.solve(PROBLEM, "beam", width=np.int64(3)).choice
+    )
     assert parse_options("beam", ["width=3"]) == {"width": 3}
     path = tmp_path / "scene.json"
     seqopt.save_scene(SCENE, str(path))  # type: ignore[arg-type]

@@ -2,45 +2,47 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise, product
 
 import cvxpy as cp
-import formulations.layers.beam
-import formulations.layers.rank_search
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from seqopt.graph.layers.interface import CostProblem
 
+from formulations import beam, rank_search
 from formulations.solvers import anatomy, minimize, minimize_whole
 from seqopt.errors import InfeasibleError, ProblemError
-from seqopt.graph.formulation import End, FormulationKind, Reads, Watch
+from seqopt.graph.formulation import FormulationKind, Reads, Watch
 from seqopt.graph.formulation import formulations as registered
 from seqopt.graph.layers.costs import LayeredCosts
 from seqopt.problem.problem import Aim
+from tests.layered import Costs, answer
 from tests.strategies import problems
 
 ALL = registered()
 INF = np.inf
 
 
-class Ranked(CostProblem):
-    """A problem whose shared steps look otherwise once the choice before is made, as ranks do."""
-
-    def conditional(self, move, before):
-        row = np.nan_to_num(super().conditional(move, before), posinf=1.0)
-        return (7 * row + 3 * move) % 5
+def conditional(costs, move, before):
+    """What a search of one move is charged for pairs, as ranks among its own candidates are."""
+    row = np.nan_to_num(costs.shared[move][before], posinf=1.0)
+    return (7 * row + 3 * move) % 5
 
 
 def ranked(problem):
     """The problem as one of ranks, or None if no choice is allowed."""
-    own = Ranked(problem.sums)
+    costs = problem.sums
     try:
-        own.sums.continuable()
+        costs.continuable()
     except InfeasibleError:
         return None
-    return own
+    rows = [
+        np.array([conditional(costs, k, i) for i in range(len(shared))])
+        for k, shared in enumerate(costs.shared)
+    ]
+    return replace(problem, alone=LayeredCosts(costs.single, (costs.shared[0], *rows[1:])))
 
 
 def later(costs, k, i):
@@ -58,7 +60,7 @@ def charged(problem, k, before, i):
     shared = problem.sums.shared[k][before[-1] if before else 0, i]
     if not (np.isfinite(shared) and later(problem.sums, k, i)):
         return None
-    return problem.conditional(k, before[-1])[i] if before else shared
+    return problem.alone.shared[k][before[-1], i] if before else shared
 
 
 def first_of_least(worth):
@@ -73,7 +75,9 @@ def cascaded(problem, charge):
         for i in range(size):
             if worth[i] is not None and charge == "earlier":
                 last = k + 1 == len(costs.sizes)
-                worth[i] = 0.0 if last else min(costs.shared[k + 1][i])
+                ahead = [] if last else range(costs.sizes[k + 1])
+                allowed = [j for j in ahead if later(costs, k + 1, j)]
+                worth[i] = 0.0 if last else min(costs.shared[k + 1][i, j] for j in allowed)
             if worth[i] is not None:
                 worth[i] += costs.single[k][i]
         choice.append(first_of_least(worth))
@@ -128,18 +132,18 @@ def test_heuristics_do_what_they_display(problem, data):
         ("beam", {"width": number}, beamed(own, number)),
         ("rank_search", {"horizon": number}, searched(own, number)),
     ):
-        found = ALL[name].solve(own, **options)
+        found = answer(own, name, **options)
         assert (name, found.choice) == (name, choice)
         assert (found.objective, found.bound) == (own.sums.cost(choice), -INF)
 
 
 @pytest.mark.parametrize(("name", "option"), [("beam", "width"), ("rank_search", "horizon")])
 def test_numbers_start_at_one(name, option):
-    problem = CostProblem(LayeredCosts((np.zeros(2),), (np.zeros((1, 2)),)))
-    assert ALL[name].solve(problem, **{option: 1}).choice == (0,)
+    problem = Costs(LayeredCosts((np.zeros(2),), (np.zeros((1, 2)),)))
+    assert answer(problem, name, **{option: 1}).choice == (0,)
     for number in (0, -1):
         with pytest.raises(ProblemError, match=f"{name}: {option} is {number}; give a whole"):
-            ALL[name].solve(problem, **{option: number})
+            answer(problem, name, **{option: number})
 
 
 def test_what_each_promises():
@@ -171,8 +175,14 @@ def test_defaults_are_those_of_the_texts(problem):
             ("beam", {"width": 5}),
             ("rank_search", {"horizon": 2}),
         ):
-            assert ALL[name].solve(own).choice == ALL[name].solve(own, **options).choice
-            assert ALL[name].options == options
+            assert answer(own, name).choice == answer(own, name, **options).choice
+            assert options.items() <= ALL[name].options.items()
+
+
+def rough(costs, choice):
+    """The sum of what is worst in every move, its pair and its candidate."""
+    parts = costs.parts(choice)
+    return sum(map(max, zip(parts[::2], parts[1::2], strict=True)))
 
 
 @given(problem=problems())
@@ -182,14 +192,14 @@ def test_exact_ones_take_the_best_and_of_equal_ones_the_first(problem):
     if not np.isfinite([costs.cost(c) for c in choices]).any():
         for name in ("overlap_dp", "minimax"):
             with pytest.raises(InfeasibleError):
-                ALL[name].solve(problem)
+                answer(problem, name)
         return
     best = min(choices, key=lambda c: (costs.cost(c), c))
-    found = ALL["overlap_dp"].solve(problem)
+    found = answer(problem, "overlap_dp")
     assert (found.choice, found.objective, found.bound) == (best, *[costs.cost(best)] * 2)
-    flat = min(choices, key=lambda c: (costs.worst(c), costs.cost(c)))
-    found = ALL["minimax"].solve(problem)
-    assert costs.cost(found.choice) == costs.cost(flat)
+    flat = min(choices, key=lambda c: (costs.worst(c), rough(costs, c)))
+    found = answer(problem, "minimax")
+    assert rough(costs, found.choice) == rough(costs, flat)
     assert found.objective == found.bound == costs.worst(found.choice) == costs.worst(flat)
 
 
@@ -201,12 +211,12 @@ def test_exact_ones_on_costs_of_any_sign(seed):
     pairs = zip((1, *sizes[:-1]), sizes, strict=True)
     costs = LayeredCosts(single, tuple(rng.integers(-9, 9, size=p).astype(float) for p in pairs))
     choices = [*product(*(range(size) for size in costs.sizes))]
-    problem = CostProblem(costs)
+    problem = Costs(costs)
     total, worst = min(map(costs.cost, choices)), min(map(costs.worst, choices))
-    assert ALL["overlap_dp"].solve(problem).objective == total
-    assert ALL["minimax"].solve(problem).objective == worst
+    assert answer(problem, "overlap_dp").objective == total
+    assert answer(problem, "minimax").objective == worst
     for name in ("overlap_lp", "overlap_mip"):
-        found = ALL[name].solve(problem)
+        found = answer(problem, name)
         assert found.objective == total
         assert total - 1e-4 <= found.bound <= total
         assert found.prices == {}
@@ -215,13 +225,13 @@ def test_exact_ones_on_costs_of_any_sign(seed):
 
 def test_how_much_is_enumerated_at_once(monkeypatch):
     free = tuple(np.zeros(2) for _ in range(3))
-    problem = CostProblem(LayeredCosts(free, (np.zeros((1, 2)), np.eye(2), np.eye(2))))
-    monkeypatch.setattr(formulations.layers.rank_search, "MOST", 8)
-    assert ALL["rank_search"].solve(problem, horizon=9).choice == (0, 1, 0)
-    monkeypatch.setattr(formulations.layers.rank_search, "MOST", 7)
-    assert ALL["rank_search"].solve(problem, horizon=2).choice == (0, 1, 0)
+    problem = Costs(LayeredCosts(free, (np.zeros((1, 2)), np.eye(2), np.eye(2))))
+    monkeypatch.setattr(rank_search, "MOST", 8)
+    assert answer(problem, "rank_search", horizon=9).choice == (0, 1, 0)
+    monkeypatch.setattr(rank_search, "MOST", 7)
+    assert answer(problem, "rank_search", horizon=2).choice == (0, 1, 0)
     with pytest.raises(ProblemError, match=r"8 combinations of 3 moves; .*\(at most 7e\+00 are"):
-        ALL["rank_search"].solve(problem, horizon=9)
+        answer(problem, "rank_search", horizon=9)
 
 
 class Counting(Watch):
@@ -239,11 +249,12 @@ class Counting(Watch):
 
 def test_a_beam_says_whether_it_came_to_its_end():
     flat = [np.zeros((1, 2)), np.ones((2, 2)), np.ones((2, 2))]
-    problem = CostProblem(LayeredCosts(single=[np.array([0.0, 1.0])] * 3, shared=flat))
-    beam = formulations.layers.beam.solve
-    assert beam(problem).end is End.DONE
-    assert beam(problem, watch=Counting(4)).end is End.STOPPED  # the greedy search alone is done
-    assert beam(problem, watch=Counting(1)).end is not End.DONE
+    costs = Costs(LayeredCosts(single=[np.array([0.0, 1.0])] * 3, shared=flat))
+    graph = costs.compiled().instance.asked
+    assert not beam.choose(graph, Watch()).stopped
+    for looks in (0, 1, 2):  # the greedy search alone is done
+        assert beam.choose(graph, Counting(looks)) == ((1, 3, 5), (), True, (), 0.0)
+    assert not beam.choose(graph, Counting(3)).stopped
 
 
 def test_rank_search_without_proof_looks_at_the_next_move_alone():
