@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import FrozenInstanceError
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 import pytest
-from formulations.layers.exhibits import (
-    MINIMAX_LAYER,
-    _flow_of_peaks,
-    _largest_of_each,
-    _worst_pairs,
-    below,
-)
-from formulations.layers.overlap_flow import OVERLAP_MIP
-from formulations.layers.priced_paths import ACCURACY
-from seqopt.graph.layers.interface import CostProblem
 
-from seqopt.errors import InfeasibleError
-from seqopt.graph.formulation import End, Watch, exhibits
+from formulations.exhibits import _assigned, _below
+from formulations.overlap_flow import ACCURACY, OVERLAP_MIP, unit_flow
+from seqopt.errors import InfeasibleError, ProblemError
+from seqopt.graph.formulation import Watch, exhibits
+from seqopt.graph.graph import Graph
 from seqopt.graph.layers.costs import LayeredCosts
+from seqopt.problem.problem import Aim
+from tests.layered import Costs, answer
 
 PROGRAMS = {OVERLAP_MIP.name: OVERLAP_MIP, **exhibits()}
 
@@ -37,67 +31,62 @@ def costs_of(lowest, seed=0):
 @pytest.mark.parametrize("lowest", [-9.0, 1.0])
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_the_choice_and_its_bound_are_the_least(name, lowest):
-    costs, formulation = costs_of(lowest), PROGRAMS[name]
-    problem, aim = CostProblem(costs), formulation.aim
-    least = min(aim.value_of(costs, choice) for choice in product(*map(range, costs.sizes)))
-    found = formulation.solve(problem)
-    assert found.end is End.DONE
-    assert aim.value_of(costs, found.choice) == found.objective == pytest.approx(least, rel=1e-9)
-    assert least - 1e-4 * max(abs(least), 9.0) <= found.bound <= least
-    told = []
-    watch = Watch(progress=told.append)
-    formulation.solve(problem, watch=watch)
-    assert all(one.bound <= least for one in told)
+    costs, aim, told = Costs(costs_of(lowest)), PROGRAMS[name].aim, []
+    least = costs.best(aim)
+    found = answer(costs, name, progress=told.append)
+    assert not found.stopped
+    assert costs.worth(found.choice, aim) == pytest.approx(found.objective, rel=1e-12)
+    assert found.objective == pytest.approx(least, rel=1e-9)
+    assert least - 1e-4 * max(abs(least), 9.0) <= found.bound <= least + 1e-12 * abs(least)
+    assert all(one.bound <= least + 1e-12 * abs(least) for one in told)
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_without_time_it_is_an_allowed_choice_and_what_is_known_of_the_least(name):
-    costs, formulation = costs_of(-9.0), PROGRAMS[name]
-    aim = formulation.aim
-    least = min(aim.value_of(costs, choice) for choice in product(*map(range, costs.sizes)))
-    found = formulation.solve(CostProblem(costs), watch=Watch(time_limit=0.0))
-    assert found.end is End.STOPPED
-    assert found.bound <= least <= found.objective == aim.value_of(costs, found.choice)
+    costs, aim = Costs(costs_of(-9.0)), PROGRAMS[name].aim
+    found = answer(costs, name, time_limit=0.0)
+    assert found.stopped == "time"
+    assert found.bound <= costs.best(aim) + 1e-9
+    assert costs.best(aim) <= found.objective + 1e-9
+    assert costs.worth(found.choice, aim) == pytest.approx(found.objective, rel=1e-12)
 
 
-def test_a_program_is_itself_and_one_without_a_choice_is_infeasible():
-    problem = CostProblem(costs_of(1.0))
-    written = OVERLAP_MIP.solve.write(problem)
-    with pytest.raises(FrozenInstanceError):
-        written.feasible = False
-    assert written != OVERLAP_MIP.solve.write(problem)  # each has variables of its own
-    assert hash(written) == hash(written)
-    assert MINIMAX_LAYER.solve.write(problem).feasible
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_one_without_a_choice_is_infeasible(name):
     costs = costs_of(1.0)
     never = tuple(np.full(part.shape, np.inf) for part in costs.shared[1:])
-    impossible = CostProblem(LayeredCosts(costs.single, (costs.shared[0], *never)))
-    with pytest.raises(InfeasibleError):
-        OVERLAP_MIP.solve.write(impossible)
+    with pytest.raises(InfeasibleError, match="move 2: none of its 4"):
+        answer(Costs(LayeredCosts(costs.single, (costs.shared[0], *never))), name)
 
 
 def test_what_is_read_from_assignments():
-    picks = np.array([0.1, 0.9, 0.0, 0.2, 0.8, 1.0])
-    assert _largest_of_each((2, 3, 1))(picks) == (1, 2, 0)
-    assert _largest_of_each((6,))(picks) == (5,)
+    graph = Costs(costs_of(1.0)).compiled().instance.asked  # 3, 4 and 2 candidates
+    picks = np.array([1.0, 0.1, 0.9, 0.0, 0.2, 0.8, 0.1, 0.3, 0.4, 0.4])
+    assert _assigned(graph, apart=False).path(picks) == (2, 5, 8)
 
 
-@pytest.mark.parametrize(("scale", "least"), [(4.0, 0.0), (0.5, -3.0)])
+def test_an_assignment_needs_a_state_of_every_level():
+    source, target = np.array([0, 0, 1]), np.array([1, 2, 2])
+    ends = np.array([False, False, True])
+    graph = Graph(source, target, np.ones((3, 1)), (False,), ends)
+    for name in ("assignment_tight", "assignment_loose", "minimax_layer", "minimax_big_m"):
+        with pytest.raises(ProblemError, match="an assignment chooses a state of every level"):
+            PROGRAMS[name].solve.choose(graph, Watch())
+
+
+@pytest.mark.parametrize("scale", [4.0, 0.5])
 @pytest.mark.parametrize("value", [-7.0, 0.25, 3.0])
-def test_a_bound_is_lower_by_what_a_solver_may_be_off(scale, least, value):
+def test_a_bound_is_lower_by_what_a_solver_may_be_off(scale, value):
     off = ACCURACY * max(abs(value), 1.0)
-    assert below(scale, least)(value) == pytest.approx(least + scale * (value - off), rel=1e-15)
-    assert below(scale)(value) == pytest.approx(scale * (value - off), rel=1e-15)
+    assert _below(scale)(value) == pytest.approx(scale * (value - off), rel=1e-15)
 
 
-@pytest.mark.parametrize("lowest", [-9.0, 1.0])
-def test_pairs_cost_the_worst_of_both(lowest):
-    costs = costs_of(lowest)
-    worst, least = _worst_pairs(costs)
-    for part, shared, single in zip(worst, costs.shared, costs.single, strict=True):
-        assert (part == np.maximum(shared, single[None, :])).all()
-    assert least == min(0.0, *(part.min() for part in worst))
-    flow, bound = _flow_of_peaks(CostProblem(costs))
-    assert flow.cost.min() >= 0.0
-    sizes = [np.concatenate([part.ravel() for part in worst])]
-    assert flow.cost == pytest.approx((sizes[0] - least) / (sizes[0] - least).max(), rel=1e-12)
-    assert bound(0.5) == pytest.approx(least + flow.bound(0.5), rel=1e-15)
+def test_pairs_cost_the_worst_of_both():
+    costs = costs_of(1.0)
+    graph = Costs(costs).compiled(Aim.PEAK).instance.asked
+    pairs = zip(costs.shared, costs.single, strict=True)
+    worst = np.concatenate([np.maximum(shared, single).ravel() for shared, single in pairs])
+    assert graph.amounts[:, 0] == pytest.approx(worst)
+    flow = unit_flow(graph)
+    assert flow.cost == pytest.approx(worst / worst.max(), rel=1e-12)
+    assert flow.bound(0.5) == pytest.approx((0.5 - ACCURACY) * worst.max(), rel=1e-12)
