@@ -215,7 +215,7 @@ def _instance(document: dict[str, Any], arrays: dict[str, np.ndarray]) -> Instan
         ]
         graph = Graph(*rows, amounts, (False,) * len(names), ends)
         timed = TimedGraph(_by_goal(graph, (goals, caps)), states[:, 0], *whole)
-    asked = (names, amounts, goals, caps)
+    asked: Any = (names, amounts, goals, caps)
     facts = document["facts"]
     return Instance(document["name"], *rows, ends, *asked, states=states, timed=timed, facts=facts)
 
