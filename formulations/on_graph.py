@@ -22,7 +22,7 @@ from seqopt.graph.formulation import Formulation, FormulationKind, On, Reads, Wa
 from seqopt.graph.graph import Graph
 from seqopt.graph.instance import TAIL, Instance, _Target, _target_sums
 from seqopt.graph.orders import AllOrders, OrderSelection
-from seqopt.graph.paths import path_values
+from seqopt.graph.paths import path_values, tied
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
 from seqopt.problem.problem import WORST_TOTAL, Aim, RobustAim, cvar
@@ -52,7 +52,7 @@ def path_of_instance(instance: Instance, choose: Choose, watch: Watch) -> StateP
     return StatePath(
         states,
         values,
-        tuple(map(min, values, bounds)),
+        tuple(v if v < b <= tied(v) else b for v, b in zip(values, bounds, strict=True)),
         (),
         *told,
         trace=watch.trace,

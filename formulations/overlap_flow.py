@@ -39,7 +39,7 @@ from formulations.choice import Choice, Choose
 from formulations.on_graph import on_graph
 from formulations.solvers import minimize, minimize_whole
 from seqopt.arrays import Floats
-from seqopt.errors import ProblemError
+from seqopt.errors import NothingFoundError, ProblemError
 from seqopt.graph.formulation import FormulationKind, On, Watch
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import fewest_moves
@@ -119,7 +119,8 @@ def _written(flow: Flow, arcs: cp.Variable) -> tuple[cp.Problem, list[cp.Constra
 def _relaxed(graph: Graph, watch: Watch) -> Choice:
     """Return the path that the largest flow follows, with a bound and the duals of the budgets.
 
-    A `SolverError` says that the solver ended without an optimum.
+    A `SolverError` says that the solver ended without an optimum, a `NothingFoundError` that no
+    path within the budgets is at hand.
     """
     require_sum(graph, "overlap_lp")
     flow = unit_flow(graph)
@@ -130,13 +131,14 @@ def _relaxed(graph: Graph, watch: Watch) -> Choice:
         return Choice(at_hand(graph), stopped=True)
     duals = [float(cap.dual_value) for cap in caps]
     prices = tuple(flow.scale / u * d for u, d in zip(flow.units, duals, strict=True))
-    path = flow.path(np.asarray(arcs.value))
-    return Choice(
-        at_hand(graph, path) or path,
-        (flow.bound(optimum.value),),
-        prices=(prices,),
-        compile_seconds=optimum.compile_seconds,
-    )
+    path, bound = at_hand(graph, flow.path(np.asarray(arcs.value))), flow.bound(optimum.value)
+    watch.tell(bound=bound)
+    if not path:
+        raise NothingFoundError(
+            "the flow mixes paths, none of which is within all caps; use a formulation that keeps "
+            "budgets exactly"
+        )
+    return Choice(path, (bound,), prices=(prices,), compile_seconds=optimum.compile_seconds)
 
 
 def require_sum(graph: Graph, name: str) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from seqopt._interrupts import answered
 from seqopt.arrays import Floats
-from seqopt.errors import InfeasibleError, SolverError, TimeUpError
+from seqopt.errors import InfeasibleError, NothingFoundError, SolverError, TimeUpError
 from seqopt.graph.formulation import Finding, Formulation, FormulationKind, Run, Watch, timed
 from seqopt.graph.instance import PEAK, SUM, TAIL, TIME, Instance
 from seqopt.graph.solution import StatePath
@@ -83,10 +83,10 @@ def _selected(
         from seqopt.plan._infeasible import refusal  # noqa: PLC0415  # seldom needed
 
         raise refusal(instance, name, exact=formulation.looks_at_all) from None
-    except TimeUpError as error:
+    except (NothingFoundError, TimeUpError) as error:
         low = watch.bound + offset
         said = f"{error} (no path is below {low:.6g})" if math.isfinite(low) else str(error)
-        raise (KeyboardInterrupt if watch.interrupted else TimeUpError)(said) from error
+        raise (KeyboardInterrupt if watch.interrupted else type(error))(said) from error
     except SolverError as error:
         if watch.interrupted:
             raise KeyboardInterrupt(str(error)) from error
