@@ -23,16 +23,17 @@ class Costs:
     sums: LayeredCosts
     budgets: tuple[Budget, ...] = ()
     alone: LayeredCosts | None = None  # as a search of one move sees them; by default the same
+    largest: LayeredCosts | None = None  # those whose largest counts; by default the same
 
     @property
     def peaks(self):
-        return self.sums
+        return self.largest or self.sums
 
     def compiled(self, aim=Aim.SUM):
-        return compile_costs("drawn", self.sums, aim, self.budgets, self.alone or self.sums)
+        return compile_costs("drawn", aim.costs(self), aim, self.budgets, self.alone or self.sums)
 
     def worth(self, choice, aim=Aim.SUM):
-        return self.sums.cost(choice) if aim is Aim.SUM else self.sums.worst(choice)
+        return aim.value_of(aim.costs(self), choice)
 
     def within(self, aim=Aim.SUM):
         """What every choice within limits and budgets is worth."""
@@ -46,6 +47,11 @@ class Costs:
     def best(self, aim=Aim.SUM):
         """The least value within budgets, infinite if there is none."""
         return min(self.within(aim).values(), default=np.inf)
+
+
+def of_layers(layers):
+    """The costs of candidates that were computed for a build."""
+    return Costs(layers.sums, layers.budgets, layers.alone, layers.peaks)
 
 
 @dataclass(frozen=True)

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import cvxpy as cp
 import numpy as np
 import pytest
-from formulations.layers.priced_paths import LayeredFlow
-from seqopt.graph.layers.interface import CostProblem
 
 from formulations import solvers
-from seqopt.errors import InfeasibleError, ProblemError, SolverError
+from formulations.overlap_flow import Flow
+from seqopt.errors import InfeasibleError, NothingFoundError, ProblemError, SolverError
 from seqopt.graph.formulation import Formulation, FormulationKind, On, formulations
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.solution import Selection
-from seqopt.judge.certificate import certify
-from seqopt.plan.solving import solve
+from seqopt.graph.solution import StatePath
 from seqopt.problem.problem import Aim
+from tests.layered import Costs, answer, changed, told
 from tests.quality.degenerate import MALFORMED, judge, outcomes
 from tests.quality.degenerate_cases import CASES, Size, capped, costs, opposed, whole
 
@@ -29,7 +28,7 @@ TAKERS = [
 FLOWS = ("overlap_lp", "overlap_mip")
 EXACT = ("labels", "lagrangian", "minimax", "overlap_dp", *FLOWS)
 BOUNDS = ("lagrangian", "overlap_lp")  # where a budget binds
-MIXTURES = {"overlap_mip": "infeasible", "labels": "infeasible", "lagrangian": "solver failed"}
+MIXTURES = {"overlap_mip": "infeasible", "labels": "infeasible", "lagrangian": "infeasible"}
 flows = pytest.mark.parametrize("name", FLOWS)
 takers = pytest.mark.parametrize("name", TAKERS)
 NONE_ALLOWED = {
@@ -58,7 +57,7 @@ def test_no_answer_is_wrong(case):
         elif case in NONE_ALLOWED:
             assert status == "infeasible", row
         elif case == "budgets met by mixtures only":
-            assert status == MIXTURES.get(name, "rejected"), row
+            assert status == MIXTURES.get(name, "solver failed"), row
         elif case not in LOOSE and name in EXACT:
             binds = case.startswith("budget") and name in BOUNDS
             assert status in ({"optimal", "feasible", "rejected"} if binds else {"optimal"}), row
@@ -68,55 +67,66 @@ def test_budgets_only_mixtures_meet():
     """The relaxation has a solution, a choice has none: a bound is no proof of feasibility."""
     problem = opposed(SMALL, np.random.default_rng(0), 1.0)
     with pytest.raises(InfeasibleError, match="budgets"):
-        ALL["overlap_mip"].solve(problem)
-    selection = ALL["overlap_lp"].solve(problem)
-    assert np.isfinite(selection.bound)
-    with pytest.raises(SolverError, match="use a formulation that keeps budgets exactly"):
-        certify(problem, selection, Aim.SUM)
+        answer(problem, "overlap_mip")
+    said = r"keeps budgets exactly \(no path is below [0-9.]+\)"
+    with pytest.raises(NothingFoundError, match=said):
+        answer(problem, "overlap_lp")
 
 
 @pytest.mark.parametrize("name", ["overlap_dp", "rank_search", "cascade", "beam", "minimax"])
 def test_equal_costs_go_to_the_first(name):
     problem = costs(SMALL.sizes, lambda shape: np.full(shape, 5.0))
-    assert ALL[name].solve(problem).choice == (0, 0, 0)
+    assert answer(problem, name).choice == (0, 0, 0)
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1e-3, 1e3, 1e9])
 @pytest.mark.parametrize("name", ALL)
 def test_units_change_no_value(name, scale):
-    value, same = (solve(small(seed=1, scale=s), ALL[name]).certificate for s in (1.0, scale))
+    value, same = (answer(small(seed=1, scale=s), name).certificate for s in (1.0, scale))
     assert same.objective == pytest.approx(scale * value.objective, rel=1e-9)
     assert same.gap == pytest.approx(value.gap, abs=1e-9)
 
 
-def answers(reply) -> Formulation:
-    """An exact formulation that gives a fixed reply, or raises it."""
+def answers(reply, **promised) -> Formulation:
+    """A formulation that gives a fixed reply to an instance, or raises it."""
 
-    def solve(problem):
+    def solve(instance):
         if isinstance(reply, Exception):
             raise reply
-        return reply(problem)
+        return reply(instance)
 
-    return Formulation("fake", "", FormulationKind.EXACT, Aim.SUM, solve)
+    promised = {"kind": FormulationKind.EXACT, "aim": Aim.SUM} | promised
+    return Formulation("fake", "", solve=solve, **promised)
 
 
-def worst(problem):
-    choice = tuple(int(np.argmax(single)) for single in problem.sums.single)
-    return Selection(choice, problem.sums.cost(choice))
+def best(instance):
+    return ALL["overlap_dp"].solve(instance)
+
+
+def another(instance):
+    """A path of no small sum, with its own."""
+    largest = replace(instance, amounts=instance.amounts.max() - instance.amounts)
+    states = best(largest).states
+    nodes = [0, *(node for (node,) in states)]
+    codes = [a * instance.nodes + b for a, b in pairwise(nodes)]
+    every = (instance.source.astype(int) * instance.nodes + instance.target).tolist()
+    value = sum(instance.amounts[every.index(code), 0] for code in codes)
+    return StatePath(states, (float(value),), (-np.inf,))
 
 
 @pytest.mark.parametrize(
     ("reply", "status"),
     [
-        (worst, "rejected"),
-        (lambda p: Selection((0, 0, 0), 0.0), "rejected"),
-        (lambda p: Selection((0, 0, 0), np.nan), "rejected"),
-        (lambda p: replace(ALL["overlap_dp"].solve(p), bound=np.nan), "rejected"),
+        (another, "rejected"),
+        (lambda i: replace(best(i), objective=(0.0,), bound=(0.0,)), "rejected"),
+        (lambda i: replace(best(i), objective=(np.nan,)), "solver failed"),
+        (lambda i: replace(best(i), bound=(np.nan,)), "solver failed"),
+        (lambda i: None, "solver failed"),
         (SolverError("stalled"), "solver failed"),
-        (InfeasibleError("none"), "wrong"),
+        (InfeasibleError("none"), "solver failed"),
         (ProblemError("odd"), "wrong"),
-        (ZeroDivisionError("traceback"), "wrong"),
-        (ALL["overlap_dp"].solve, "optimal"),
+        (ZeroDivisionError("traceback"), "solver failed"),
+        (best, "optimal"),
     ],
 )
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
@@ -128,46 +138,49 @@ def test_the_judge_tells_them_apart(reply, status, scale):
 def test_the_judge_sees_a_false_bound_and_an_answer_where_there_is_none():
     """With budgets the certificate cannot check a bound below the answer's own value."""
     problem = capped(SMALL, np.random.default_rng(0), 1.0, 0.6)
-    assert (
-        judge(problem, replace(answers(ALL["overlap_mip"].solve), takes_budgets=True))["status"]
-        == "optimal"
-    )
+    taker = {"takes_budgets": True}
+    exact = answers(ALL["overlap_mip"].solve, **taker)
+    assert judge(problem, exact)["status"] == "optimal"
     dearest = tuple(int(np.argmin(takes)) for takes in problem.budgets[0].single)
     value = problem.sums.cost(dearest)
-    bad = replace(answers(lambda p: Selection(dearest, value, bound=value)), takes_budgets=True)
-    assert judge(problem, bad)["status"] == "wrong"
+    assert judge(problem, told(problem, dearest, value, value))["status"] == "wrong"
     impossible = CASES["no pair allowed"](SMALL, np.random.default_rng(0))
-    assert judge(impossible, answers(ALL["overlap_dp"].solve))["status"] == "infeasible"
-    assert judge(impossible, answers(worst))["status"] == "rejected"
-    assert judge(impossible, answers(SolverError("stalled")))["status"] == "solver failed"
+    for reply in (best, another, SolverError("stalled")):
+        assert judge(impossible, answers(reply))["status"] == "infeasible"  # before any is asked
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 @pytest.mark.parametrize("factor", [0.9, 1.1])
 def test_claims_are_measured_in_the_units_of_the_costs(scale, factor):
     problem = small(scale=scale)
-    good = ALL["overlap_dp"].solve(problem)
-    assert certify(problem, good, Aim.SUM).gap == 0
+    assert answer(problem, changed("overlap_dp", lambda s: s)).certificate.gap == 0
+    value = problem.best()
+    off = told(problem, answer(problem).choice, factor * value)
     with pytest.raises(SolverError, match="as claimed"):
-        certify(problem, replace(good, objective=factor * good.objective), Aim.SUM)
+        answer(problem, off)
+    poor = max(problem.within().items(), key=lambda pair: pair[1])
+    assert poor[1] > 1.1 * value
+    claimed = told(problem, *poor, factor * value)
     if factor > 1:
         with pytest.raises(SolverError, match="claimed bound"):
-            certify(problem, replace(good, bound=factor * good.bound), Aim.SUM)
+            answer(problem, claimed)
+    else:
+        assert answer(problem, claimed).certificate.bound == pytest.approx(value)
 
 
 @pytest.mark.parametrize("amount", [1e-9, 1.0, 1e9])
 def test_budgets_are_measured_in_their_own_units(amount):
     problem = capped(SMALL, np.random.default_rng(0), amount, 0.6)
-    free = ALL["overlap_dp"].solve(replace(problem, budgets=()))
+    free = answer(replace(problem, budgets=()))
     with pytest.raises(SolverError, match="more than"):
-        certify(problem, free, Aim.SUM)
-    certificate = solve(problem, ALL["overlap_mip"]).certificate
+        answer(problem, told(problem, free.choice, free.objective))
+    certificate = answer(problem, "overlap_mip").certificate
     assert certificate.spent["use"] <= problem.budgets[0].bound * (1 + 1e-9)
     plain = capped(SMALL, np.random.default_rng(0), 1.0, 0.6)
     assert certificate.objective == pytest.approx(
-        solve(plain, ALL["overlap_mip"]).certificate.objective
+        answer(plain, "overlap_mip").certificate.objective
     )
-    prices = [ALL["overlap_lp"].solve(p).prices["use"] for p in (problem, plain)]
+    prices = [answer(p, "overlap_lp", proof=False).prices["use"] for p in (problem, plain)]
     assert amount * prices[0] == pytest.approx(prices[1], abs=1e-4)
 
 
@@ -191,27 +204,27 @@ def test_malformed_budgets_are_refused(change, named):
 def test_budgets_of_another_problem_are_refused(name):
     other = capped(Size(2, 3, 6), np.random.default_rng(0), 1.0, 1.0).budgets
     with pytest.raises(ProblemError, match="other moves or candidates"):
-        ALL[name].solve(replace(small(), budgets=other))
+        answer(replace(small(), budgets=other), name)
 
 
 @takers
 def test_a_bound_of_infinity_is_no_cap(name):
-    free = ALL[name].solve(small())
+    free = answer(small(), name)
     budget = replace(capped(SMALL, np.random.default_rng(0), 1.0, 1.0).budgets[0], bound=np.inf)
-    capless = solve(replace(small(), budgets=(budget,)), ALL[name]).certificate
+    capless = answer(replace(small(), budgets=(budget,)), name).certificate
     assert capless.objective == pytest.approx(free.objective)
 
 
 def test_sums_that_overflow_are_refused():
     with pytest.raises(ProblemError, match="sum overflows; rescale"):
-        CostProblem(LayeredCosts((np.full(2, 1e308),), (np.full((1, 2), 1e308),)))
+        Costs(LayeredCosts((np.full(2, 1e308),), (np.full((1, 2), 1e308),)))
 
 
 @flows
 @pytest.mark.parametrize(
     ("status", "named"),
     [
-        (cp.INFEASIBLE, "infeasible that is not"),
+        (cp.INFEASIBLE, "infeasible that is not|within all budgets, and some are"),
         (cp.OPTIMAL_INACCURATE, "ended with status"),
         (cp.INFEASIBLE_INACCURATE, "ended with status"),
         (cp.USER_LIMIT, "ended with status"),
@@ -234,7 +247,7 @@ def test_a_solver_that_fails_never_calls_the_problem_infeasible(monkeypatch, nam
     monkeypatch.setattr(solvers, "_end", end)
     for problem in (small(), capped(SMALL, np.random.default_rng(0), 1.0, 0.6)):
         with pytest.raises(SolverError, match=named):
-            ALL[name].solve(problem)
+            answer(problem, name)
 
 
 @takers
@@ -242,23 +255,23 @@ def test_a_solver_that_fails_never_calls_the_problem_infeasible(monkeypatch, nam
 def test_a_budget_that_cannot_be_met_is_named(name, amount):
     problem = capped(SMALL, np.random.default_rng(0), amount, -1.0)
     with pytest.raises(InfeasibleError, match="every choice uses at least 0 of 'use', more than -"):
-        ALL[name].solve(problem)
+        answer(problem, name)
 
 
 @takers
-def test_two_budgets_leave_the_proof_to_the_solver(name):
-    """Each can be met on its own; that both cannot is the solver's word."""
-    with pytest.raises(InfeasibleError, match="no choice is within all budgets; raise a bound"):
-        ALL[name].solve(opposed(SMALL, np.random.default_rng(0), 0.9))
+def test_two_budgets_that_conflict_are_named(name):
+    """Each can be met on its own."""
+    with pytest.raises(InfeasibleError, match=r"'odd' and .* 'even' cannot be kept together"):
+        answer(opposed(SMALL, np.random.default_rng(0), 0.9), name)
 
 
-CHOICE, BOUND = LayeredFlow.choice, LayeredFlow.bound
+PATH, BOUND = Flow.path, Flow.bound
 FLAWS = {
-    "zeros": ("choice", lambda self, flow: CHOICE(self, np.zeros_like(flow))),
-    "NaN": ("choice", lambda self, flow: CHOICE(self, np.full_like(flow, np.nan))),
+    "zeros": ("path", lambda self, flow: PATH(self, np.zeros_like(flow))),
+    "NaN": ("path", lambda self, flow: PATH(self, np.full_like(flow, np.nan))),
     "bound too high": ("bound", lambda self, optimum: 1.1 * BOUND(self, optimum)),
     "NaN bound": ("bound", lambda self, optimum: np.nan),
-    "another path": ("choice", lambda self, flow: CHOICE(self, 1 - flow)),
+    "another path": ("path", lambda self, flow: PATH(self, 1 - flow)),
 }
 
 
@@ -267,7 +280,7 @@ FLAWS = {
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 def test_a_flow_that_is_wrong_is_caught(monkeypatch, name, flaw, scale):
     problem = small(seed=1, scale=scale)
-    assert ALL["overlap_dp"].solve(problem).choice != (0, 0, 0)
-    monkeypatch.setattr(LayeredFlow, *FLAWS[flaw])
-    with pytest.raises(SolverError, match=r"promises the optimum|claimed bound"):
-        solve(problem, ALL[name])
+    assert answer(problem).choice != (0, 0, 0)
+    monkeypatch.setattr(Flow, *FLAWS[flaw])
+    with pytest.raises(SolverError, match=r"promises the least|claimed bound|nonsense"):
+        answer(problem, name)

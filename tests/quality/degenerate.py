@@ -31,12 +31,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
-from seqopt.graph.layers.interface import PlacementProblem
 
 from seqopt.errors import InfeasibleError, ProblemError, SolverError
 from seqopt.graph.formulation import Formulation, FormulationKind, On, formulations
-from seqopt.judge.certificate import judge as certified
-from seqopt.plan._guard import require_fit
+from tests.layered import Costs
+from tests.layered import answer as certified
 from tests.quality.degenerate_cases import CASES, Case, Size, enumerated
 
 FULL, SMALL = Size(5, 4, 7), Size(3, 3, 6)
@@ -46,26 +45,25 @@ UNANSWERED = ("infeasible", "refused", "solver failed", "rejected")
 MALFORMED = {"one cost NaN", "one cost -inf", "costs 1e308", "budget amount NaN"}
 
 
-def answer(problem: PlacementProblem, formulation: Formulation) -> dict[str, object]:
+def answer(problem: Costs, formulation: Formulation) -> dict[str, object]:
     """Return what a formulation makes of a problem; see the module's text."""
     row: dict[str, object] = {"value": np.nan, "bound": np.nan, "choice": (), "message": ""}
     try:
-        require_fit(problem, formulation, {})
-        selection = formulation.solve(problem)
+        claimed = certified(problem, formulation, proof=False)
     except (InfeasibleError, ProblemError, SolverError) as error:
         names: dict[type, str] = {InfeasibleError: "infeasible", ProblemError: "refused"}
         return row | {"status": names.get(type(error), "solver failed"), "message": str(error)}
     except Exception as error:  # a traceback is what this looks for
         return row | {"status": "wrong", "message": repr(error)}
-    row |= {"bound": selection.bound, "choice": selection.choice}
+    row |= {"bound": claimed.bound, "choice": claimed.choice}
     try:
-        certificate = certified(problem, selection, formulation)
+        certificate = certified(problem, formulation).certificate
     except SolverError as error:
         return row | {"status": "rejected", "message": str(error)}
     return row | {"status": "answered", "value": certificate.objective}
 
 
-def judge(problem: PlacementProblem, formulation: Formulation) -> dict[str, object]:
+def judge(problem: Costs, formulation: Formulation) -> dict[str, object]:
     """Return the answer with its status held against enumeration."""
     best, winners = enumerated(problem, formulation.aim)
     row = answer(problem, formulation) | {"exact": best, "optima": len(winners), "chosen": ""}

@@ -9,20 +9,20 @@ from itertools import pairwise, product
 
 import numpy as np
 from numpy.typing import ArrayLike
-from seqopt.graph.layers.interface import CostProblem, PlacementProblem
 
 from experiments.harness.scenes import half_circle
 from seqopt.arrays import Floats
 from seqopt.engines.interface import Engine, Fields, Want
 from seqopt.engines.rigid.compliance import ComplianceEngine
 from seqopt.graph.layers.costs import Budget, LayeredCosts
-from seqopt.graph.layers.layers import Layers, candidate_layers
+from seqopt.graph.layers.layers import candidate_layers
 from seqopt.network.network import Network
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.sequence.three_robots import three_robot_loop
 from seqopt.study.published import EQUATIONS, RESOLUTION
+from tests.layered import Costs, of_layers
 
 COARSE = replace(
     EQUATIONS, name="coarse", resolution=tuple((name, 100 * size) for name, size in RESOLUTION)
@@ -45,10 +45,10 @@ class Size:
 
 
 Rng = np.random.Generator
-Case = Callable[[Size, Rng], PlacementProblem]
+Case = Callable[[Size, Rng], Costs]
 
 
-def enumerated(problem: PlacementProblem, aim: Aim) -> tuple[float, list[tuple[int, ...]]]:
+def enumerated(problem: Costs, aim: Aim) -> tuple[float, list[tuple[int, ...]]]:
     """Return the best value over all combinations within limits and budgets, and who reaches it."""
     worth = problem.sums.cost if aim is Aim.SUM else problem.peaks.worst
     values: dict[tuple[int, ...], float] = {
@@ -64,18 +64,18 @@ def enumerated(problem: PlacementProblem, aim: Aim) -> tuple[float, list[tuple[i
     return best, [c for c, value in values.items() if value - best <= 1e-12 * size]
 
 
-def costs(sizes: tuple[int, ...], draw: Callable[[tuple[int, ...]], Floats]) -> CostProblem:
+def costs(sizes: tuple[int, ...], draw: Callable[[tuple[int, ...]], Floats]) -> Costs:
     """Return a problem with costs drawn by shape; nothing is shared before the first move."""
     shared = (np.zeros((1, sizes[0])), *(draw(pair) for pair in pairwise(sizes)))
-    return CostProblem(LayeredCosts(tuple(draw((size,)) for size in sizes), shared))
+    return Costs(LayeredCosts(tuple(draw((size,)) for size in sizes), shared))
 
 
-def whole(sizes: tuple[int, ...], rng: Rng, scale: float = 1.0, least: int = 0) -> CostProblem:
+def whole(sizes: tuple[int, ...], rng: Rng, scale: float = 1.0, least: int = 0) -> Costs:
     """Return a problem with random whole costs, times a scale."""
     return costs(sizes, lambda shape: scale * rng.integers(least, 10, shape).astype(float))
 
 
-def mixed(size: Size, rng: Rng) -> CostProblem:
+def mixed(size: Size, rng: Rng) -> Costs:
     """Return a problem with costs from 1e-9 to 1e9; the best choice has only small ones."""
 
     def draw(shape: tuple[int, ...]) -> Floats:
@@ -84,13 +84,13 @@ def mixed(size: Size, rng: Rng) -> CostProblem:
     return costs(size.sizes, draw)
 
 
-def rounded(size: Size, rng: Rng) -> CostProblem:
+def rounded(size: Size, rng: Rng) -> Costs:
     """Return costs that are equal but for the rounding of their sums, the larger ones first."""
     same = rng.permutation([0.1 + 0.2, *[0.3] * (size.candidates - 1)])
     return costs(size.sizes, lambda shape: np.broadcast_to(same, shape))
 
 
-def one_left(size: Size, rng: Rng) -> CostProblem:
+def one_left(size: Size, rng: Rng) -> Costs:
     """Return a problem in which one candidate per move is allowed."""
     problem = whole(size.sizes, rng)
     kept = rng.integers(size.candidates, size=size.moves)
@@ -98,26 +98,26 @@ def one_left(size: Size, rng: Rng) -> CostProblem:
         np.where(np.arange(size.candidates) == k, cost, np.inf)
         for k, cost in zip(kept, problem.sums.single, strict=True)
     )
-    return CostProblem(LayeredCosts(single, problem.sums.shared))
+    return Costs(LayeredCosts(single, problem.sums.shared))
 
 
-def dead_end(size: Size, rng: Rng) -> CostProblem:
+def dead_end(size: Size, rng: Rng) -> Costs:
     """Return a problem whose candidates are all allowed, but no pair of the last two moves is."""
     sums = whole(size.sizes, rng).sums
-    return CostProblem(
+    return Costs(
         LayeredCosts(sums.single, (*sums.shared[:-1], np.full_like(sums.shared[-1], np.inf)))
     )
 
 
-def altered(size: Size, rng: Rng, value: float) -> CostProblem:
+def altered(size: Size, rng: Rng, value: float) -> Costs:
     """Return a problem with one cost replaced."""
     sums = whole(size.sizes, rng).sums
     first = sums.single[0].copy()
     first[0] = value
-    return CostProblem(LayeredCosts((first, *sums.single[1:]), sums.shared))
+    return Costs(LayeredCosts((first, *sums.single[1:]), sums.shared))
 
 
-def capped(size: Size, rng: Rng, amount: float, share: float) -> CostProblem:
+def capped(size: Size, rng: Rng, amount: float, share: float) -> Costs:
     """Return a problem with a budget of which candidate ``j`` takes ``j`` times an amount.
 
     The bound is a share of what the best choice without it takes; the dearest candidates take least
@@ -132,7 +132,7 @@ def capped(size: Size, rng: Rng, amount: float, share: float) -> CostProblem:
     return replace(problem, budgets=(replace(budget, bound=share * spent),))
 
 
-def opposed(size: Size, rng: Rng, total: float) -> CostProblem:
+def opposed(size: Size, rng: Rng, total: float) -> Costs:
     """Return a problem with two budgets that every candidate takes one or the other of.
 
     Their bounds add up to the number of moves times ``total``.
@@ -146,16 +146,16 @@ def opposed(size: Size, rng: Rng, total: float) -> CostProblem:
     return replace(problem, budgets=budgets)
 
 
-def arch(size: Size, criterion: Criterion, limits: tuple[Limit, ...] = ()) -> Layers:
+def arch(size: Size, criterion: Criterion, limits: tuple[Limit, ...] = ()) -> Costs:
     """Return the problem of the three-robot loop on a small arch."""
     engine = ComplianceEngine(half_circle(size.bricks))
-    return candidate_layers(engine, three_robot_loop(engine.network), criterion, limits)
+    return of_layers(candidate_layers(engine, three_robot_loop(engine.network), criterion, limits))
 
 
-def flat(size: Size, _: Rng) -> Layers:
+def flat(size: Size, _: Rng) -> Costs:
     """Return a problem in which all possible choices respond equally."""
     engine = Even(ComplianceEngine(half_circle(size.bricks)))
-    return candidate_layers(engine, three_robot_loop(engine.network), EQUATIONS)
+    return of_layers(candidate_layers(engine, three_robot_loop(engine.network), EQUATIONS))
 
 
 class Even:
@@ -178,7 +178,7 @@ class Even:
         return Fields(**sevens)
 
 
-def tight(size: Size, _: Rng) -> Layers:
+def tight(size: Size, _: Rng) -> Costs:
     """Return a problem whose limit is the least force with which it can be built."""
     least, __ = enumerated(arch(size, FORCE), Aim.PEAK)
     return arch(size, FORCE, (Limit("F_largest", least),))
