@@ -156,8 +156,15 @@ def moves_along(graph: Graph, path: Sequence[int]) -> Ints:
 
 
 def path_values(graph: Graph, path: Sequence[int]) -> tuple[float, ...]:
-    """Return what every column takes of a path: its sum, or its largest amount."""
-    taken = graph.amounts[moves_along(graph, path)]
+    """Return what every column takes of a path: its sum, or its largest amount.
+
+    Of moves side by side those count that are best together.
+    """
+    moves = moves_along(graph, path)
+    codes = graph.source.astype(np.int64) * graph.states + graph.target
+    if (codes[moves] == codes[np.minimum(moves + 1, len(codes) - 1)])[moves + 1 < len(codes)].any():
+        return lexicographic(graph.only(np.isin(codes, codes[moves]))).values
+    taken = graph.amounts[moves]
     return tuple(np.where(graph.peaks, taken.max(axis=0, initial=0.0), taken.sum(axis=0)).tolist())
 
 
