@@ -7,10 +7,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-from formulations.states.on_graph import Choice, on_graph
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from formulations.choice import Choice
+from formulations.on_graph import on_graph
 from formulations.states._search import _on_paths, path_values
 from formulations.states._totals import least_total
 from seqopt.engines.rigid.compliance import ComplianceEngine
@@ -185,8 +186,8 @@ def test_where_time_is_over_a_bound_is_left(name, aim, monkeypatch):
         def __init__(self, *_):
             super().__init__(0.0)
 
-    monkeypatch.setattr("formulations.states.on_graph.watched", lambda *_: lambda _: None)
-    monkeypatch.setattr("formulations.states.on_graph.Watch", Late)
+    monkeypatch.setattr("formulations.on_graph.watched", lambda *_: lambda _: None)
+    monkeypatch.setattr("formulations.on_graph.Watch", Late)
     plan, best = solve(posed(aim, (5, 2)), name), known((5, 2), aim)
     assert (plan.status, plan.selection.stopped) == ("feasible", "time")
     assert plan.selection.bound[0] <= best[0] * (1 + 1e-9)
