@@ -472,7 +472,7 @@ def _able(problem: Problem) -> tuple[On, ...]:
     first = natural(problem)
     if first is On.LAYERS:
         return (On.LAYERS, On.STATES)
-    of_candidates = not isinstance(problem.moves, FreeRules) and len(problem.goals) <= 1
+    of_candidates = in_layers(problem.moves) and len(problem.goals) <= 1
     return (first, On.LAYERS) if first is On.STATES and of_candidates else (first,)
 
 
