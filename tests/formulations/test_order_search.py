@@ -113,6 +113,7 @@ def test_what_adds_up_equals_brute_force(aim, bricks, robots):
     assert finds_better_order(problem, least) is False
 
 
+OF_ONE_AIM = {"minmax": ("overlap_lp", "overlap_mip"), "sum": ("minimax",)}  # what they refuse
 TAKE_ORDERS = [name for name, found in seqopt.formulations().items() if On.ORDERS in found.also]
 
 
@@ -120,11 +121,15 @@ TAKE_ORDERS = [name for name, found in seqopt.formulations().items() if On.ORDER
 @pytest.mark.parametrize(("aim", "bricks"), [("minmax", 4), ("sum", 3)])
 @pytest.mark.parametrize("name", TAKE_ORDERS)
 def test_formulations_of_states_find_the_best_order_too(name, aim, bricks):
-    worths = known(bricks, TWO, aim).values()
-    found = seqopt.solve(posed(small_arch(bricks), TWO, aim), name)
+    worths, problem = known(bricks, TWO, aim).values(), posed(small_arch(bricks), TWO, aim)
+    if name in OF_ONE_AIM.get(aim, ()):
+        with pytest.raises(ProblemError, match=f"{name}: .* largest cost"):
+            seqopt.solve(problem, name)
+        return
+    found = seqopt.solve(problem, name)
     least = min(worths)
     assert max(worths) > 1.1 * least
-    exact = find_formulation(name).kind is FormulationKind.EXACT
+    exact = find_formulation(name).kind is not FormulationKind.HEURISTIC
     assert found.order.selection.objective >= least * (1 - 1e-9)
     if exact:
         assert found.order.selection.objective == pytest.approx(least, rel=1e-8)

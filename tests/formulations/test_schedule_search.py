@@ -442,7 +442,7 @@ def test_the_short_cut_does_what_the_long_way_does():
     ("words", "said"),
     [
         ({"criterion": "equations-2-3"}, "equations-2-3: it ranks the choices of a move"),
-        ({"formulation": "overlap_dp"}, "overlap_dp is for open grips in layers"),
+        ({"formulation": "overlap_mip"}, "overlap_mip: a largest cost is no sum; take"),
         ({"formulation": "pareto_zones"}, "states of a build are asked for; use .*schedule_search"),
         ({"workers": 0}, "workers is 0; give a whole number from 1"),
         ({"rules": {"regrips": 0}}, "rules {'regrips': 0}: give a seqopt.FreeRules"),

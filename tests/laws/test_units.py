@@ -30,8 +30,7 @@ def solved(scene, criterion):
         ComplianceEngine(build_network(scene)), three_robot_loop(build_network(scene)), criterion
     )
     plan = solve(problem, find_formulation("overlap_dp"))
-    selection, certificate = plan.selection, plan.certificate
-    return problem, problem.nodes(selection.choice), certificate
+    return problem, plan.nodes, plan.certificate
 
 
 @pytest.fixture(scope="module")
