@@ -99,7 +99,7 @@ def test_problems_go_to_their_own_formulations(plan):
     assert found.objective["minmax"] == pytest.approx(plan.objective["minmax"])
     with pytest.raises(ProblemError, match="and Pareto sets are asked for; use pareto_zones"):
         find_front(_StateFront(posed("F_largest")), "schedule_search")
-    with pytest.raises(ProblemError, match="layers of candidates are asked for"):
+    with pytest.raises(ProblemError, match="a object is not a problem"):
         solve(object(), find_formulation("schedule_search"))
 
 
