@@ -54,36 +54,18 @@ EQUIVALENT = (
         Equivalent(module, line, "strict=True", "strict=False", why)
         for module, line, why in (
             ("formulations.*", "zip(", LENGTHS),
-            ("formulations.layers.priced_paths", "zip(", LENGTHS),
             (COSTS, "enumerate(zip(", LENGTHS),
             (COSTS, "zip(self.single[-2::-1]", LENGTHS),
-            (CERTIFICATE, "shared in zip(", LENGTHS),
-            (CERTIFICATE, "zip(choice, sizes", "lengths were compared before"),
         )
     ),
-    *(
-        Equivalent(module, "", "np.zeros(1)", "np.zeros(2)", "two equal ways are one")
-        for module in (CERTIFICATE, "formulations.*")
-    ),
-    Equivalent("formulations.*", "if ", "else 0", "else -1", "of one row the first is the last"),
-    Equivalent(
-        "formulations.layers.rank_search",
-        "while len(",
-        "<",
-        "!=",
-        "no choice is longer than all moves",
-    ),
+    Equivalent("formulations.beam", "", "np.zeros(1)", "np.zeros(2)", "two equal ways are one"),
     *(
         Equivalent(
-            "formulations.layers.rank_search", "MOST", "20_000_000", size, "a bound on memory alone"
+            "formulations.rank_search", "MOST", "20_000_000", size, "a bound on memory alone"
         )
         for size in ("20000001", "19999999")
     ),
-    Equivalent("formulations.layers.cascade", "charge", "==", ">=", "it is later or earlier"),
-    Equivalent(
-        "formulations.layers.cascade", "len(costs.sizes)", "==", ">=", "no move is beyond the last"
-    ),
-    Equivalent("formulations.layers.minimax", "np.full(", "1", "2", "two equal ways are one"),
+    Equivalent("formulations.cascade", "charge", "==", ">=", "it is later or earlier"),
     Equivalent(COSTS, "== np.inf", "==", ">=", "nothing is larger than infinity"),
     Equivalent(COSTS, "== -np.inf", "==", "<=", "nothing is smaller than minus infinity"),
     Equivalent(COSTS, "out, before", "0", "-1", "of one row the first is the last"),
@@ -101,16 +83,6 @@ EQUIVALENT = (
     ),
     Equivalent(RANKS, "ranks if values.ndim", "==", "<=", "a step has one open move or two"),
     Equivalent(RANKS, "ordered", "!=", ">", "in order, what is another is larger"),
-    Equivalent(
-        CERTIFICATE, "low, high", "- 1", "* 1", "the largest of all costs is never looked at"
-    ),
-    Equivalent(
-        "formulations.layers.priced_paths",
-        "known and",
-        "== 1",
-        "<= 1",
-        "there is this one at least",
-    ),
     *(
         Equivalent(
             "formulations.contact.limit_analysis",
@@ -186,9 +158,7 @@ EQUIVALENT = (
     Equivalent(GRIPS, "@cache", "@cache", "", "what is kept is made anew, and the same"),
     Equivalent(GROWTH, "AT_ONCE = 2**17", "2", "1", "how many are changed at a time"),
     Equivalent(COSTS, "given.flat[0]", "0", "-1", "all of these entries are one"),
-    Equivalent(
-        "formulations.layers.beam", "len(met)", "==", ">=", "no more are met than were found"
-    ),
+    Equivalent("formulations.beam", "len(met)", "<", "!=", "no more are met than were found"),
 )
 
 

@@ -53,6 +53,8 @@ RIGID = (
 CHOSEN = ("formulations/test_programs", "formulations/test_degenerate")
 STANDING = ("formulations/test_equilibrium", "validation/test_limit_analysis")
 PROOFS = {
+    "seqopt.judge._arithmetic": ("judge/test_certificate", "judge/test_budget_proof"),
+    "seqopt.plan._paths": ("judge/test_certificate", "formulations/test_conformance"),
     "seqopt.judge._budget_proof": ("judge/test_proofs", "judge/test_budget_proof"),
     "seqopt.judge.certificate": (
         *("judge/test_certificate", "plan/test_values", "judge/test_proofs"),
@@ -77,22 +79,22 @@ MODULES = {
     "seqopt.engines.rigid._operator": RIGID,
     "seqopt.engines.rigid._grip_equations": RIGID,
     "seqopt.engines.rigid._growth": ("engines/test_operator", "engines/test_growth"),
+    "seqopt.graph.layers.compiled": ("judge/test_certificate", "formulations/test_programs"),
     "seqopt.graph.layers.costs": ("graph/test_costs", "plan/test_values"),
     **PROOFS,
     "seqopt.problem.criteria": (
         *("problem/test_criteria", "problem/test_own_criterion", "problem/test_scales"),
         "graph/test_layers",
     ),
-    "formulations.layers.priced_paths": ("plan/test_flow", "plan/test_values", *CHOSEN),
-    "formulations.layers.beam": CHOSEN,
-    "formulations.layers.cascade": CHOSEN,
+    "formulations.beam": CHOSEN,
+    "formulations.cascade": CHOSEN,
     "formulations.contact.limit_analysis": STANDING,
-    "formulations.layers.minimax": CHOSEN,
-    "formulations.layers.overlap_dp": CHOSEN,
-    "formulations.layers.overlap_flow": CHOSEN,
-    "formulations.layers.exhibits": ("formulations/test_whole_program",),
-    "formulations.layers.rank_search": CHOSEN,
-    "formulations.whole_program": ("formulations/test_whole_program",),
+    "formulations.labels": (*CHOSEN, "judge/test_budget_proof"),
+    "formulations.on_graph": (*CHOSEN, "formulations/test_conformance"),
+    "formulations.path_dp": (*CHOSEN, "formulations/test_conformance"),
+    "formulations.overlap_flow": (*CHOSEN, "plan/test_flow"),
+    "formulations.exhibits": ("formulations/test_whole_program",),
+    "formulations.rank_search": CHOSEN,
     "formulations.solvers": (*("formulations/test_whole_program", *STANDING), *CHOSEN),
 }
 LEAST = 0.95  # of the mutants that are not equivalent
