@@ -135,17 +135,18 @@ def _solve_all(graph: Choices, formulation: Formulation, run: Run) -> Plan:
     path = find_path(found.instance, formulation, run, found.offset)
     choice = found.choice([node for (node,) in path.selection.states])
     seconds |= path.seconds | {"compile": seconds["compile"] + path.seconds["compile"]}
+    proof = path.certificate
     with timed(seconds, "verify"):
-        if path.certificate is not None:
+        if proof is not None:
             for layers in _from_cache(graph):
                 _require_anew(layers, choice)
+            spent = {budget.name: budget.spent(choice) for budget in graph.budgets}
+            proof = replace(proof, spent=spent)  # amounts below zero and without a bound as well
         steps = _checked(graph.steps(choice), graph)
     seconds["verify"] += path.seconds["verify"]
     rows = tuple(map(tuple, found.instance.states[[s for (s,) in path.selection.states]].tolist()))
     selection = replace(path.selection, states=rows)
-    return Plan(
-        graph, graph, formulation, selection, path.certificate, steps, {**stages, **seconds}
-    )
+    return Plan(graph, graph, formulation, selection, proof, steps, {**stages, **seconds})
 
 
 def _solve_windows(graph: Choices, formulation: Formulation, run: Run) -> Plan:
