@@ -208,7 +208,20 @@ def test_a_budget_without_a_bound_is_none(problem25):
     free = replace(problem25, budgets=(travel(problem25, np.inf),))
     best = solve(problem25, "overlap_dp").certificate.objective
     for name in ("labels", "lagrangian"):
-        assert solve(free, name).certificate.objective == pytest.approx(best)
+        plan = solve(free, name)
+        assert plan.certificate.objective == pytest.approx(best)
+        assert plan.certificate.spent == {b.name: b.spent(plan.choice) for b in free.budgets}
+
+
+def test_what_is_spent_may_be_below_zero(problem25):
+    """Of amounts of both signs it is the sum, however the search counts them."""
+    way = travel(problem25, 20.0)
+    less = replace(way, single=tuple(each - 1.0 for each in way.single), bound=20.0 - 22)
+    plans = [solve(replace(problem25, budgets=(b,)), "labels") for b in (way, less)]
+    assert plans[0].choice == plans[1].choice
+    (spent,), (lower,) = (plan.certificate.spent.values() for plan in plans)
+    assert lower == pytest.approx(spent - 22)
+    assert plans[0].selection.prices[0] == pytest.approx(plans[1].selection.prices[0])
 
 
 def test_the_bound_holds_where_costs_have_both_signs():
