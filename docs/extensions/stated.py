@@ -111,24 +111,11 @@ def _vault_loads(table: pd.DataFrame) -> str:
     return markdown(head, rows)
 
 
-PLAIN = r"^(?:[a-z ]+ )?[^ ]+: |^[^ ]+ (?=finds|is )"  # what a reason is about
-
-
 def _composing(table: pd.DataFrame) -> dict[str, str]:
-    plain = table["reason"].str.replace(PLAIN, "", regex=True).str.partition(";")[0]
-    plain = plain.str.partition(" (did")[0]
-    reasons = [*dict.fromkeys(plain.dropna())]
-    said = plain.map({why: f"({k})" for k, why in enumerate(reasons, start=1)})
-    cells = table.assign(cell=said.fillna("yes")).set_index(["with", "schedule"])["cell"]
-    schedules, words = table["schedule"].unique(), table["with"].unique()
-    rows = [[word, *(cells[word, schedule] for schedule in schedules)] for word in words]
-    numbered = [f"{k}. {why}" for k, why in enumerate(reasons, start=1)]
-    return {
-        "composing_table": markdown(["", *schedules], rows),
-        "composing_reasons": "\n".join(numbered),
-        "composing_cells": str(len(table)),
-        "composing_no": str(int(table["reason"].notna().sum())),
-    }
+    """Return how many pairs of schedules and other words there are, and which."""
+    schedules, words = (", ".join(table[name].unique()) for name in ("schedule", "with"))
+    told = {"composing_schedules": schedules, "composing_words": words}
+    return {**told, "composing_cells": str(len(table))}
 
 
 def _on_graphs(table: pd.DataFrame) -> str:
