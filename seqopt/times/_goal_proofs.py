@@ -15,8 +15,8 @@ from seqopt.graph.graph import Graph, LabelProof
 from seqopt.graph.paths import tied
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
-from seqopt.judge._proof import Levels
-from seqopt.judge._rule_moves import RuleTables, ScheduleTables
+from seqopt.judge._proof import Rebuilt
+from seqopt.judge._states import StateEvaluator, Tables
 from seqopt.problem.problem import Measure
 from seqopt.sequence._durations import require_durations
 from seqopt.sequence.schedule import Schedule
@@ -37,7 +37,7 @@ class TimedStates:
     """
 
     problem: States
-    tables: RuleTables | ScheduleTables
+    tables: Tables
     levels: Sequence[Ints]
     which: Sequence[int]
     graph: Graph
@@ -224,28 +224,27 @@ class GoalProofs:
 
 
 def label_bounds(
-    levels: Levels, values: Sequence[float], found: StatePath
+    evaluator: StateEvaluator, rebuilt: Rebuilt, values: Sequence[float], found: StatePath
 ) -> Callable[[Graph], tuple[float, ...]]:
-    """Return what bounds the goals after those about margins, by labels, on a subgraph of levels.
+    """Return what bounds the goals after those about margins, by labels, on rebuilt subgraphs.
 
     ``values``: of all goals; ``found``: what is claimed, with labels. The function raises
     `SolverError` if labels are given that do not prove what is claimed.
     """
-    passable = levels.passable
-    first, tables = passable.margins, passable.tables
+    first, tables = evaluator.margins, evaluator.tables
     margins, claim = values[:first], Claim(values, found.bound, found.proofs, found.motions)
 
     def fallen(level: int, rows: Ints) -> Bools:
-        if not passable.stands.asked(margins):
+        if not evaluator.demands(margins):
             return np.zeros(len(rows), dtype=bool)
-        return ~passable.may_stand(level, rows, margins)
+        return ~evaluator.may_stand(level, rows, margins)
 
-    bricks = [tables.bricks_at(level) if level else 0 for level in levels.levels]
-    grips = [passable.held_by(rows) for rows in levels.states]
-    cured = cured_rows(passable.problem, bricks, grips, claim.motions)
+    bricks = [tables.bricks_at(level) if level else 0 for level in rebuilt.parts]
+    grips = [evaluator.held_to_stand(rows) for rows in rebuilt.states]
+    cured = cured_rows(evaluator.problem, bricks, grips, claim.motions)
 
     def bounds(graph: Graph) -> tuple[float, ...]:
-        own = tables, levels.states, levels.levels, graph, fallen, cured
-        return GoalProofs(TimedStates(passable.problem, *own), claim).bounds(first)
+        own = tables, rebuilt.states, rebuilt.parts, graph, fallen, cured
+        return GoalProofs(TimedStates(evaluator.problem, *own), claim).bounds(first)
 
     return bounds

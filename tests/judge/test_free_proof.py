@@ -52,7 +52,7 @@ def test_tables_say_what_the_book_says(build, data):
         states = np.array([row], dtype=np.int32)
         found = {
             (follows.level, tuple(after), follows.regrip)
-            for follows in tables.follow(bricks, states)
+            for follows in tables.successors(bricks, states)
             for after in follows.states.tolist()
         }
         assert found == expected

@@ -24,7 +24,8 @@ from seqopt.graph.states.states import build_states
 from seqopt.judge import _budget_proof as budget_proof
 from seqopt.judge._budget_proof import least_within
 from seqopt.judge._orders import finds_better_order
-from seqopt.judge._proof import Passable, Proof
+from seqopt.judge._proof import Proof
+from seqopt.judge._states import StateEvaluator
 from seqopt.judge.certificate import TOLERANCE, certify_partial
 from seqopt.plan.solving import solve
 from seqopt.problem.criteria import WorstRatio
@@ -85,7 +86,7 @@ def test_what_all_plans_have_in_common_bounds_every_path(ending, robots, regrips
     rules = FreeRules(ending=ending, regrips=regrips, least_grips=1)
     problem = posed("minmax,steps", with_robots(small_arch(5), robots), rules=rules)
     floors = floors_of_goals(problem)
-    assert Passable(problem).least() == pytest.approx(floors, rel=1e-12)
+    assert StateEvaluator(problem).least() == pytest.approx(floors, rel=1e-12)
     graph = explore(problem).graph().graph
     assert least_peak(graph, 0) >= floors[0] * (1 - 1e-12)
     fewest = keep_best(graph, 1)[1]
