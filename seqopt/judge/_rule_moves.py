@@ -57,7 +57,7 @@ class _Tables:
 
     def _row(self, held: Grips, stays: Grips) -> Ints:
         """Return the row (1, robots) of nodes held, or held last where that counts."""
-        out = np.zeros((1, self.robots), dtype=np.int32)
+        out: Ints = np.zeros((1, self.robots), dtype=np.int32)
         for column, robot in enumerate(self.team):
             if (node := held[robot]) is not None:
                 out[0, column] = self._place[node]

@@ -60,13 +60,13 @@ def judge_schedule(
         if not spent <= cap + TOLERANCE * cap:
             raise SolverError(f"{goal} is {spent:.9g}, more than the {cap:g} that are allowed")
     twin = twin_of(Measure.MAKESPAN) if problem.is_timed else None
-    timed = twin is not None and bool(np.isfinite(selection.bound).any())
-    if not timed and (selection.stopped or problem.is_timed):  # bounds are claimed, not proven
+    proves_time = twin is not None and bool(np.isfinite(selection.bound).any())
+    if not proves_time and (selection.stopped or problem.is_timed):  # bounds are claimed alone
         bounds = _with_counts(problem, twin, values, (-np.inf,) * len(values))
         gap = _gap(problem.aims, values, bounds)
         return Certificate(values, bounds, gap, gap)
     proof, claimed = Proof(_weighed(problem, selection), hint), selection.bound
-    if timed:
+    if twin is not None:
         bounds = _timed_bounds(problem, proof, twin, selection, values)
     elif problem.totals:
         bounds = proof.bounds(values)
