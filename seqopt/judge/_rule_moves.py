@@ -14,13 +14,14 @@ from typing import NamedTuple
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
+from seqopt.errors import StepError
 from seqopt.network.network import Network
 from seqopt.scene._armed import posture_rules
 from seqopt.scene.scene import Scene
 from seqopt.sequence._rule_check import RuleBook, unbearable
-from seqopt.sequence.rules import Ending, Newest
+from seqopt.sequence.rules import Ending, FreeRules, Newest, Payload
 from seqopt.sequence.schedule import Hold, Schedule, holds, islands
-from seqopt.sequence.steps import Grips, StepKind
+from seqopt.sequence.steps import Grips, Step, StepKind
 
 PAIRS = 1_000_000  # pairs of a state and a place in one chunk
 
@@ -272,26 +273,34 @@ class RuleTables(_Tables):
 
     def keep(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) keep the rules as long as the build goes on, from 1 brick."""
-        ok = self._keep(bricks, states, self._propped)
-        if bricks == self.last and self._propped.any():  # where nobody holds, props are struck
-            bare = (states[:, : self.robots] <= 0).all(axis=1)
-            ok[bare] = self._keep(bricks, states[bare], np.zeros_like(self._propped))
-        return ok
+        return np.asarray(~np.any([each for each, _ in self._broken(bricks, states)], axis=0))
 
-    def _keep(self, bricks: int, states: Ints, props: Bools) -> Bools:
-        """Return the same with props at places."""
+    def _broken(self, bricks: int, states: Ints) -> list[tuple[Bools, str]]:
+        """Return which states (n, c) break which rules, the ending aside, and that in words."""
         grips = states[:, : self.robots].clip(min=0)
-        ok = np.ones(len(states), dtype=bool)
-        propped = props[: 2 * bricks + 1]
+        count = np.count_nonzero(grips, axis=1)
+        struck = (bricks == self._book.span[1]) & (count == 0)  # where nobody holds, props are
+        props = self._propped[: 2 * bricks + 1]
+        held = np.where(struck, 0, count + props.sum())
         _, newest, loose = self._places(bricks)
-        if bricks > 1:
-            ok &= np.count_nonzero(grips, axis=1) + propped.sum() >= self._least
-        if self._rules.newest is not Newest.FREE and not propped[-2:].any():
-            ok &= newest[np.arange(self.robots), grips].any(axis=1)
+        words = f"{held.min(initial=self.robots)} grips, fewer than least_grips={self._least}"
+        out = [(held < self._least * (bricks > 1), words)]
+        if self._rules.newest is not Newest.FREE:
+            on = newest[np.arange(self.robots), grips].any(axis=1) | (props[-2:].any() & ~struck)
+            out.append((~on, f"nobody holds the newest brick (newest={self._rules.newest.value})"))
         for part in loose:
-            if not (part & props).any():
-                ok &= part[grips].any(axis=1)
-        return ok
+            on = part[grips].any(axis=1) | ((part & self._propped).any() & ~struck)
+            out.append((~on, "a part that no joint ties to the ground is held by nobody"))
+        return out
+
+    def fault(self, bricks: int, state: Ints) -> str:
+        """Return which rule a state (1, c) breaks, in a few words; empty if none."""
+        every = self._broken(bricks, state) if bricks else []
+        return next((words for broken, words in every if broken[0]), "")
+
+    def row(self, grips: Grips) -> Ints:
+        """Return the row (1, robots) of nodes that the robots of a scene hold."""
+        return self._row(grips, ())
 
     def ends(self, level: int, states: Ints) -> Bools:
         """Return which states (n, c) end the build."""
@@ -303,7 +312,7 @@ class RuleTables(_Tables):
         site = self._rules.finish
         if site is None or site.grips is None:
             return self.keep(self.bricks_at(level), states)
-        both = self.in_order(np.concatenate([grips, self._row(site.grips, ())]))
+        both = self.in_order(np.concatenate([grips, self.row(site.grips)]))
         return np.asarray((both[:-1] == both[-1]).all(axis=1))
 
     def codes(self, states: Ints) -> Ints:
@@ -412,3 +421,33 @@ class ScheduleTables(_Tables):
     def in_order(self, states: Ints) -> Ints:
         """Return states as they are: no two robots could change places."""
         return states
+
+
+def check_free(
+    network: Network, rules: FreeRules, steps: Sequence[Step], worlds: tuple[Scene, ...] = ()
+) -> None:
+    """Require that a checked sequence keeps the rules of a free schedule, forces of grips aside."""
+    tables, heavy = RuleTables(RuleBook(network, rules, worlds), []), dict[int, str]()
+    if rules.payload is Payload.KEPT:
+        heavy = unbearable((network.scene, *worlds), steps, rules.begun(network.scene).begin)
+    level, state = tables.first, tables.start()
+    for step in steps:
+        if step.number in heavy:
+            raise StepError(f"step {step.number} ({step.kind.value}): {heavy[step.number]}")
+        to = level + (step.kind in (StepKind.PLACE, StepKind.REMOVE))
+        wanted, regrip = tables.row(step.grips), step.kind is StepKind.REPOSITION
+        found = [
+            move.states[(move.states[:, : tables.robots] == wanted).all(axis=1)]
+            for move in tables.successors(level, state)
+            if (move.level, move.regrip) == (to, regrip) and tables.bricks_at(to) == step.bricks
+        ]
+        after = np.concatenate([state[:0], *found])[:1]
+        others = (n for r, n in enumerate(step.grips) if r not in tables.team)
+        if not len(after) or any(node is not None for node in others):
+            why = tables.fault(step.bricks, wanted) or "no rule allows it after the one before"
+            raise StepError(f"step {step.number} ({step.kind.value}) of a free schedule: {why}")
+        level, state = to, after
+    if not tables.ends(level, state)[0]:
+        raise StepError(
+            f"step {len(steps)}: the build does not end there (ending={rules.ending.value})"
+        )

@@ -14,8 +14,8 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.paths import strictly_below, tied
 from seqopt.graph.states._visits import move_amounts
 from seqopt.graph.states.states import States
-from seqopt.judge._prop_rules import props_that_hold
 from seqopt.judge._rule_moves import RuleTables, ScheduleTables, Transitions
+from seqopt.judge._step_checks import props_that_hold
 from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import LARGEST, Goal, Measure
 from seqopt.problem.requirements import LIMIT_TOLERANCE, state_costs

@@ -17,10 +17,9 @@ from seqopt.errors import SolverError, StepError
 from seqopt.graph.solution import StatePath
 from seqopt.graph.states.states import States
 from seqopt.judge._proof import BELOW, Hint, Proof
-from seqopt.judge._prop_rules import check_props
-from seqopt.judge._shape_rules import check_shape
-from seqopt.judge._standing_proof import proven_margins, require_margin
+from seqopt.judge._rule_moves import check_free
 from seqopt.judge._states import goal_values
+from seqopt.judge._step_checks import check_props, check_shape, proven_margins, require_margin
 from seqopt.judge._twin import Twin, twin_of
 from seqopt.judge.certificate import Certificate
 from seqopt.problem.problem import LARGEST, Goal, Measure
@@ -30,7 +29,7 @@ from seqopt.responses._tolerance import COLUMN, is_tolerance, misfits_along, tol
 from seqopt.responses.quantities import CHOSEN_BY, PROP_EXCESS
 from seqopt.responses.table import _analyzed, _Columns, force_column
 from seqopt.scene._armed import check_postures
-from seqopt.sequence._rule_check import check_carried, check_free
+from seqopt.sequence._rule_check import check_carried
 from seqopt.sequence.schedule import OpenGrip, Schedule
 from seqopt.sequence.steps import Step, StepKind
 

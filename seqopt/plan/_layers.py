@@ -23,7 +23,7 @@ from seqopt.graph.layers.interface import PlacementProblem
 from seqopt.graph.layers.layers import Layers, _require_carried, steps_over, travel
 from seqopt.graph.scenarios import ScenarioLayers, engine_for
 from seqopt.graph.solution import Selection
-from seqopt.judge._shape_rules import check_shape
+from seqopt.judge._step_checks import check_shape
 from seqopt.judge.certificate import Certificate, _require_anew, certify_partial, judge
 from seqopt.plan._guard import readable, require_fit, require_proof, require_time, select
 from seqopt.plan.plan import Plan

@@ -32,9 +32,9 @@ from seqopt.problem.criteria import WorstRatio
 from seqopt.problem.problem import Aim
 from seqopt.problem.requirements import Limit
 from seqopt.responses.quantities import CHOSEN_BY
-from seqopt.sequence._rule_check import RuleBook
 from seqopt.sequence.rules import Ending, FreeRules, with_robots
 from tests.builders import small_arch
+from tests.plain_rules import PlainBook
 
 ONES = WorstRatio("ones", (("F_largest", 100.0), ("M_sup", 10.0)))
 FREE_RULES = FreeRules()
@@ -47,7 +47,7 @@ def posed(aim, scene=None, limits=(), count=5, rules=FREE_RULES):
 
 def states_below(problem, bound, join):
     """How many states plans may pass whose values, joined, are within a bound: in plain words."""
-    book, engine = RuleBook(problem.network, problem.rules), problem.engine
+    book, engine = PlainBook(problem.network, problem.rules), problem.engine
     work = [(0.0, 0, 0, (None,) * len(problem.network.scene.robots))]
     done, values, pushed = set(), {}, 0
     while work:
