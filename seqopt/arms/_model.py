@@ -84,7 +84,8 @@ class ArmModel:
         self.model, geometry = _read(pin, path, arm)
         self.data = self.model.createData()
         self.flange = self.model.getFrameId(flange_of(self.model, arm))
-        self.base = pin.SE3(_axes(arm), np.array(arm.position))
+        x, y = np.array(arm.x_axis), np.array(arm.y_axis)
+        self.base = pin.SE3(np.column_stack([x, y, np.cross(x, y)]), np.array(arm.position))
         bodies = [*_bodies(self.model, geometry)]
         self.fixed = [body for body in bodies if body.joint == 0]
         self.moving = [body for body in bodies if body.joint > 0]
@@ -249,12 +250,6 @@ def flange_of(model: Any, arm: Arm) -> str:
     return name
 
 
-def _axes(arm: Arm) -> Floats:
-    """Return the directions of the base as columns."""
-    x, y = np.array(arm.x_axis), np.array(arm.y_axis)
-    return np.column_stack([x, y, np.cross(x, y)])
-
-
 def _joints(model: ArmModel) -> list[Any]:
     return [*model.model.joints][1:]
 
@@ -371,7 +366,10 @@ class PosedArm:
         if not self.holds:
             return tuple(out)
         placed = model.placed(self._own[None], np.array([self.arm.tool_length]))
-        local = [*(body.points for body in model.moving), _tool(self.arm)]
+        angles = np.linspace(0.0, 2 * np.pi, _AROUND, endpoint=False)
+        ring = self.arm.tool_radius * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+        end = np.array([0.0, 0.0, 0.5 * self.arm.tool_length])
+        local = [*(body.points for body in model.moving), np.concatenate([ring - end, ring + end])]
         moved = zip(local, placed.rotation[0], placed.shift[0], strict=True)
         return (*out, *(points @ turn.T + shift for points, turn, shift in moved))
 
@@ -382,14 +380,6 @@ class PosedArm:
 
 def _close(one: Floats, two: Floats) -> bool:
     return bool(np.linalg.norm(one - two) <= _SAME)
-
-
-def _tool(arm: Arm) -> Floats:
-    """Return points of a tool around its middle, (m, 3), m."""
-    angles = np.linspace(0.0, 2 * np.pi, _AROUND, endpoint=False)
-    ring = arm.tool_radius * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
-    end = np.array([0.0, 0.0, 0.5 * arm.tool_length])
-    return np.concatenate([ring - end, ring + end])
 
 
 def idle_arm(arm: Arm) -> PosedArm:

@@ -78,7 +78,11 @@ def read_urdf(path: Path) -> Urdf:
         name = str(link.get("name"))
         if link.find("collision/geometry") is not None:
             continue
-        if _take_visual(link):
+        shown = [each for each in link.findall("visual") if each.find("geometry") is not None]
+        for each in shown:
+            shape = ElementTree.SubElement(link, "collision")
+            shape.extend(deepcopy(part) for part in each if part.tag in ("origin", "geometry"))
+        if shown:
             visual.append(name)
         elif name in bodies or _has_mass(link):
             bare.append(name)
@@ -96,15 +100,6 @@ def shape_notes(scene: Scene) -> tuple[str, ...]:
             with suppress(SceneError, FileError):
                 found.append((robot.name, str(read_urdf(model_path(robot.arm)))))
     return tuple(f"robot {name}: its arm has {said}" for name, said in found if said)
-
-
-def _take_visual(link: _Link) -> bool:
-    """Give a link its visual shapes for collisions, in place; return whether there are any."""
-    shown = [each for each in link.findall("visual") if each.find("geometry") is not None]
-    for each in shown:
-        shape = ElementTree.SubElement(link, "collision")
-        shape.extend(deepcopy(part) for part in each if part.tag in ("origin", "geometry"))
-    return bool(shown)
 
 
 def _followed(robot: _Link) -> list[str]:

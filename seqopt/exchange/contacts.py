@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from seqopt.arrays import Floats, FrozenValue, Ints
+from seqopt.arrays import Floats, FrozenValue
 from seqopt.errors import FileError, SceneError
 from seqopt.exchange._content import GROUND, Content, FileJoint, Given
 from seqopt.exchange._meshes import Repaired
@@ -177,7 +177,11 @@ def _facets(shape: _Shape) -> _Facets:
 def _overlaps(first: _Facets, second: _Facets, gap: float) -> Iterator[tuple[list[Any], Any]]:
     """Yield overlaps of the faces of two blocks, plane by plane, with the origins and axes."""
     planes: list[_Plane] = []
-    for k, m in _opposed(first, second, gap):
+    against = first.normal @ second.normal.T < -_OPPOSED
+    step = second.middle[None] - first.middle[:, None]
+    apart = np.abs(np.einsum("kmi,ki->km", step, first.normal))
+    wide = np.linalg.norm(step, axis=2)
+    for k, m in np.argwhere(against & (apart <= gap + (1 - _OPPOSED**2) ** 0.5 * wide)):
         normal = first.normal[k] - second.normal[m]
         normal /= np.linalg.norm(normal)
         middle = 0.5 * (first.middle[k] + second.middle[m])
@@ -194,15 +198,6 @@ def _in_plane(plane: _Plane, normal: Floats, middle: Floats, gap: float) -> bool
     """Return whether a face lies in a plane, no farther off than half a gap."""
     origin, axes, _ = plane
     return bool(normal @ axes[0] > _LEVEL and abs((middle - origin) @ axes[0]) <= 0.5 * gap)
-
-
-def _opposed(first: _Facets, second: _Facets, gap: float) -> Ints:
-    """Return pairs (P, 2) of faces that look at each other from near planes."""
-    against = first.normal @ second.normal.T < -_OPPOSED
-    step = second.middle[None] - first.middle[:, None]
-    apart = np.abs(np.einsum("kmi,ki->km", step, first.normal))
-    wide = np.linalg.norm(step, axis=2)
-    return np.argwhere(against & (apart <= gap + (1 - _OPPOSED**2) ** 0.5 * wide)).astype(np.int64)
 
 
 def _overlap(first: Floats, second: Floats, plane: tuple[Floats, Floats], gap: float) -> list[Any]:

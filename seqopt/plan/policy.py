@@ -227,7 +227,8 @@ class Policy(FrozenValue):
         names = ("goals", "robots", "kinds", "checked", "keeps_range")
         told = {name: getattr(self, name) for name in names}
         arrays = {name: getattr(self, name) for name in ARRAYS}
-        arrays["held"] = _small(self.held)
+        least = min(int(self.held.min(initial=0)), -int(self.held.max()) - 1)
+        arrays["held"] = self.held.astype(np.min_scalar_type(least))
         buffer = io.BytesIO()
         np.savez_compressed(buffer, allow_pickle=False, told=json.dumps(told), **arrays)
         return buffer.getvalue()
@@ -283,13 +284,6 @@ def _are_lists(value: object) -> bool:
 
 
 ARRAYS = ("order", "nodes", "bricks", "held", "values", "following")
-
-
-def _small(values: Ints) -> Ints:
-    """Return whole numbers in the smallest type that holds them."""
-    return values.astype(
-        np.min_scalar_type(min(int(values.min(initial=0)), -int(values.max()) - 1))
-    )
 
 
 def find_policy(

@@ -238,7 +238,9 @@ class FreeSpace(StateRows):
 
     def lawful(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) keep the rules as long as the build goes on, (n,)."""
-        propped = self._propped(bricks)
+        scene = self.network.scene
+        props = scene.standing_props(bricks, held=True) if bricks else ()
+        propped = [scene.since[scene.brick_of_node[prop.node].name] - 1 for prop in props]
         ok = self._lawful(bricks, states, propped)
         if propped and bricks == self.levels:  # where nobody holds, props are struck
             bare = self.grips(states) == 0
@@ -262,12 +264,6 @@ class FreeSpace(StateRows):
                 continue
             ok &= np.isin((held - 1) // 2, bricks_of).any(axis=1)
         return ok
-
-    def _propped(self, bricks: int) -> list[int]:
-        """Return the bricks that props hold while so many stand, by place in build order from 0."""
-        scene = self.network.scene
-        props = scene.standing_props(bricks, held=True) if bricks else ()
-        return [scene.since[scene.brick_of_node[prop.node].name] - 1 for prop in props]
 
     def ended(self, states: Ints) -> Bools:
         """Return which states with all bricks end the build, (n,)."""

@@ -114,7 +114,14 @@ class FreeRules:
         for name, kind in _CHOICES:
             object.__setattr__(self, name, _choice(name, kind, getattr(self, name)))
         for name in ("robots", "placers"):
-            object.__setattr__(self, name, _names(name, getattr(self, name)))
+            given = getattr(self, name)
+            names = (given,) if isinstance(given, str) else given
+            if not isinstance(names, tuple | list) or not all(isinstance(n, str) for n in names):
+                raise StepError(f"rule {name}: {short(given)}; give names of robots")
+            twice = [n for n in names if names.count(n) > 1]
+            if twice:
+                raise StepError(f"rule {name}: {twice[0]} occurs twice; name it once")
+            object.__setattr__(self, name, tuple(names))
         for name in ("least_grips", "regrips"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, _count(name, getattr(self, name)))
@@ -309,16 +316,6 @@ def _choice(name: str, kind: type[Enum], given: object) -> Enum:
         raise StepError(
             f"rule {name}: {short(given)}{hint}; give one of {', '.join(known)}"
         ) from None
-
-
-def _names(name: str, given: object) -> tuple[str, ...]:
-    names = (given,) if isinstance(given, str) else given
-    if not isinstance(names, tuple | list) or not all(isinstance(n, str) for n in names):
-        raise StepError(f"rule {name}: {short(given)}; give names of robots")
-    twice = [n for n in names if names.count(n) > 1]
-    if twice:
-        raise StepError(f"rule {name}: {twice[0]} occurs twice; name it once")
-    return tuple(names)
 
 
 def _count(name: str, given: object) -> int:

@@ -323,7 +323,11 @@ def barrel_vault(
     >>> barrel_vault(2)
     <Scene barrel vault 2: 31 bricks, 30 joints, 2 ground ends, 3 robots>
     """
-    row = _tested(test)
+    source = resources.files("seqopt").joinpath("data/paper/arch_tests.csv")
+    rows = {row["test"]: row for row in csv.DictReader(source.read_text("utf-8").splitlines())}
+    if isinstance(test, bool) or not isinstance(test, int) or str(test) not in rows:
+        raise SceneError(f"barrel vault: test is {short(test)}; give 1 to {len(rows)}")
+    row = rows[str(test)]
     scene = arch_scene(
         _vault_shape(row, law),
         name or f"barrel vault {test}",
@@ -356,14 +360,6 @@ def _vault_shape(row: dict[str, str], law: JointLaw) -> ArchShape:
         dimensions=(chord - gap, width, thickness),
         density=float(row["gamma_m_kg_m3"]),
     )
-
-
-def _tested(test: int) -> dict[str, str]:
-    source = resources.files("seqopt").joinpath("data/paper/arch_tests.csv")
-    rows = {row["test"]: row for row in csv.DictReader(source.read_text("utf-8").splitlines())}
-    if isinstance(test, bool) or not isinstance(test, int) or str(test) not in rows:
-        raise SceneError(f"barrel vault: test is {short(test)}; give 1 to {len(rows)}")
-    return rows[str(test)]
 
 
 _TRIED_VAULTS = 8  # numbers of courses, where none is given
