@@ -277,18 +277,6 @@ def _grips_off(engine: Engine, build: Build, known: dict[_Key, float]) -> Floats
     return each_tolerance(engine, held_in_steps(scene, build.steps), known)
 
 
-def _ask_all(
-    engine: Engine, builds: Sequence[Build], known: _Asked, shown: Sequence[Build]
-) -> None:
-    """Ask of all builds at once how far grips may be off, and of those with fields these."""
-    every = [step for build in builds if not build.order for step in build.steps]
-    if every:
-        _grips_off(engine, Build("", every, pd.DataFrame()), known.offs)
-    states = _distinct(build.steps for build in shown)
-    want = Want.EDGES | Want.BRICKS | Want.SUPPORT
-    known.fields.update(zip(states, _each_fields(engine, states.values(), want), strict=True))
-
-
 def _off_said(far: float) -> str:
     """Return how far grips of a step may be off, in words; none where nobody holds."""
     return f"Grips {_far_off(far)}." if far < np.inf else ""
@@ -422,7 +410,12 @@ def _data(
     ends = np.cumsum([numbers * len(build.steps) for build in builds])
     drawn = [bool(end <= MOST) and not b.order for b, end in zip(builds, ends, strict=True)]
     known = _Asked({} if offs is None else offs, {}, {})
-    _ask_all(engine, builds, known, [*compress(builds, drawn)])
+    every = [step for build in builds if not build.order for step in build.steps]
+    if every:
+        _grips_off(engine, Build("", every, pd.DataFrame()), known.offs)
+    states = _distinct(build.steps for build in compress(builds, drawn))
+    want = Want.EDGES | Want.BRICKS | Want.SUPPORT
+    known.fields.update(zip(states, _each_fields(engine, states.values(), want), strict=True))
     return {
         "structure": _structure_data(network),
         "builds": [

@@ -12,7 +12,6 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 
-from seqopt.arrays import Floats, Ints
 from seqopt.engines.interface import Engine
 from seqopt.errors import SceneError
 from seqopt.graph.scenarios import engine_for
@@ -202,7 +201,11 @@ def _crossing(values: pd.Series[float], level: float, stiff: float, soft: float)
 
 def _softness_lines(table: pd.DataFrame, builds: Sequence[str]) -> list[str]:
     """Return a table of some builds in text: the largest responses at every decade, 80 columns."""
-    shown = _decades(np.unique(table["stiffness"]))
+    known = np.unique(table["stiffness"])
+    finite = [float(k) for k in known if k < np.inf]
+    whole = [k for k in finite if abs(np.log10(k) - round(np.log10(k))) < 1e-9] or finite
+    step = -(-len(whole) // 6)
+    shown = (*whole[::-1][::step][::-1], float(max(known)))
     lines = []
     for response, unit in LARGEST.items():
         wide = table.pivot_table(response, "build", "stiffness", sort=False)
@@ -225,11 +228,3 @@ def _three(value: float) -> str:
 def _in_short(stiffness: float) -> str:
     """Return a stiffness in a few letters, as 3e6."""
     return f"{stiffness:.0e}".replace("e+0", "e").replace("e+", "e")
-
-
-def _decades(known: Floats | Ints) -> tuple[float, ...]:
-    """Return up to six stiffnesses to show and the stiffest, whole decades as far as there are."""
-    finite = [float(k) for k in known if k < np.inf]
-    whole = [k for k in finite if abs(np.log10(k) - round(np.log10(k))) < 1e-9] or finite
-    step = -(-len(whole) // 6)
-    return (*whole[::-1][::step][::-1], float(max(known)))

@@ -86,13 +86,6 @@ def _written(label: Label) -> Annotation:
     return text
 
 
-def _lead(label: Label, shift: tuple[float, float]) -> None:
-    """Draw a line from a point to its words."""
-    line = {"arrowstyle": "-", "lw": 0.5, "color": GRAY, "shrinkA": 0, "shrinkB": 4}
-    found = label.axes.annotate("", label.at, shift, textcoords="offset points", arrowprops=line)
-    found.set_in_layout(False)
-
-
 def _spots() -> Iterator[tuple[float, float]]:
     """Yield directions with their distances, points: the nearest and those beside first."""
     for radius in RADII:
@@ -129,7 +122,11 @@ def _spot(text: Annotation, label: Label, boxes: Sequence[Bbox], scale: float) -
     up: dict[float, Any] = {0.0: "bottom", 0.5: "center", 1.0: "top"}
     text.set(ha=across[_share(dx)], va=up[_share(dy)])
     if float(np.hypot(dx, dy)) > FAR:
-        _lead(label, (dx, dy))
+        line = {"arrowstyle": "-", "lw": 0.5, "color": GRAY, "shrinkA": 0, "shrinkB": 4}
+        found = label.axes.annotate(
+            "", label.at, (dx, dy), textcoords="offset points", arrowprops=line
+        )
+        found.set_in_layout(False)
     return box
 
 
@@ -239,22 +236,20 @@ def _points(axes: Axes, speed: SpeedTable, name: str) -> Iterator[tuple[Axes, fl
 
 def _named(axes: Axes, speed: SpeedTable, name: str) -> Iterator[Label]:
     """Yield words for points: above for formulations, each once a level; below for engines."""
-    seen, took, named = _seen(speed, name).sort_values("seconds"), _index(speed), set[str]()
+    seen, took, named = _seen(speed, name).sort_values("seconds"), speed.take.name, set[str]()
     for height, level in seen.groupby("height"):
         level = level.sort_values("kept", ascending=False, kind="stable")  # noqa: PLW2901
         if name == "error":
             first: pd.Series[float] = level.loc[took] if took in level.index else level.iloc[0]
-            engines = _engines(level, str(first["engine"]))
+            worst = float(level["error"].max())
+            names = dict.fromkeys([str(first["engine"]), *level["engine"]])
+            said = ", ".join(names) + (f": {error_text(worst)}" if worst else "")
+            engines = textwrap.fill(said, LINE)
             if engines not in named:
                 yield Label(axes, _at(first, height), engines, bool(first["kept"]))
             named.add(engines)
         else:
             yield from _named_once(axes, level, height, took)
-
-
-def _index(speed: SpeedTable) -> Any:
-    """Return where in the table the row to take is."""
-    return speed.take.name
 
 
 def _at(row: pd.Series[float], height: object) -> tuple[float, float]:
@@ -272,13 +267,6 @@ def _named_once(axes: Axes, level: pd.DataFrame, height: object, took: Any) -> I
         if new:
             more = f"\nand {len(new) - 1} more" if len(new) > 1 else ""
             yield Label(axes, _at(first, height), new[0] + more, bool(first["kept"]))
-
-
-def _engines(level: pd.DataFrame, first: str) -> str:
-    worst = float(level["error"].max())
-    names = dict.fromkeys([first, *level["engine"]])
-    said = ", ".join(names) + (f": {error_text(worst)}" if worst else "")
-    return textwrap.fill(said, LINE)
 
 
 def _neighbors(level: pd.DataFrame) -> Iterator[pd.DataFrame]:
