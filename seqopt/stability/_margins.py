@@ -22,7 +22,7 @@ from seqopt.network.build import network_of
 from seqopt.network.network import Network
 from seqopt.scene.scene import Scene
 from seqopt.stability._held_states import CompileHeld, HeldStates, compile_held, node_assembly
-from seqopt.stability._prover import DIRECTIONS, FINE, NEAR, in_every_direction, sideways
+from seqopt.stability._prover import DIRECTIONS, FINE, NEAR, hulls, sideways
 from seqopt.stability._screens import FALLS, STANDS, Part, Screen, held_parts
 from seqopt.stability.assessment import ROUGHEST, bonded
 from seqopt.stability.limit_analysis import CAP, GAP, Case
@@ -129,9 +129,9 @@ class Margins:
         brackets = np.array(self._brackets(f"tilt {count}", pulls, bricks, grips))
         angles = 2 * np.pi * np.arange(count) / count
         known = np.where(np.isfinite(brackets[..., 0]), np.maximum(brackets[..., 0], 0.0), np.nan)
-        least = [np.nan_to_num(in_every_direction(angles, row)[0]) for row in known.T]
+        least = np.nan_to_num(hulls(angles, known.T)[0])
         most = np.maximum(brackets[..., 1].min(axis=0), 0.0)
-        return np.asarray(np.arctan(np.stack([np.array(least), most], axis=1)))
+        return np.asarray(np.arctan(np.stack([least, most], axis=1)))
 
     def friction(
         self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None, step: float = 2.0**-7
