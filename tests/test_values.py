@@ -36,7 +36,7 @@ from seqopt.scene.boxes import boxes
 from seqopt.scene.library.common import _overlaps
 from seqopt.scene.shape import Surface
 from seqopt.sequence.two_robots import sequential
-from seqopt.stability._held_states import _HoldingForces, _Known, first_directions
+from seqopt.stability._held_states import _HoldingForces, _Known
 from seqopt.stability._load_factor import load_factor
 from seqopt.stability._prover import Prover
 from seqopt.stability._step_verdicts import each_verdict
@@ -79,7 +79,7 @@ def values(arch25):
         HeldPostures(np.array([0]), np.array([1]), np.array([[0]]), (np.ones((1, 6, 2)),)),
         read_hands(network, grips[None], [[2]], np.ones((1, 1, 3))),
         *_Known(assembly, bonded(assembly, DRY)).motions_of(-np.ones((2, 6))),
-        *(_HoldingForces(0.0, np.zeros(1)), first_directions(4, 1)),
+        _HoldingForces(0.0, np.zeros(1)),
         *each_verdict(network, sequential(network)[:1], EPOXY),
     )
     return {type(value).__name__: value for value in every}

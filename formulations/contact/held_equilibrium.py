@@ -21,23 +21,22 @@ method goes on from the basis of the set before.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import highspy
 import numpy as np
 from scipy import sparse
 
-from seqopt.arrays import Floats, Ints
+from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.contact.assembly import Assembly
-from seqopt.stability._held_states import (
-    Directions,
-    Enough,
-    HeldProgram,
-    better_directions,
-    first_directions,
-)
+from seqopt.stability._held_states import Enough, HeldProgram
 from seqopt.stability.limit_analysis import CAP, Answer, Case, Claim, limits
 
+_SIDES = 8  # of a cone to start with, the axes of its contact among them
+_SPREAD = np.array([p for p in product((-1.0, 0.0, 1.0), repeat=3) if any(p)])
+_GAIN = 1e-7  # least gain for which a direction joins, over the largest entry of the motion
 ROUNDS = 12  # of refinement
 GROWN = 4  # times as many directions as at the start are too many: it starts again
 FREE = highspy.kHighsInf
@@ -51,6 +50,46 @@ OPTIONS: dict[str, Any] = {
     "simplex_scale_strategy": 0,  # programs come scaled; without, none went in circles
     "simplex_iteration_limit": 5000,  # of one answer; what takes longer has stalled
 }
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Directions(FrozenValue):
+    """Directions in which corners and grips act.
+
+    ``owner`` (n,): corner, or grip counted on after the corners. ``unit`` (n, 3): unit vectors;
+    those of a corner have no normal part.
+    """
+
+    owner: Ints
+    unit: Floats
+
+    def joined(self, other: Directions) -> Directions:
+        """Return these directions and others after them."""
+        owner = np.concatenate([self.owner, other.owner])
+        return Directions(owner, np.concatenate([self.unit, other.unit]))
+
+
+def first_directions(corners: int, grips: int) -> Directions:
+    """Return directions to start with, the same ones for every corner and for every grip."""
+    angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
+    flat = np.stack([np.zeros(_SIDES), np.cos(angle), np.sin(angle)], axis=1)
+    space = _SPREAD / np.linalg.norm(_SPREAD, axis=1, keepdims=True)
+    of_corners = Directions(np.repeat(np.arange(corners), _SIDES), np.tile(flat, (corners, 1)))
+    of_grips = corners + np.repeat(np.arange(grips), len(space))
+    return of_corners.joined(Directions(of_grips, np.tile(space, (grips, 1))))
+
+
+def better_directions(known: Directions, along: Floats, wanted: Bools) -> Directions:
+    """Return the best directions of corners and grips where those known are not as good.
+
+    ``along`` (m, 3): what a force of every corner or grip is worth, per component; the normal parts
+    of corners are zero. ``wanted`` (m,): whose directions are asked for.
+    """
+    best = np.zeros(len(along))
+    np.maximum.at(best, known.owner, np.einsum("ij,ij->i", known.unit, along[known.owner]))
+    size = np.linalg.norm(along, axis=1)
+    which = np.flatnonzero(wanted & (size - best > _GAIN))
+    return Directions(which, along[which] / size[which, None])
 
 
 class _HeldEquilibrium:
@@ -86,7 +125,9 @@ class _HeldEquilibrium:
         grown = (case.tension, case.cohesion, case.payload, case.applied)
         grows = any((*(growth for _, growth in grown), *case.pull))
         cost, most = (case.sense.value, CAP) if grows else (0.0, 0.0)
-        self._add(np.array([cost]), np.array([most]), sparse.csc_array(self._growth()[:, None]))
+        pulls, held = self._case.loads(self._assembly)[1], np.full(self._grips, case.payload[1])
+        z = np.concatenate([pulls - self._pressed(self._cut[1]), -self._disc[1], -held])
+        self._add(np.array([cost]), np.array([most]), sparse.csc_array(z[:, None]))
         self._join(first_directions(self._corners, self._grips))
         self._first = len(self._owner)
 
@@ -106,12 +147,6 @@ class _HeldEquilibrium:
         payload = self._case.payload[0] * self._held / self._assembly.scales[0]
         balance = self._pressed(self._cut[0]) - self._case.loads(self._assembly)[0]
         return np.concatenate([balance, self._disc[0], payload])
-
-    def _growth(self) -> Floats:
-        """Return the column of z."""
-        balance = self._case.loads(self._assembly)[1] - self._pressed(self._cut[1])
-        payload = np.full(self._grips, self._case.payload[1])
-        return np.concatenate([balance, -self._disc[1], -payload])
 
     def _join(self, new: Directions) -> None:
         """Add the columns of directions: rays of cones, points of discs, and grips."""
@@ -187,8 +222,9 @@ class _HeldEquilibrium:
                 return self._forces()
             if status == highspy.HighsModelStatus.kInfeasible:
                 _, known, ray = self._solver.getDualRay()
-                if known:
-                    return self._reason(np.array(ray))
+                if known:  # a motion that says why there are no forces
+                    motion = -np.array(ray) * (np.sign(self._right() @ ray) or 1.0)
+                    return self._nothing(Claim.INFEASIBLE, motion[: self._lines])
             self._solver.clearSolver()
         return self._nothing(Claim.STALLED, np.zeros(self._lines))
 
@@ -202,11 +238,6 @@ class _HeldEquilibrium:
         motion = -np.array(solution.row_dual)[: self._lines].reshape(-1, 6)
         value = float(x[0])
         return Answer(Claim.SOLVED, value, force[: self._corners], force[self._corners :], motion)
-
-    def _reason(self, ray: Floats) -> Answer:
-        """Return the answer that there are no forces, with the motion that a ray is."""
-        ray = ray * (np.sign(self._right() @ ray) or 1.0)
-        return self._nothing(Claim.INFEASIBLE, -ray[: self._lines])
 
     def _nothing(self, claim: Claim, motion: Floats) -> Answer:
         forces = np.zeros((self._corners, 3)), np.zeros((self._grips, 3))

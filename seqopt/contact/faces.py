@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from seqopt.arrays import Floats, frozen
-from seqopt.contact._prop_grips import PropGrips, added, prop_grips
+from seqopt.contact._prop_grips import added, prop_grips
 from seqopt.contact.assembly import Assembly
 from seqopt.errors import SceneError
 from seqopt.network.network import GROUND, Network
@@ -128,15 +128,7 @@ def step_assembly(
     held = [(node, robot.payload) for node, robot in pairs if node is not None]
     bare = bare_assembly(network, bricks, known)
     props = prop_grips(network, bricks, held=bool(held))
-    return _with_grips(bare, network, held, props)
-
-
-def _with_grips(
-    bare: Assembly, network: Network, held: Sequence[tuple[int, float]], props: PropGrips
-) -> Assembly:
-    """Return an assembly with grips of robots, nodes and payloads, N, and of props."""
-    placed = network.scene.placed
-    block = {node: i for i, brick in enumerate(placed) for node in brick.nodes}
+    block = {node: i for i, brick in enumerate(network.scene.placed) for node in brick.nodes}
     nodes = [*(node for node, _ in held), *props.nodes]
     return replace(
         bare,
@@ -204,7 +196,9 @@ def _contact(
     sign = np.sign(axes[0] @ (np.array(between[-1].position) - below)) or 1.0
     axes = axes * np.array([[sign], [1.0], [sign]])
     common = _overlap(axes, point, between, name)
-    middle = point + _centroid(common) @ axes[1:]
+    (x, y), (u, v) = common.T, np.roll(common, -1, axis=0).T
+    turn = x * v - u * y  # a corner that occurs twice does not count twice
+    middle = point + np.array([(x + u) @ turn, (y + v) @ turn]) / (3.0 * turn.sum()) @ axes[1:]
     before = -_face_distance(between[0], -axes[0], middle) if len(between) > 1 else 0.0
     ends = (before, _face_distance(between[-1], axes[0], middle))
     _require_touching(name, between, ends, _distance_beside(common), thickness)
@@ -251,13 +245,6 @@ def _clip(polygon: Floats, other: Floats) -> Floats:
                 kept.append(polygon[i])
         polygon = np.array(kept).reshape(-1, 2)
     return polygon
-
-
-def _centroid(polygon: Floats) -> Floats:
-    """Return the centroid (2,) of a polygon; a corner that occurs twice does not count twice."""
-    (x, y), (u, v) = polygon.T, np.roll(polygon, -1, axis=0).T
-    turn = x * v - u * y
-    return np.asarray([(x + u) @ turn, (y + v) @ turn] / (3.0 * turn.sum()))
 
 
 def _polygon_area(polygon: Floats) -> float:

@@ -105,27 +105,28 @@ class Screen:
         same. Result (S,): 1 where it is proven that the structure stands, -1 where it is proven
         that it falls, and 0 where neither is. Raises `GripError` as `held_places` does.
         """
-        out = np.zeros(len(np.asarray(held)), dtype=np.int8)
-        for own, part, places, loads in held_parts(self.network, bricks, held, payload):
-            found = _verdicts(self._upright(part).bracket(places, loads, _decided))
-            rows = np.flatnonzero(found == STANDS) if self.tilt else ()
-            if len(rows):
-                survived = self._tilted(part).survive
-                found[rows] = _of_both(*survived(np.tan(self.tilt), places[rows], loads[rows]))
-            out[own] = found
-        return out
+        return self._found(bricks, held, payload, solve=True)
 
     def recalled(
         self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None
     ) -> NDArray[np.int8]:
         """Return the same by what is known already: no program is solved."""
+        return self._found(bricks, held, payload, solve=False)
+
+    def _found(
+        self, bricks: int, held: ArrayLike, payload: ArrayLike | None, *, solve: bool
+    ) -> NDArray[np.int8]:
         out = np.zeros(len(np.asarray(held)), dtype=np.int8)
         for own, part, places, loads in held_parts(self.network, bricks, held, payload):
-            found = _verdicts(self._upright(part).known(places, loads))
+            states = self._upright(part)
+            asked = places, loads
+            bracket = states.bracket(*asked, _decided) if solve else states.known(*asked)
+            found = _of_both(bracket[:, 1] <= EXACT, bracket[:, 0] > EXACT)
             rows = np.flatnonzero(found == STANDS) if self.tilt else ()
             if len(rows):
-                known = self._tilted(part).known
-                found[rows] = _of_both(*known(np.tan(self.tilt), places[rows], loads[rows]))
+                tilted = self._tilted(part)
+                ask = tilted.survive if solve else tilted.known
+                found[rows] = _of_both(*ask(np.tan(self.tilt), places[rows], loads[rows]))
             out[own] = found
         return out
 
@@ -165,11 +166,6 @@ def _lacking(
 def _decided(bracket: Floats) -> Bools:
     """Return where brackets (S, 2) prove that no bond is lacking, or that some is."""
     return np.asarray((bracket[:, 1] <= EXACT) | (bracket[:, 0] > EXACT))
-
-
-def _verdicts(bracket: Floats) -> NDArray[np.int8]:
-    """Return verdicts by brackets (S, 2) of the bond that is lacking."""
-    return _of_both(bracket[:, 1] <= EXACT, bracket[:, 0] > EXACT)
 
 
 def _of_both(stands: Bools, falls: Bools) -> NDArray[np.int8]:

@@ -23,7 +23,7 @@ from seqopt.stability.limit_analysis import CAP, GAP
 _FIRST = tuple(range(0, FINE, FINE // 4))
 _FAR = 1.5  # times the pull that must be survived: what is survived by so much is far enough
 _TURN = 2 * np.pi / FINE
-_ANGLES = _TURN * np.arange(FINE)
+_ANGLES: Floats = _TURN * np.arange(FINE, dtype=float)
 
 
 class TiltedStates:

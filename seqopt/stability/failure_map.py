@@ -205,7 +205,7 @@ def _brick_map(
         whole = pd.concat([getattr(each, name) for each in found.values()]).assign(axis="bricks")
         groups = [rows for _, rows in whole.groupby(["build", "holds"], sort=False)]
         tables.append(pd.concat(groups, ignore_index=True))
-    return FailureMap(*tables, found[usual].motions, usual)
+    return FailureMap(tables[0], tables[1], found[usual].motions, usual)
 
 
 def _values(scene: Scene, axis: str, values: Sequence[float]) -> tuple[Sequence[float], float]:
