@@ -53,8 +53,8 @@ OPTIONS: dict[str, Any] = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Directions(FrozenValue):
-    """Directions in which corners and grips act.
+class _Directions(FrozenValue):
+    """_Directions in which corners and grips act.
 
     ``owner`` (n,): corner, or grip counted on after the corners. ``unit`` (n, 3): unit vectors;
     those of a corner have no normal part.
@@ -63,23 +63,23 @@ class Directions(FrozenValue):
     owner: Ints
     unit: Floats
 
-    def joined(self, other: Directions) -> Directions:
+    def joined(self, other: _Directions) -> _Directions:
         """Return these directions and others after them."""
         owner = np.concatenate([self.owner, other.owner])
-        return Directions(owner, np.concatenate([self.unit, other.unit]))
+        return _Directions(owner, np.concatenate([self.unit, other.unit]))
 
 
-def first_directions(corners: int, grips: int) -> Directions:
+def _first_directions(corners: int, grips: int) -> _Directions:
     """Return directions to start with, the same ones for every corner and for every grip."""
     angle = 2 * np.pi * np.arange(_SIDES) / _SIDES
     flat = np.stack([np.zeros(_SIDES), np.cos(angle), np.sin(angle)], axis=1)
     space = _SPREAD / np.linalg.norm(_SPREAD, axis=1, keepdims=True)
-    of_corners = Directions(np.repeat(np.arange(corners), _SIDES), np.tile(flat, (corners, 1)))
+    of_corners = _Directions(np.repeat(np.arange(corners), _SIDES), np.tile(flat, (corners, 1)))
     of_grips = corners + np.repeat(np.arange(grips), len(space))
-    return of_corners.joined(Directions(of_grips, np.tile(space, (grips, 1))))
+    return of_corners.joined(_Directions(of_grips, np.tile(space, (grips, 1))))
 
 
-def better_directions(known: Directions, along: Floats, wanted: Bools) -> Directions:
+def _better_directions(known: _Directions, along: Floats, wanted: Bools) -> _Directions:
     """Return the best directions of corners and grips where those known are not as good.
 
     ``along`` (m, 3): what a force of every corner or grip is worth, per component; the normal parts
@@ -89,7 +89,7 @@ def better_directions(known: Directions, along: Floats, wanted: Bools) -> Direct
     np.maximum.at(best, known.owner, np.einsum("ij,ij->i", known.unit, along[known.owner]))
     size = np.linalg.norm(along, axis=1)
     which = np.flatnonzero(wanted & (size - best > _GAIN))
-    return Directions(which, along[which] / size[which, None])
+    return _Directions(which, along[which] / size[which, None])
 
 
 class _HeldEquilibrium:
@@ -111,7 +111,7 @@ class _HeldEquilibrium:
 
     def _start(self) -> None:
         """Write the program down with the directions to start with."""
-        self._directions = Directions(np.zeros(0, np.int64), np.zeros((0, 3)))
+        self._directions = _Directions(np.zeros(0, np.int64), np.zeros((0, 3)))
         self._owner = np.zeros(0, np.int64)  # of every column but the first, and its force
         self._force = np.zeros((0, 3))
         self._held = np.zeros(self._grips)  # payloads in the program
@@ -128,7 +128,7 @@ class _HeldEquilibrium:
         pulls, held = self._case.loads(self._assembly)[1], np.full(self._grips, case.payload[1])
         z = np.concatenate([pulls - self._pressed(self._cut[1]), -self._disc[1], -held])
         self._add(np.array([cost]), np.array([most]), sparse.csc_array(z[:, None]))
-        self._join(first_directions(self._corners, self._grips))
+        self._join(_first_directions(self._corners, self._grips))
         self._first = len(self._owner)
 
     def _add(self, cost: Floats, most: Floats, matrix: sparse.csc_array) -> None:
@@ -148,7 +148,7 @@ class _HeldEquilibrium:
         balance = self._pressed(self._cut[0]) - self._case.loads(self._assembly)[0]
         return np.concatenate([balance, self._disc[0], payload])
 
-    def _join(self, new: Directions) -> None:
+    def _join(self, new: _Directions) -> None:
         """Add the columns of directions: rays of cones, points of discs, and grips."""
         corner = new.owner < self._corners
         at, unit, by = new.owner[corner], new.unit[corner], new.owner[~corner]
@@ -243,14 +243,14 @@ class _HeldEquilibrium:
         forces = np.zeros((self._corners, 3)), np.zeros((self._grips, 3))
         return Answer(claim, np.nan, *forces, motion.reshape(-1, 6))
 
-    def _better(self, motion: Floats) -> Directions:
+    def _better(self, motion: Floats) -> _Directions:
         size = np.abs(motion).max(initial=0.0) or 1.0
         along = -(self._map.T @ (motion.ravel() / size)).reshape(-1, 3)
         corner = along[: self._corners]
         closing = corner[:, 0] + self._case.friction * np.linalg.norm(corner[:, 1:], axis=1)
         corner[:, 0] = 0.0
         cones = (closing > 0) | bool(self._disc.size)
-        return better_directions(self._directions, along, np.concatenate([cones, self._held > 0]))
+        return _better_directions(self._directions, along, np.concatenate([cones, self._held > 0]))
 
 
 def compile_held(assembly: Assembly, case: Case) -> HeldProgram:
