@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import argparse
 import re
+from argparse import SUPPRESS
 from collections.abc import Iterable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import version
 from types import ModuleType
-from typing import Any, NoReturn
+from typing import Any, NoReturn, get_type_hints
 
 from seqopt._cli.answer import Status
-from seqopt._cli.screens import ALL, HelpAll, first_screen
-from seqopt._cli.terminal import columns, complain, show, wrapped
+from seqopt._cli.terminal import columns, complain, show
 from seqopt.errors import did_you_mean
 
 EXAMPLES = """Three examples:
@@ -28,6 +29,8 @@ EXAMPLES = """Three examples:
 seqopt --help names all commands, seqopt COMMAND --help what each is for, and
 seqopt COMMAND --help-all what it can do.
 """
+LINES = 40  # of a screen
+ALL = "--help-all"
 WRONG_CHOICE = re.compile(r"invalid choice: '(.*?)' \(choose from (.*)\)")
 UNKNOWN = re.compile(r"unrecognized arguments: (--?[^ =]+)")
 MISSING = "the following arguments are required"
@@ -76,8 +79,7 @@ def _layout(prog: str) -> argparse.HelpFormatter:
 class _Command:
     """A command in a few words, and its module of `seqopt._cli`, loaded when it is asked for.
 
-    That has ``add_arguments``, ``run``, ``DESCRIPTION``, ``EXAMPLES``, and ``USAGE`` where it has
-    more options than a reader takes in at once.
+    Its ``run`` says by its signature what it is asked: a class of `seqopt._cli.options`.
     """
 
     about: str
@@ -86,6 +88,11 @@ class _Command:
     def load(self) -> ModuleType:
         """Return the module."""
         return import_module(f"seqopt._cli.{self.module}")
+
+    @property
+    def asked(self) -> Any:
+        """The class of what it is asked."""
+        return get_type_hints(self.load().run)["asked"]
 
 
 COMMANDS = {
@@ -137,6 +144,14 @@ class _Parser(argparse.ArgumentParser):
         self.exit(Status.BAD_INPUT)
 
 
+class _HelpAll(argparse.Action):
+    """The option that prints the help of a command with all its options."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        show(parser.format_help())
+        parser.exit()
+
+
 class _Version(argparse.Action):
     """The option that prints the version, which is looked up then alone."""
 
@@ -158,9 +173,8 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
         "seqopt COMMAND --help-all has all of its options.",
     )
     about = "show program's version number and exit"
-    whole.add_argument("--version", action=_Version, nargs=0, default=argparse.SUPPRESS, help=about)
+    whole.add_argument("--version", action=_Version, nargs=0, default=SUPPRESS, help=about)
     whole.color = False  # signs of color would be printed as codes
-    whole.set_defaults(quiet=False, json=False)
     commands = whole.add_subparsers(
         required=True, title="commands", metavar="COMMAND", dest="command"
     )
@@ -168,22 +182,57 @@ def parser(asked: str | None = None) -> argparse.ArgumentParser:
         added = commands.add_parser(name, help=command.about, formatter_class=_layout)
         added.color = False
         if asked in (None, name):
-            _fill(added, command.load())
+            from seqopt._cli.signatures import fill  # noqa: PLC0415  # of which help needs nothing
+
+            all_help = "show every option of the command, and exit"
+            added.add_argument(ALL, action=_HelpAll, nargs=0, default=SUPPRESS, help=all_help)
+            fill(added, command.asked)
         if asked == name:
             whole.asked, whole.spoken = name, tuple(added._option_string_actions)
     return whole
 
 
-def _fill(command: argparse.ArgumentParser, module: ModuleType) -> None:
-    """Give a command what its module says."""
-    if usages := getattr(module, "USAGE", ()):
-        command.usage = "\n       ".join(f"{command.prog} {usage}" for usage in usages)
-    lines = "\n".join(f"  {example}" for example in module.EXAMPLES)
-    command.description = wrapped(module.DESCRIPTION)
-    about = "show every option of the command, and exit"
-    command.add_argument(ALL, action=HelpAll, nargs=0, default=argparse.SUPPRESS, help=about)
-    command.epilog = f"example{'s' * (len(module.EXAMPLES) > 1)}:\n{lines}"
-    module.add_arguments(command)
+def request(words: Sequence[str], tell: Any = None) -> tuple[str, Any]:
+    """Return the command that words ask for, and what it is asked; a wrong word ends the program.
+
+    ``tell``: told how far it is.
+    """
+    options = vars(parser(asked_command(words)).parse_args(words))
+    from seqopt._cli.signatures import parsed  # noqa: PLC0415  # of which help needs nothing
+
+    name = options.pop("command")
+    more = {"words": (*words,)} | ({} if tell is None else {"tell": tell})
+    return name, parsed(COMMANDS[name].asked, options, **more)
+
+
+def first_screen(command: argparse.ArgumentParser) -> str:
+    """Return the help of a command on one screen: the whole of it where that fits.
+
+    Else what must be given, what an example gives, and what has no dashes; of its help as much as
+    stands before the first semicolon.
+    """
+    whole = command.format_help()
+    if whole.count("\n") <= LINES or command._subparsers is not None:
+        return whole
+    given = {word.partition("=")[0] for word in (command.epilog or "").split()}
+    first = [
+        action
+        for action in command._actions
+        if action.required or not action.option_strings or given & {*action.option_strings}
+    ]
+    more = len(command._actions) - len(first) - 2  # both forms of help are no answer to more
+    lines = command._get_formatter()
+    lines.add_usage(command.usage, first, ())
+    lines.add_text(command.description)
+    lines.start_section("what a first use needs")
+    brief = [*map(copy, first)]
+    for action in brief:
+        action.help = (action.help or "").partition("; ")[0]
+    lines.add_arguments(brief)
+    lines.end_section()
+    lines.add_text(command.epilog)
+    lines.add_text(f"{command.prog} {ALL} has {more} more options, by question.")
+    return lines.format_help()
 
 
 def asked_command(words: Sequence[str]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from seqopt._cli.options import Asked
 from seqopt._cli.words.given import is_folder
 from seqopt._files import (
     csv_text,
@@ -83,12 +83,6 @@ def speed_files(table: SpeedTable | None) -> dict[str, bytes | str]:
     from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
 
     return files | picture_files("speed", table.plot())
-
-
-TABLES = {
-    "--tables plan|all": "which tables are written: those of the plan, or all, with every choice of"
-    " every open step beside: megabytes (default: plan)"
-}
 
 
 def _steps_table(plan: ShownBuild) -> pd.DataFrame:
@@ -198,40 +192,39 @@ def written_to(folder: Path | None, *, page: bool = True) -> str:
     return f"written to {folder}" + f"; {folder / PAGE} shows it step by step" * page
 
 
-def write_outputs(
-    options: argparse.Namespace, files: Callable[[], Mapping[str, bytes | str]]
-) -> tuple[Path, ...]:
+def write_outputs(asked: Asked, files: Callable[[], Mapping[str, bytes | str]]) -> tuple[Path, ...]:
     """Write the folder that a command was asked for, whole, if it was asked for one; return it.
 
     Raises `FileError` if a file would overwrite what the command reads, or cannot be written.
     """
-    if options.out is None:
+    if asked.out is None:
         return ()
-    options.tell("writing the plan")
+    asked.tell("writing the plan")
     made = files()
-    require_apart([options.out / name for name in made], _inputs(options))
-    write_folder(options.out, made)
-    return (options.out,)
+    require_apart([asked.out / name for name in made], _inputs(asked))
+    write_folder(asked.out, made)
+    return (asked.out,)
 
 
-def require_out(options: argparse.Namespace, *names: str) -> None:
+def require_out(asked: Asked, *names: str) -> None:
     """Raise `FileError`, before anything is computed, if the folder asked for cannot be made.
 
     Nor may what will have one of some names in it be what the command reads.
     """
-    if options.out is not None:
-        require_folder(options.out)
-        keep_apart(options, *(options.out / name for name in names))
+    if asked.out is not None:
+        require_folder(asked.out)
+        keep_apart(asked, *(asked.out / name for name in names))
 
 
-def keep_apart(options: argparse.Namespace, *outputs: Path | None) -> None:
+def keep_apart(asked: Asked, *outputs: Path | None) -> None:
     """Raise `FileError` if outputs are one file, or one that the command reads."""
-    require_apart([path for path in outputs if path is not None], _inputs(options))
+    require_apart([path for path in outputs if path is not None], _inputs(asked))
 
 
-def _inputs(options: argparse.Namespace) -> list[Path]:
-    asked = (options.scene, getattr(options, "plan", None), getattr(options, "schedule", None))
-    named = [Path(name) for name in asked if isinstance(name, str | Path)]
+def _inputs(asked: Asked) -> list[Path]:
+    """Return the files that a command reads, those in the folder of a plan among them."""
+    given = (getattr(asked, name, None) for name in ("scene", "plan", "schedule"))
+    named = [Path(name) for name in given if isinstance(name, str | Path)]
     folders = [path for path in named if is_folder(path)]
     inside = [path / name for path in folders for name in ("scene.json", "plan.csv")]
     return [path for path in (*named, *inside) if str(path) not in builtin_scenes()]

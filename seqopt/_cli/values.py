@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import math
 import re
 from collections.abc import Iterable, Sequence
@@ -10,8 +9,9 @@ from dataclasses import replace
 from math import radians
 from typing import Any
 
-from seqopt.contact.curing import Curing, _find_curing
-from seqopt.contact.mortar import MORTARS, Mortar, _mortar_name, find_mortar
+from seqopt._cli.options import Cost, Posed, Stands
+from seqopt.contact.curing import _find_curing
+from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
 from seqopt.errors import ProblemError, SceneError, SeqoptError, StepError, did_you_mean
 from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.problem._limit_words import LARGEST, NAMES, number_word, split_word
@@ -187,22 +187,6 @@ def parse_options(formulation: Formulation | str, texts: Sequence[str]) -> dict[
     return out
 
 
-def asked_mortars(options: argparse.Namespace) -> dict[str, Mortar]:
-    """Return the mortar that is named, or dry joints and the epoxy, by what they are called.
-
-    The last is what the build counts on. Numbers that are given take the place of its own, and
-    friction in dry joints as well.
-    """
-    given = {
-        name: number_word(text, f"--{name.replace('_', '-')}", zero=True)
-        for name in ("friction", "tensile_strength", "cohesion")
-        if (text := getattr(options, name)) is not None
-    }
-    own = replace(mortar_word(options.mortar or "epoxy", "--mortar"), **given)
-    dry = () if options.mortar else (Mortar(friction=own.friction),)
-    return {_mortar_name(mortar): mortar for mortar in (*dry, own)}
-
-
 def mortar_word(text: str | Mortar, where: str) -> Mortar:
     """Return a mortar by its words; ``where`` is the argument, for messages."""
     if isinstance(text, Mortar):  # of Python
@@ -215,28 +199,26 @@ def mortar_word(text: str | Mortar, where: str) -> Mortar:
         raise ProblemError(f"{where} {text}{hint}: {known}") from error
 
 
-def asked_standing(options: argparse.Namespace) -> Standing | None:
+def asked_standing(asked: Stands) -> Standing | None:
     """Return what is demanded of the stability of states, if anything is."""
-    curing = getattr(options, "curing", [])
-    names = [name for name in ("tilt", "friction") if getattr(options, name, None) is not None]
-    names += ["curing"] * bool(curing)
-    if options.stands is None:
+    said = {"tilt": asked.tilt, "friction": asked.friction}
+    given = {
+        name: number_word(text, f"--{name}", zero=True)
+        for name, text in said.items()
+        if text is not None and asked.stands is not None
+    }
+    if asked.stands is None:
+        names = [name for name in (*said, "curing") if getattr(asked, name)]
         if names:
             raise ProblemError(f"--{names[0]}: it goes with --stands; give --stands dry, say")
         return None
-    mortar = mortar_word(options.stands, "--stands")
-    numbers = [name for name in names if name != "curing"]
-    given = {name: number_word(getattr(options, name), f"--{name}", zero=True) for name in numbers}
-    tilt = radians(given.pop("tilt", 0.0))
-    cures = _curing_words(curing) if curing else None
-    return Standing(replace(mortar, **given), tilt, cures)
-
-
-def _curing_words(words: Sequence[str]) -> Curing:
+    mortar = mortar_word(asked.stands, "--stands")
     try:
-        return _find_curing(" ".join(words))
+        cures = _find_curing(" ".join(asked.curing)) if asked.curing else None
     except SceneError as error:
         raise ProblemError(f"--{error}") from error
+    tilt = radians(given.pop("tilt", 0.0))
+    return Standing(replace(mortar, **given), tilt, cures)
 
 
 def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:
@@ -254,13 +236,13 @@ def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:
     return FreeRules(**given)  # type: ignore[arg-type]
 
 
-def asked_criterion(options: argparse.Namespace) -> Criterion:
+def asked_criterion(asked: Cost) -> Criterion:
     """Return the criterion that a command is asked for, with what it ranks among."""
     usual = DEFAULTS["any other"].criterion.name
-    criterion = parse_criterion(options.criteria or usual, options.crown)
+    criterion = parse_criterion(asked.criteria or usual, asked.crown)
     kinds: dict[str, Any] = {"ranked": Ranked, "among": Among}
     for name, kind in kinds.items():
-        if (text := getattr(options, name)) is not None:
+        if (text := getattr(asked, name)) is not None:
             if not isinstance(criterion, RankSum):
                 raise ProblemError(f"--{name} {text}: {criterion.name} has no ranks; leave it out")
             criterion = replace(criterion, **{name: kind(text)})
@@ -289,11 +271,11 @@ def parse_criterion(text: str | Criterion, crown: str | None = None) -> Criterio
     return RankSum(text, tuple(terms), tuple(terms))
 
 
-def asked_resources(options: argparse.Namespace, progress: Tell | None = None) -> Resources:
+def asked_resources(asked: Posed, progress: Tell | None = None) -> Resources:
     """Return what a computation may use."""
-    workers = count_word(options.workers, "--workers", MOST_WORKERS)
-    most = None if options.max_memory is None else parse_size(options.max_memory)
-    return Resources(workers, None, options.cache, most, progress)
+    workers = count_word(asked.workers, "--workers", MOST_WORKERS)
+    most = None if asked.max_memory is None else parse_size(asked.max_memory)
+    return Resources(workers, None, asked.cache, most, progress)
 
 
 def parse_size(text: str) -> float:

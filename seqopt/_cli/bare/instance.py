@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
 import shlex
 from collections.abc import Sequence
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 from seqopt._cli.answer import Answer
-from seqopt._cli.commands import optimize
-from seqopt._cli.options import WRITTEN, declare
+from seqopt._cli.commands.optimize import Optimize
 from seqopt._cli.outputs import keep_apart
 from seqopt._cli.posing import asked_problem
-from seqopt._cli.screens import question
 from seqopt._cli.values import parse_time_limit
-from seqopt._cli.words.given import file_name, take
+from seqopt._cli.words.given import file_name
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.instances._files import WRITERS, save_instance
@@ -23,17 +20,6 @@ from seqopt.plan._compiled import compile_instance
 from seqopt.problem._limit_words import number_word
 from seqopt.work._clock import Clock
 
-DESCRIPTION = (
-    "Write the graph of a problem: its nodes and arcs, what they take, what is to be small and "
-    "what is capped. Whoever reads it needs no scene. The options are those of optimize; what "
-    "concerns the search alone is left aside."
-)
-USAGE = ("[SCENE] [--out FILE] [options of optimize]",)
-EXAMPLES = (
-    "seqopt instance arch25 --out arch25.npz",
-    "seqopt instance arch25 --budget travel=0.8 --out arch25.mps",
-    "seqopt instance chain:bricks=7 --schedule free --aim minmax,steps --out chain7",
-)
 SAID = ("--quiet", "--json")
 OUT = (
     "file to write: .npz (the instance), .mps, .lp or .pbtxt (a program, the last for CP-SAT); "
@@ -41,43 +27,60 @@ OUT = (
 )
 
 
-def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``instance``: those of ``optimize``, and how it is written."""
-    optimize.add_arguments(command)
-    out = next(action for action in command._actions if action.dest == "out")
-    out.metavar, out.help = "FILE", OUT
-    about = {
-        "--name NAME": "what it is called (default: as the file)",
-        "--below VALUE": "leave out states of which the first aim, a worst step, takes more; "
-        "plans that are better than this stay",
-    }
-    declare(question(command, WRITTEN), about)
+@dataclass(frozen=True, kw_only=True)
+class Instance(Optimize):
+    """Write the graph of a problem: its nodes and arcs, what they take, what is small and capped.
+
+    Whoever reads it needs no scene. The options are those of optimize; what concerns the search
+    alone is left aside.
+
+    Usage
+    [SCENE] [--out FILE] [options of optimize]
+
+    What is written and printed?
+    out : FILE
+        file to write: .npz (the instance), .mps, .lp or .pbtxt (a program, the last for CP-SAT);
+        without an end a folder with all of them
+    name : NAME
+        what it is called (default: as the file)
+    below : VALUE
+        leave out states of which the first aim, a worst step, takes more; plans that are better
+        than this stay
+
+    Examples
+    --------
+    seqopt instance arch25 --out arch25.npz
+    seqopt instance arch25 --budget travel=0.8 --out arch25.mps
+    seqopt instance chain:bricks=7 --schedule free --aim minmax,steps --out chain7
+    """
+
+    name: str | None = None
+    below: str | None = None
 
 
-def run(options: argparse.Namespace) -> Answer:
+def run(asked: Instance) -> Answer:
     """Write the instance of the problem that is asked for."""
-    path = options.out and Path(options.out)
+    path = asked.out
     if path and path.suffix not in ("", *WRITERS):
         raise ProblemError(f"--out {path}: give a name with {', '.join(WRITERS)}, or a folder")
-    if options.bases is not None:
+    if asked.bases is not None:
         raise ProblemError("--bases: an instance is of one scene; leave it out")
-    below = number_word(options.below, "--below") if options.below is not None else float("inf")
-    options.out, options.command = None, "optimize"
-    clock = Clock(parse_time_limit(options.time_limit))
+    below = number_word(asked.below, "--below") if asked.below is not None else float("inf")
+    clock = Clock(parse_time_limit(asked.time_limit))
     with clock.needed("posing the problem"):
-        problem = asked_problem(options).problem
+        problem = asked_problem(replace(asked, out=None)).problem
     if path is None:
         path = file_name(problem.engine.network.scene.name, ".npz")
-        take(options, f"file: {path}; --out names another, or a folder for every format")
-    named = None if options.formulation is None else find_formulation(options.formulation)
-    options.tell("computing all that arcs take")
+        asked.taken.append(f"file: {path}; --out names another, or a folder for every format")
+    named = None if asked.formulation is None else find_formulation(asked.formulation)
+    asked.tell("computing all that arcs take")
     aim = None if named is None else named.aim
-    facts = {"made_by": _made_by(options.words)}
-    name = options.name or path.stem
+    facts = {"made_by": _made_by(asked.words)}
+    name = asked.name or path.stem
     with clock.needed("writing down the graph"):
         instance = compile_instance(problem, name=name, aim=aim, below=below, facts=facts)
-    options.tell("writing the instance")
-    keep_apart(options, path)
+    asked.tell("writing the instance")
+    keep_apart(asked, path)
     save_instance(instance, path)
     limited = ", ".join(f"{name} {most:g}" for name, _, most in first_stage(instance).limited)
     lines = [f"{instance!r}".strip("<>"), *([f"capped: {limited}"] if limited else [])]

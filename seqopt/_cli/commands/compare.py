@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -21,17 +22,7 @@ from seqopt._cli.asked import (
     scene_facts,
     strictly,
 )
-from seqopt._cli.options import (
-    BUILT,
-    POSTURES,
-    criterion_options,
-    declare,
-    engine_options,
-    form_options,
-    robots_option,
-    scene_options,
-    speed_option,
-)
+from seqopt._cli.options import Cost, Judged, Postures, Strict, Team, word
 from seqopt._cli.outputs import (
     comparison_files,
     figure_notes,
@@ -40,7 +31,6 @@ from seqopt._cli.outputs import (
     speed_files,
     write_outputs,
 )
-from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import _parse_grip_range, asked_criterion, parse_robots, speed_seconds
 from seqopt._showing import PAGE
@@ -62,25 +52,6 @@ from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
 from seqopt.study.published import PUBLISHED
 
-DESCRIPTION = (
-    "Build a scene in every way that seqopt knows, on paper: the fixed sequences, a loop of robots "
-    "whose grips each formulation chooses, and the free schedule. Show the largest forces, moments "
-    "and displacements side by side; for the arch of Bruun et al. beside the figures that they "
-    "print, with a list of the inconsistencies in print."
-)
-USAGE = ("[SCENE] [--out DIR] [--details] [other options]",)
-EXAMPLES = (
-    "seqopt compare",
-    "seqopt compare wall:columns=6,courses=4 --out wall",
-    "seqopt compare arch25 --criteria worst-ratio --json",
-    "seqopt compare arch25 --grips 1e5..1e9",
-    "seqopt compare arch25 --speed 20 --out speed",
-)
-WRITTEN = {
-    "--out DIR": "write tables, figures and a page with all builds",
-    "--details": "also show the largest force of each robot, every formulation under both "
-    "objectives of ranks, and where the grips of the published plan rank",
-}
 ABOUT_STANDING = (
     "Proven as rigid bricks whose joints may open and slide, robots within their payload. First: "
     "the step that falls first, the brick that is fastest in it, and the joint that opens fastest."
@@ -104,67 +75,93 @@ OF_PAPER = "In the paper: "  # with which notes about it begin
 MODIFIED = "modified-sequential"
 
 
-def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``compare``."""
-    basic = question(command, BUILT)
-    scene_options(basic)
-    robots_option(basic, "all methods, each of which takes as many as it needs")
-    declare(basic, WRITTEN)
-    speed_option(basic)
-    criterion_options(command)
-    declare(engine_options(command), POSTURES)
-    form_options(command, strict=True, builds=True)
+@dataclass(frozen=True, kw_only=True)
+class Compare(Strict, Postures, Judged, Cost, Team):
+    """Build a scene in every way that seqopt knows, on paper, and show all side by side.
+
+    These are the fixed sequences, a loop of robots whose grips each formulation chooses, and the
+    free schedule. Show the largest forces, moments and displacements; for the arch of Bruun et al.
+    beside the figures that they print, with a list of the inconsistencies in print.
+
+    Usage
+    [SCENE] [--out DIR] [--details] [other options]
+
+    What is built, and by whom?
+    out : DIR
+        write tables, figures and a page with all builds
+    details :
+        also show the largest force of each robot, every formulation under both objectives of ranks,
+        and where the grips of the published plan rank
+    speed : SECONDS
+        also chart speed against accuracy: the loop by every engine and formulation, each within so
+        many seconds (10); errors are those beside the engine that --engine names
+
+    Examples
+    --------
+    seqopt compare
+    seqopt compare wall:columns=6,courses=4 --out wall
+    seqopt compare arch25 --criteria worst-ratio --json
+    seqopt compare arch25 --grips 1e5..1e9
+    seqopt compare arch25 --speed 20 --out speed
+    """
+
+    details: bool = False
+    speed: str | None = word(None, const="10")
 
 
-def run(options: argparse.Namespace) -> Answer:
+def run(asked: Compare) -> Answer:
     """Compare all ways to build a scene."""
-    return answered(options, *find(options))
+    return answered(asked, find(asked))
 
 
-def find(options: argparse.Namespace) -> tuple[Engine, Criterion, BuildProver, Comparison]:
+class Found(NamedTuple):
+    """A comparison, and what it is compared by."""
+
+    engine: Engine
+    criterion: Criterion
+    prover: BuildProver
+    result: Comparison
+
+
+def find(asked: Compare) -> Found:
     """Compare all ways to build a scene; with what it is compared by."""
-    _parse_grip_range(options.grips)  # said before anything is computed
-    seconds = speed_seconds(options.speed)
-    scene = asked_scene(options, ranged=True)
-    find_postures(scene, options.cache, options.tell)
-    engine = asked_engine(options, build_network(scene))
-    criterion = asked_criterion(options)
-    require_out(options)
-    prover = asked_prover(options, engine.network)
-    robots = parse_robots(options.robots)
-    result = compare(engine, criterion, options.tell, robots, prover, seconds)
-    return engine, criterion, prover, result
+    _parse_grip_range(asked.grips)  # said before anything is computed
+    seconds = speed_seconds(asked.speed)
+    scene = asked_scene(asked, ranged=True)
+    find_postures(scene, asked.cache, asked.tell)
+    engine = asked_engine(asked, build_network(scene))
+    criterion = asked_criterion(asked)
+    require_out(asked)
+    prover = asked_prover(asked, engine.network)
+    robots = parse_robots(asked.robots)
+    result = compare(engine, criterion, asked.tell, robots, prover, seconds)
+    return Found(engine, criterion, prover, result)
 
 
-def answered(
-    options: argparse.Namespace,
-    engine: Engine,
-    criterion: Criterion,
-    prover: BuildProver,
-    result: Comparison,
-) -> Answer:
+def answered(asked: Compare, found: Found) -> Answer:
     """Write a comparison, and return what is in it."""
-    scene, grips = engine.network.scene, _parse_grip_range(options.grips)
+    engine, criterion, prover, result = found
+    scene, grips = engine.network.scene, _parse_grip_range(asked.grips)
     criteria = {k: {"criterion": c.name, **c.settings} for k, c in result.criteria.items()}
     about = {"scene": scene.name, "criteria": criteria, **provenance(engine)}
     text, headings = _tell(result, scene, criterion)
-    blocks = [text, format_details(result, scene)] if options.details else [text]
+    blocks = [text, format_details(result, scene)] if asked.details else [text]
     if result.speed is not None:
         blocks.append("\n".join([SPEED, *result.speed.told(wrapped)]))
-    softly = held_softly(engine, _shown_tables(result), grips, options.tell)
+    softly = held_softly(engine, _shown_tables(result), grips, asked.tell)
     turns = turning_points(softly, _fixed(result)) if grips else ()
     if grips:
         blocks += _softly(softly, turns)
     written: tuple[Path, ...] = ()
-    if options.out is not None:
-        options.tell("drawing figures")
+    if asked.out is not None:
+        asked.tell("drawing figures")
         files = comparison_files(result) | {"summary.json": json.dumps(about, indent=2) + "\n"}
         page = {PAGE: comparison_page(engine, result)}
         files |= softness_files(softly) | speed_files(result.speed)
-        written = write_outputs(options, lambda: files | page)
-        blocks.append(_where(options.out, speed=result.speed is not None))
+        written = write_outputs(asked, lambda: files | page)
+        blocks.append(_where(asked.out, speed=result.speed is not None))
     else:
-        more = "" if options.details else "; --details shows more here"
+        more = "" if asked.details else "; --details shows more here"
         blocks.append(wrapped(f"--out DIR writes tables, figures and a step viewer{more}."))
     answer = Answer(
         facts=about
@@ -175,7 +172,7 @@ def answered(
         headings=(*headings, SPEED, SOFTLY, TURNS),
         written=written,
         notes=(
-            *level_notes(options, simplest(engine)),
+            *level_notes(asked, simplest(engine)),
             *result.enough.lines,
             *refused(prover),
             *(() if grips else (HOW_SOFT,)),
@@ -184,7 +181,7 @@ def answered(
     )
     over = exceeded(scene, *result.tables.values())
     left = builds_in_words(result.departures)
-    return strictly(answer, options, over, left, result.verdicts)
+    return strictly(answer, asked, over, left, result.verdicts)
 
 
 def _softly(table: pd.DataFrame, turns: Sequence[str]) -> list[str]:

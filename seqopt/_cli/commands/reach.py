@@ -2,49 +2,51 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import pandas as pd
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.asked import asked_scene, scene_facts
-from seqopt._cli.options import BUILT, POSTURES, declare, form_options, scene_options
+from seqopt._cli.options import Built, Postures
 from seqopt._cli.outputs import figure_notes, require_out, write_outputs
-from seqopt._cli.screens import question
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
 from seqopt.arms._permits import find_table, reach_table
 from seqopt.arms.reach import find_postures
 from seqopt.scene.scene import Scene
 
-DESCRIPTION = (
-    "Say which robots reach which nodes; of those with arms, with how many postures, and up to "
-    "how many bricks. Robots have arms in the scene file; the extra arms computes postures."
-)
-EXAMPLES = ("seqopt reach my.json --out reach", "seqopt reach my.json --cache postures --json")
-WRITTEN = {"--out DIR": "folder to write reach.csv, postures.csv and a picture to"}
+
+@dataclass(frozen=True, kw_only=True)
+class Reach(Postures, Built):
+    """Say which robots reach which nodes.
+
+    Of those with arms, with how many postures, and up to how many bricks. Robots have arms in the
+    scene file; the extra arms computes postures.
+
+    What is written and printed?
+    out : DIR
+        folder to write reach.csv, postures.csv and a picture to
+
+    Examples
+    --------
+    seqopt reach my.json --out reach
+    seqopt reach my.json --cache postures --json
+    """
 
 
-def add_arguments(command: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``reach``."""
-    basic = question(command, BUILT)
-    scene_options(basic)
-    declare(basic, WRITTEN | POSTURES)
-    form_options(command)
-
-
-def run(options: argparse.Namespace) -> Answer:
+def run(asked: Reach) -> Answer:
     """Say what arms reach, and write it if asked."""
-    scene = asked_scene(options)
-    require_out(options)
-    find_postures(scene, options.cache, options.tell)
+    scene = asked_scene(asked)
+    require_out(asked)
+    find_postures(scene, asked.cache, asked.tell)
     table = reach_table(scene) if scene.has_arms else _without_arms(scene)
-    written = write_outputs(options, lambda: _files(scene, table))
+    written = write_outputs(asked, lambda: _files(scene, table))
     lines = [*(_described if scene.has_arms else _covered)(scene, table)]
     if written:
         names = "reach.csv, postures.csv" if scene.has_arms else "reach.csv"
-        lines.append(f"written to {options.out}: {names}")
+        lines.append(f"written to {asked.out}: {names}")
     else:
         lines.append("--out DIR writes a row for every robot and node, and postures of arms")
     return Answer(
