@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import version
 from types import ModuleType
-from typing import Any, NoReturn, get_type_hints
+from typing import Any, NoReturn
 
 from seqopt._cli.answer import Status
 from seqopt._cli.terminal import columns, complain, show
@@ -77,43 +77,51 @@ def _layout(prog: str) -> argparse.HelpFormatter:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class _Command:
-    """A command in a few words, and its module of `seqopt._cli`, loaded when it is asked for.
+    """A command in a few words, and where in `seqopt._cli` the class is of what it is asked.
 
-    Its ``run`` says by its signature what it is asked: a class of `seqopt._cli.options`.
+    Its module has ``run`` as well, and is loaded when it is asked for.
     """
 
     about: str
-    module: str
+    where: str
 
     def load(self) -> ModuleType:
         """Return the module."""
-        return import_module(f"seqopt._cli.{self.module}")
+        return import_module(f"seqopt._cli.{self.where.partition(':')[0]}")
 
     @property
     def asked(self) -> Any:
         """The class of what it is asked."""
-        return get_type_hints(self.load().run)["asked"]
+        return getattr(self.load(), self.where.partition(":")[2])
 
 
 COMMANDS = {
-    "compare": _Command("show all ways to build a scene side by side", "commands.compare"),
-    "optimize": _Command("choose where robots hold, and write the plan", "commands.optimize"),
-    "replan": _Command("plan the rest of a build after a change", "commands.replan"),
-    "next": _Command("look up the best next move of a build", "commands.next"),
-    "pareto": _Command("find all plans that no other one beats in every aim", "commands.pareto"),
-    "analyze": _Command("compute forces and displacements in every step", "commands.analyze"),
-    "times": _Command("say how long a build takes, and who does what when", "commands.times"),
-    "assess": _Command("prove which steps stand, and with what margins", "commands.assess"),
-    "report": _Command("make a page that shows plans step by step", "commands.report"),
-    "reach": _Command("say which arms reach which nodes, and how", "commands.reach"),
-    "scene": _Command("check, describe, export or list scenes", "commands.scene"),
-    "import": _Command(
-        "make a scene of an assembly of COMPAS, a mesh or a table", "commands.importing"
+    "compare": _Command("show all ways to build a scene side by side", "commands.compare:Compare"),
+    "optimize": _Command(
+        "choose where robots hold, and write the plan", "commands.optimize:Optimize"
     ),
-    "export": _Command("write a plan in a format of others", "commands.exporting"),
-    "instance": _Command("write the graph of a problem, for any solver", "bare.instance"),
-    "judge": _Command("check a bare solution of an instance, and a bound", "bare.judge"),
-    "completion": _Command("let the shell complete words of seqopt", "commands.completion"),
+    "replan": _Command("plan the rest of a build after a change", "commands.replan:Replan"),
+    "next": _Command("look up the best next move of a build", "commands.next:Next"),
+    "pareto": _Command(
+        "find all plans that no other one beats in every aim", "commands.pareto:Pareto"
+    ),
+    "analyze": _Command(
+        "compute forces and displacements in every step", "commands.analyze:Analyze"
+    ),
+    "times": _Command("say how long a build takes, and who does what when", "commands.times:Times"),
+    "assess": _Command("prove which steps stand, and with what margins", "commands.assess:Assess"),
+    "report": _Command("make a page that shows plans step by step", "commands.report:Report"),
+    "reach": _Command("say which arms reach which nodes, and how", "commands.reach:Reach"),
+    "scene": _Command("check, describe, export or list scenes", "commands.scene:SceneAsked"),
+    "import": _Command(
+        "make a scene of an assembly of COMPAS, a mesh or a table", "commands.importing:Import"
+    ),
+    "export": _Command("write a plan in a format of others", "commands.exporting:Export"),
+    "instance": _Command("write the graph of a problem, for any solver", "bare.instance:Instance"),
+    "judge": _Command("check a bare solution of an instance, and a bound", "bare.judge:Judge"),
+    "completion": _Command(
+        "let the shell complete words of seqopt", "commands.completion:Completion"
+    ),
 }
 
 

@@ -84,7 +84,7 @@ def fill(command: argparse.ArgumentParser, kind: type[Asked]) -> None:
     listed = "\n".join(f"  {example}" for example in examples)
     command.epilog = f"example{'s' * (len(examples) > 1)}:\n{listed}"
     known = {each.name: each for each in fields(kind)}
-    asked = {question for question, *_ in page.options.values()}
+    asked = dict.fromkeys(question for question, *_ in page.options.values())
     for title in sorted(asked, key=lambda each: QUESTIONS.index(each) if each in QUESTIONS else -1):
         about = wrapped(" ".join(page.lines.get(title, ())), columns() - 2)
         group = command.add_argument_group(title, about or None)

@@ -298,8 +298,8 @@ def _found(
     margins, at = _asked_margins(asked, steps)
     workers = count_word(asked.workers, "--workers", MOST_WORKERS, usual=1)
     kept = asked.out is not None  # else nobody takes them up
-    asked = (dump_scene(network.scene), steps, mortars, margins, at, versions()) if kept else ()
-    rows = Rows(asked.out, asked)
+    same = (dump_scene(network.scene), steps, mortars, margins, at, versions()) if kept else ()
+    rows = Rows(asked.out, same)
     try:
         for before, (name, mortar) in enumerate(mortars.items()):
             if not (left := steps[max(0, len(rows.rows) - before * len(steps)) :]):
