@@ -46,7 +46,7 @@ _HOMES = {
     "graph.formulation": ("Formulation", "formulations"),
     "sequence.rules": ("FreeRules",),
     "plan.solving": ("pose", "solve"),
-    "workflow": ("optimize",),
+    "workflow": ("Search", "optimize"),
     "scene.scenarios": ("scenarios",),
     "plan.plan": ("Plan",),
     "graph.instances._files": ("read_instance", "save_instance"),

@@ -38,10 +38,11 @@ ROOMS = (
     {"exchange", "times"},
     {"report"},
     {"_cli"},
+    {"doors"},
     {"__init__", "__main__"},
 )  # a room imports from rooms above it in this list only
 OUTER = {"arms", "exchange", "times", "report", "_cli"}  # the inner rooms do without them
-TOP = {"workflow", "__init__", "__main__"}  # open inner and outer rooms
+TOP = {"workflow", "doors", "__init__", "__main__"}  # open inner and outer rooms
 SOLVERS = {"cvxpy", "clarabel", "highspy"}
 SOLVER_HOME = "formulations"
 SHARED = {  # what formulations may import
@@ -58,14 +59,14 @@ SHARED = {  # what formulations may import
 }
 MECHANICS = {"network.mechanics", "engines.rigid"}  # not for the frame
 LINES = 450  # of code: no thought is split for a limit; imports, docstrings and comments aside
-LINES_OF_A_FUNCTION = 50
+LINES_OF_A_FUNCTION = 48  # of code: what it takes and its docstring aside
 IMPORT = r"(?m)^ *((?:from .*)?\bimport (?:\([^)]*\)|.*))$"  # on one line, or in brackets
 NO_CODE = {COMMENT, NL, NEWLINE, INDENT, DEDENT, ENDMARKER}
 SAID = (ast.Module, ast.ClassDef, ast.FunctionDef)  # what may have a docstring
 PARAMETERS = 8  # of an experiment's function
 DRAWS_ON_ALL = "study"  # the topic that sets every other one beside the paper
 MOST_ROOMS = 19  # thirteen inner and five outer ones, and data
-MOST_NAMES = 450  # functions and classes without an underscore
+MOST_NAMES = 460  # functions and classes without an underscore
 
 
 def sources(folder: str) -> list[Path]:
@@ -312,7 +313,8 @@ def test_modules_and_functions_stay_small(folder):
         assert text.count("\n") <= LINES or len(code_lines(text)) <= LINES, path
         for node in ast.walk(parsed(path)):
             if isinstance(node, ast.FunctionDef):
-                length = (node.end_lineno or 0) - node.lineno
+                body = node.body[1:] if ast.get_docstring(node) else node.body
+                length = (node.end_lineno or 0) - body[0].lineno if body else 0
                 assert length < LINES_OF_A_FUNCTION, f"{path}: {node.name}"
 
 

@@ -13,7 +13,7 @@ from seqopt._cli.words.given import NamedSteps, given_plan, given_scene, given_s
 from seqopt._cli.words.props import parse_props
 from seqopt.arms._plan_postures import arm_faults
 from seqopt.arms.reach import find_postures
-from seqopt.contact.mortar import Mortar
+from seqopt.contact.mortar import Mortar, _mortar_name
 from seqopt.engines._kinds import ChoosingEngine, Level
 from seqopt.engines.interface import Engine
 from seqopt.engines.registry import DEFAULT, LIMITED, _chooser_of, make_engine, simplest
@@ -198,7 +198,8 @@ def asked_prover(asked: Judged, network: Network) -> BuildProver:
     demanded = asked_standing(asked) if isinstance(asked, Stands) else None
     own = (demanded and asked.stands) or asked.mortar or "epoxy"
     mortar = mortar_word(own, "--mortar") if demanded is None else demanded.mortar
-    shown = {"dry": Mortar(friction=mortar.friction), own: mortar}
+    name = own if isinstance(own, str) else _mortar_name(mortar)
+    shown = {"dry": Mortar(friction=mortar.friction), name: mortar}
     return BuildProver(network, {} if asked.no_stability else shown, asked.tell)
 
 

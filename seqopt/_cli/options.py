@@ -199,7 +199,7 @@ class Stands(Asked):
         with --stands: tilt that every state must survive
     """
 
-    stands: str | None = None
+    stands: Any = None
     friction: str | None = None
     tilt: str | None = None
     curing: tuple[str, ...] = ()

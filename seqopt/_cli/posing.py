@@ -17,7 +17,6 @@ from seqopt._cli.values import (
     parse_criterion,
     parse_numbers,
     parse_robots,
-    parse_rules,
 )
 from seqopt._cli.words.props import parse_props
 from seqopt._cli.words.where import Place, asked_place, between, kept_place
@@ -39,7 +38,7 @@ from seqopt.problem.requirements import Criterion
 from seqopt.scene._props import Prop
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
-from seqopt.sequence.rules import FREE, Direction, FreeRules
+from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules
 from seqopt.sequence.schedule import Schedule, thin
 from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import StepKind
@@ -193,7 +192,9 @@ def _asked_moves(asked: Posed, robots: str, network: Network) -> Schedule | Free
     if asked.schedule != FREE:
         schedule = find_schedule(network, asked.schedule, names)
         return schedule if rule is None else thin(schedule, rule)
-    rules = replace(parse_rules(asked.rule, names), direction=asked.direction or Direction.BUILD)
+    rules = replace(
+        parse_rules(asked.rule, names, "--rule"), direction=asked.direction or Direction.BUILD
+    )
     return replace(rules, candidates=rule) if rule else rules
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from math import radians
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 from seqopt._cli.options import Cost, Posed, Stands
 from seqopt.contact.curing import _find_curing
 from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
-from seqopt.errors import ProblemError, SceneError, SeqoptError, StepError, did_you_mean
+from seqopt.errors import ProblemError, SceneError, StepError, did_you_mean
 from seqopt.graph.formulation import Formulation, as_formulation
 from seqopt.problem._limit_words import LARGEST, NAMES, number_word, split_word
 from seqopt.problem.criteria import Among, Ranked, RankSum
@@ -22,7 +22,6 @@ from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses.resources import Resources
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
-from seqopt.sequence.rules import FreeRules
 from seqopt.study.published import CRITERIA
 from seqopt.work.progress import Tell
 from seqopt.workflow import DEFAULTS
@@ -30,9 +29,6 @@ from seqopt.workflow import DEFAULTS
 BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
 SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
 MOST_WORKERS = 1024
-COUNTS = ("least_grips", "regrips")
-UNBOUND = {("regrips", "any"): None, ("placers", "any"): (), ("candidates", "all"): ""}
-RULES = ("newest", "payload", "ending", "placers", "candidates", *COUNTS)
 
 
 def speed_seconds(text: str | None) -> float:
@@ -55,21 +51,6 @@ def count_word(text: str | None, where: str, most: int, least: int = 1, usual: i
     if not (text.isascii() and text.isdecimal()) or not least <= int(text[:12]) <= most:
         raise ProblemError(f"{where} {text}: give a whole number from {least} to {most}")
     return int(text)
-
-
-def _known_word(
-    name: str,
-    known: Iterable[str],
-    where: str,
-    error: type[SeqoptError] = ProblemError,
-    advice: str = "",
-) -> str:
-    """Return a name if it is known; else raise an error that says which are."""
-    if name not in known:
-        names = ", ".join(known)
-        hint = did_you_mean(name, known)
-        raise error(f"{where} does not exist{hint}; give one of {names}{advice}")
-    return name
 
 
 def _response_word(name: str) -> str:
@@ -145,7 +126,7 @@ def parse_grips(text: str, scene: Scene) -> Scene:
 def parse_numbers(
     where: str,
     texts: Sequence[str],
-    known: Iterable[str] | None = None,
+    known: Collection[str] | None = None,
     *,
     zero: bool = False,
     advice: str = "",
@@ -154,8 +135,9 @@ def parse_numbers(
     out: dict[str, float] = {}
     for text in texts:
         name, value = split_word(text)
-        if known is not None:
-            _known_word(name, known, f"{where} {text}", advice=advice)
+        if known is not None and name not in known:
+            hint, names = did_you_mean(name, known), ", ".join(known)
+            raise ProblemError(f"{where} {text} does not exist{hint}; give one of {names}{advice}")
         out[name] = number_word(value, f"{where} {text}", zero=zero)
     return out
 
@@ -201,6 +183,8 @@ def mortar_word(text: str | Mortar, where: str) -> Mortar:
 
 def asked_standing(asked: Stands) -> Standing | None:
     """Return what is demanded of the stability of states, if anything is."""
+    if isinstance(asked.stands, Standing):  # of Python
+        return asked.stands
     said = {"tilt": asked.tilt, "friction": asked.friction}
     given = {
         name: number_word(text, f"--{name}", zero=True)
@@ -219,21 +203,6 @@ def asked_standing(asked: Stands) -> Standing | None:
         raise ProblemError(f"--{error}") from error
     tilt = radians(given.pop("tilt", 0.0))
     return Standing(replace(mortar, **given), tilt, cures)
-
-
-def parse_rules(texts: Sequence[str], robots: tuple[str, ...]) -> FreeRules:
-    """Return the rules of a free schedule, each from ``NAME=VALUE``, for these robots or all."""
-    given: dict[str, object] = {"robots": robots}
-    for text in texts:
-        name, _, value = text.partition("=")
-        _known_word(name, RULES, f"--rule {text}", StepError)
-        if (name, value) in UNBOUND:
-            given[name] = UNBOUND[name, value]
-        elif name == "placers":
-            given[name] = parse_robots(value)
-        else:
-            given[name] = int(value) if name in COUNTS and value.isdecimal() else value
-    return FreeRules(**given)  # type: ignore[arg-type]
 
 
 def asked_criterion(asked: Cost) -> Criterion:

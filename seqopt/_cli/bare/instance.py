@@ -5,16 +5,18 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from seqopt._cli.answer import Answer
 from seqopt._cli.commands.optimize import Optimize
 from seqopt._cli.outputs import keep_apart
 from seqopt._cli.posing import asked_problem
 from seqopt._cli.values import parse_time_limit
-from seqopt._cli.words.given import file_name
+from seqopt._cli.words.given import file_name, given_scene
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import find_formulation
 from seqopt.graph.instances._files import WRITERS, save_instance
+from seqopt.graph.instances.instance import Instance as Graph
 from seqopt.judge._claims import first_stage
 from seqopt.plan._compiled import compile_instance
 from seqopt.problem._limit_words import number_word
@@ -61,6 +63,20 @@ class Instance(Optimize):
 def run(asked: Instance) -> Answer:
     """Write the instance of the problem that is asked for."""
     path = asked.out
+    if path is None:
+        path = file_name(given_scene(asked).name, ".npz")
+        asked.taken.append(f"file: {path}; --out names another, or a folder for every format")
+    found = find(replace(asked, out=path))
+    write(asked, found, path)
+    limited = ", ".join(f"{name} {most:g}" for name, _, most in first_stage(found).limited)
+    lines = [f"{found!r}".strip("<>"), *([f"capped: {limited}"] if limited else [])]
+    lines += [f"written to {path}; seqopt judge {path} SOLUTION checks an answer"]
+    return Answer(facts=found.facts_of(), text="\n".join(lines), written=(path,))
+
+
+def find(asked: Instance) -> Graph:
+    """Return the instance of the problem that is asked for; the file where it goes names it."""
+    path = asked.out
     if path and path.suffix not in ("", *WRITERS):
         raise ProblemError(f"--out {path}: give a name with {', '.join(WRITERS)}, or a folder")
     if asked.bases is not None:
@@ -69,23 +85,20 @@ def run(asked: Instance) -> Answer:
     clock = Clock(parse_time_limit(asked.time_limit))
     with clock.needed("posing the problem"):
         problem = asked_problem(replace(asked, out=None)).problem
-    if path is None:
-        path = file_name(problem.engine.network.scene.name, ".npz")
-        asked.taken.append(f"file: {path}; --out names another, or a folder for every format")
     named = None if asked.formulation is None else find_formulation(asked.formulation)
     asked.tell("computing all that arcs take")
     aim = None if named is None else named.aim
-    facts = {"made_by": _made_by(asked.words)}
-    name = asked.name or path.stem
+    facts = {"made_by": _made_by(asked.words)} if asked.words else {}
+    name = asked.name or (problem.scene.name if path is None else path.stem)
     with clock.needed("writing down the graph"):
-        instance = compile_instance(problem, name=name, aim=aim, below=below, facts=facts)
+        return compile_instance(problem, name=name, aim=aim, below=below, facts=facts)
+
+
+def write(asked: Instance, found: Graph, path: Path) -> None:
+    """Write an instance, apart from what the command reads."""
     asked.tell("writing the instance")
     keep_apart(asked, path)
-    save_instance(instance, path)
-    limited = ", ".join(f"{name} {most:g}" for name, _, most in first_stage(instance).limited)
-    lines = [f"{instance!r}".strip("<>"), *([f"capped: {limited}"] if limited else [])]
-    lines += [f"written to {path}; seqopt judge {path} SOLUTION checks an answer"]
-    return Answer(facts=instance.facts_of(), text="\n".join(lines), written=(path,))
+    save_instance(found, path)
 
 
 def _made_by(words: Sequence[str]) -> str:

@@ -18,12 +18,11 @@ import shtab
 from seqopt._cli.answer import Answer
 from seqopt._cli.arguments import COMMANDS, parser
 from seqopt._cli.options import Asked, word
-from seqopt._cli.values import RULES
 from seqopt.graph.formulation import formulation_names
 from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.scene.scene import ORDERS
 from seqopt.scene.scene_file import KINDS, builtin_scenes
-from seqopt.sequence.rules import FREE
+from seqopt.sequence.rules import FREE, RULES
 from seqopt.sequence.three_robots import SCHEDULES
 from seqopt.sequence.two_robots import METHODS
 from seqopt.study.published import CRITERIA, PUBLISHED

@@ -1,0 +1,641 @@
+"""Every command as a function of Python: the same words and defaults, and values in place of text.
+
+A scene is given as such, by its name or words, by its file, or as a plan or the folder of one.
+Where a parameter says nothing else, words of the command line stand for its value:
+``criterion="worst-ratio"``, ``limits=["payload", "F_largest=300"]``, ``grips=1e6``. With ``out``
+the same is written as by the command. Progress is shown in a notebook and at a terminal, or told to
+``progress``. A `SeqoptError` says in one line what to change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeAlias, TypeVar
+
+import pandas as pd
+
+from seqopt._cli.bare import instance as _instance
+from seqopt._cli.commands import analyze as _analyze
+from seqopt._cli.commands import assess as _assess
+from seqopt._cli.commands import compare as _compare
+from seqopt._cli.commands import exporting as _export
+from seqopt._cli.commands import pareto as _pareto
+from seqopt._cli.commands import reach as _reach
+from seqopt._cli.commands import replan as _replan
+from seqopt._cli.commands import report as _report
+from seqopt._cli.commands import times as _times
+from seqopt._cli.options import Asked
+from seqopt._cli.signatures import given
+from seqopt._cli.watcher import Watcher
+from seqopt.contact.mortar import Mortar
+from seqopt.graph.instances.instance import Instance
+from seqopt.judge._arithmetic import judge_instance as judge
+from seqopt.plan.build import ShownBuild
+from seqopt.plan.front import Front
+from seqopt.plan.plan import Plan
+from seqopt.problem.requirements import Criterion, Limit
+from seqopt.problem.standing import Standing
+from seqopt.report.comparison import Comparison
+from seqopt.scene.scene import Scene
+from seqopt.sequence.rules import FREE, FreeRules
+from seqopt.work.progress import Tell
+from seqopt.workflow import optimize
+
+__all__ = [
+    "analyze",
+    "assess",
+    "compare",
+    "export",
+    "instance",
+    "judge",
+    "optimize",
+    "pareto",
+    "reach",
+    "replan",
+    "report",
+    "times",
+]
+
+Built: TypeAlias = Scene | ShownBuild | Path | str
+Words: TypeAlias = Sequence[str] | str
+Limits: TypeAlias = Sequence[Limit | str] | Limit | str
+Rules: TypeAlias = FreeRules | Sequence[str] | str
+Stands: TypeAlias = Standing | Mortar | str
+_Asked = TypeVar("_Asked", bound=Asked)
+
+
+def compare(
+    scene: Built = "arch25",
+    *,
+    criterion: Criterion | str | None = None,
+    robots: int | Words | None = None,
+    order: Words | None = None,
+    grips: float | str | None = None,
+    engine: str | None = None,
+    mortar: Mortar | str | None = None,
+    speed: float | None = None,
+    stability: bool = True,
+    cache: Path | str | None = None,
+    out: Path | str | None = None,
+    progress: Tell | None = None,
+) -> Comparison:
+    """Build a scene in every way that seqopt knows, side by side, as ``seqopt compare`` does.
+
+    Parameters
+    ----------
+    scene : Scene, ShownBuild, pathlib.Path or str
+        What is built.
+    criterion, robots, order, grips, engine, mortar : optional
+        As of the command.
+    speed : float, optional
+        Also chart speed against accuracy, so many seconds for each engine and formulation.
+    stability : bool
+        Whether it is proven which steps stand.
+    cache : pathlib.Path or str, optional
+        Folder that keeps postures of arms.
+    out : pathlib.Path or str, optional
+        Folder to write tables, figures and a page to.
+    progress : callable, optional
+        Told how far it is.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    SeqoptError
+        With one line that says what to change.
+
+    Examples
+    --------
+    >>> found = compare("wall:columns=2,courses=2", criterion="worst-ratio", stability=False)
+    >>> float(found.table.loc["sequential", "F_rob"].round(1))
+    37.3
+    """
+    words = {"criteria": criterion, "robots": robots, "order": order, "grips": grips}
+    words |= {"engine": engine, "mortar": mortar, "speed": speed, "no_stability": not stability}
+    words |= {"scene": scene, "cache": cache, "out": out}
+    with _asked(_compare.Compare, words, progress) as asked:
+        found = _compare.find(asked)
+        if asked.out is not None:
+            _compare.answered(asked, found)
+        return found.result
+
+
+def pareto(
+    scene: Built = "arch25",
+    *,
+    schedule: Path | str = FREE,
+    aim: Words | None = None,
+    rules: Rules | None = None,
+    limits: Limits = (),
+    stands: Stands | None = None,
+    rounding: Mapping[str, float] | Words = (),
+    robots: int | Words | None = None,
+    order: Words | None = None,
+    engine: str | None = None,
+    mortar: Mortar | str | None = None,
+    seconds: float | None = None,
+    stability: bool = True,
+    out: Path | str | None = None,
+    progress: Tell | None = None,
+) -> Front:
+    """Find all plans that no other one beats in every aim, as ``seqopt pareto`` does.
+
+    Parameters
+    ----------
+    scene : Scene, ShownBuild, pathlib.Path or str
+        What is built.
+    schedule, aim, rules, limits, stands, robots, order, engine, mortar : optional
+        As of the command.
+    rounding : mapping of str to float, or words
+        Steps to multiples of which numbers are rounded up, SI units.
+    seconds : float, optional
+        Limit of all, after which the points are those that were found.
+    stability : bool
+        Whether it is proven which steps stand, where a folder is written.
+    out : pathlib.Path or str, optional
+        Folder to write.
+    progress : callable, optional
+        Told how far it is.
+
+    Returns
+    -------
+    Front
+
+    Raises
+    ------
+    SeqoptError
+        With one line that says what to change.
+
+    Examples
+    --------
+    >>> pareto("wall:columns=2,courses=2", aim="F_largest,steps")
+    <Front: 1 plans, complete; F_largest, steps, regrips>
+    """
+    if isinstance(rounding, Mapping):
+        rounding = [f"{name}={step!r}" for name, step in rounding.items()]
+    words = {"schedule": schedule, "aim": aim, "rule": rules, "limit": limits, "stands": stands}
+    words |= {"round": rounding, "robots": robots, "order": order, "engine": engine}
+    words |= {"mortar": mortar, "seconds": seconds, "no_stability": not stability}
+    with _asked(_pareto.Pareto, words | {"scene": scene, "out": out}, progress) as asked:
+        found = _pareto.find(asked)
+        if asked.out is not None:
+            _pareto.answered(asked, found)
+        return found.front
+
+
+def assess(
+    scene: Built = "arch25",
+    *,
+    method: str | None = None,
+    plan: ShownBuild | Path | str | None = None,
+    robots: Words | None = None,
+    mortar: Mortar | str | None = None,
+    margins: Words | None = None,
+    steps: str | None = None,
+    load_factor: bool = False,
+    map: str | None = None,  # noqa: A002  # as of the command
+    holds: Words | None = None,
+    workers: int = 1,
+    cache: Path | str | None = None,
+    out: Path | str | None = None,
+    progress: Tell | None = None,
+) -> pd.DataFrame:
+    """Prove of every step that it stands, or that it does not, as ``seqopt assess`` does.
+
+    Parameters
+    ----------
+    scene : Scene, ShownBuild, pathlib.Path or str
+        What is built; of a scene a fixed method is taken.
+    method, plan, robots, mortar, margins, steps, map, holds : optional
+        As of the command: ``margins="bond,tilt"``, ``steps="40:60"``, ``map="friction"``.
+    load_factor : bool
+        Find how much of the loads every step bears.
+    workers : int
+        Processes to share the steps among.
+    cache : pathlib.Path or str, optional
+        Folder that keeps postures of arms.
+    out : pathlib.Path or str, optional
+        CSV file to write; with ``map`` or ``load_factor`` a folder.
+    progress : callable, optional
+        Told how far it is.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per mortar and step: dry, then with epoxy, if no ``mortar`` is named; with ``map`` a
+        row per build, mortar and value. ``attrs["notes"]`` says what verdicts leave out.
+
+    Raises
+    ------
+    SeqoptError
+        With one line that says what to change.
+
+    Examples
+    --------
+    >>> assess("wall:columns=2,courses=2", mortar="dry")["verdict"].value_counts().to_dict()
+    {'stands': 7}
+    """
+    words = {"scene": scene, "method": method, "plan": plan, "robots": robots, "mortar": mortar}
+    words |= {"margins": margins, "steps": steps, "load_factor": load_factor, "map": map}
+    words |= {"holds": holds, "workers": workers, "cache": cache, "out": out}
+    with _asked(_assess.Assess, words, progress) as asked:
+        answer = _assess.run(asked)
+        found = answer.facts["steps" if asked.map is None else "cases"]
+        assert isinstance(found, pd.DataFrame | list)
+        table = found if isinstance(found, pd.DataFrame) else pd.DataFrame(found)
+        table.attrs["notes"] = [*answer.notes]
+        return table
+
+
+def analyze(
+    scene: Built = "arch25",
+    *,
+    method: str | None = None,
+    plan: ShownBuild | Path | str | None = None,
+    robots: Words | None = None,
+    engine: str | None = None,
+    mortar: Mortar | str | None = None,
+    staged: str | None = None,
+    tolerance: bool = False,
+    cache: Path | str | None = None,
+    out: Path | str | None = None,
+    progress: Tell | None = None,
+) -> pd.DataFrame:
+    """Compute how a structure responds in every step, as ``seqopt analyze`` does.
+
+    Parameters
+    ----------
+    scene : Scene, ShownBuild, pathlib.Path or str
+        What is built; of a scene a fixed method is taken.
+    method, plan, robots, engine, mortar, staged : optional
+        As of the command.
+    tolerance : bool
+        Find also how far every grip may be from where it should be, mm.
+    cache : pathlib.Path or str, optional
+        Folder that keeps postures of arms.
+    out : pathlib.Path or str, optional
+        CSV file to write.
+    progress : callable, optional
+        Told how far it is.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per step, units in the names of columns. ``attrs["notes"]`` says what is worth
+        knowing, ``attrs["failures"]`` which steps are mechanisms, or were not solved.
+
+    Raises
+    ------
+    SeqoptError
+        With one line that says what to change.
+
+    Examples
+    --------
+    >>> analyze("wall:columns=2,courses=2", method="sequential").shape[0]
+    7
+    """
+    words = {"scene": scene, "method": method, "plan": plan, "robots": robots, "engine": engine}
+    words |= {"mortar": mortar, "staged": staged, "tolerance": "" if tolerance else None}
+    with _asked(_analyze.Analyze, words | {"cache": cache, "out": out}, progress) as asked:
+        answer = _analyze.run(asked)
+        table = pd.DataFrame(answer.facts["steps"])
+        table.attrs |= {"notes": [*answer.notes], "failures": [*answer.failures]}
+        return table
+
+
+def times(
+    scene: Built = "arch25",
+    *,
+    method: str | None = None,
+    plan: ShownBuild | Path | str | None = None,
+    robots: Words | None = None,
+    durations: Words = (),
+    reassign: bool = False,
+    stands: Stands | None = None,
+    curing: Words = (),
+    cache: Path | str | None = None,
+    out: Path | str | None = None,
+    progress: Tell | None = None,
+) -> pd.DataFrame:
+    """Say who does what when in a build, as ``seqopt times`` does.
+
+    Parameters
+    ----------
+    scene : Scene, ShownBuild, pathlib.Path or str
+        What is built; of a scene a fixed method is taken.
+    method, plan, robots, durations, stands, curing : optional
+        As of the command.
+    reassign : bool
+        Give the same grips to the robots with which the build ends first.
+    cache : pathlib.Path or str, optional
+        Folder that keeps postures of arms.
+    out : pathlib.Path or str, optional
+        Folder to write.
+    progress : callable, optional
+        Told how far it is.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per step, s; ``attrs["robots"]`` is how long each robot does what.
+
+    Raises
+    ------
+    SeqoptError
+        With one line that says what to change.
+
+    Examples
+    --------
+    >>> float(times("wall:columns=2,courses=2", method="sequential")["end_s"].iloc[-1])
+    185.0
+    """
+    words = {"scene": scene, "method": method, "plan": plan, "robots": robots}
+    words |= {"durations": durations, "reassign": reassign, "stands": stands, "curing": curing}
+    with _asked(_times.Times, words | {"cache": cache, "out": out}, progress) as asked:
+        facts = _times.run(asked).facts
+        table = pd.DataFrame(facts["steps"])
+        table.attrs["robots"] = facts["robots"]
+        return table
+
+
+def reach(
+    scene: Built = "arch25",
+    *,
+    cache: Path | str | None = None,
+    out: Path | str | None = None,
+    progress: Tell | None = None,
+) -> pd.DataFrame:
+    """Say which robots reach which nodes, as ``seqopt reach`` does.
+
+    Parameters
+    ----------
+    scene : Scene, ShownBuild, pathlib.Path or str
+        What is built.
+    cache : pathlib.Path or str, optional
+        Folder that keeps postures of arms.
+    out : pathlib.Path or str, optional
+        Folder to write.
+    progress : callable, optional
+        Told how far it is.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row per robot and node.
+
+    Raises
+    ------
+    SeqoptError
+        With one line that says what to change.
+
+    Examples
+    --------
+    >>> bool(reach("wall:columns=2,courses=2")["reached"].all())
+    True
+    """
+    words = {"scene": scene, "cache": cache, "out": out}
+    with _asked(_reach.Reach, words, progress) as asked:
+        return pd.DataFrame(_reach.run(asked).facts["reach"])
+
+
+def replan(
+    plan: Built = "arch25",
+    at: int = 1,
+    *,
+    lost: Words = (),
+    payload: float | Words = (),
+    grips: float | str | None = None,
+    robots: int | None = None,
+    missing: Sequence[int] | int = (),
+    measured: Path | str | None = None,
+    to: int | str | None = None,
+    rules: Rules | None = None,
+    durations: Words = (),
+    aim: Words | None = None,
+    criterion: Criterion | str | None = None,
+    limits: Limits = (),
+    stands: Stands | None = None,
+    time_limit: float | None = None,
+    engine: str | None = None,
+    out: Path | str | None = None,
+    progress: Tell | None = None,
+) -> Plan:
+    """Plan the rest of a build after something has changed, as ``seqopt replan`` does.
+
+    Parameters
+    ----------
+    plan : Plan, Scene, pathlib.Path or str
+        The plan or its folder; of a scene the best free schedule is planned first.
+    at : int
+        Number of the last step that was done.
+    lost, payload, grips, robots, missing, measured : optional
+        What has changed, as of the command.
+    to, rules, durations, aim, criterion, limits, stands, engine : optional
+        As of the command; if nothing is said, as of the plan.
+    time_limit : float, optional
+        Seconds of choosing and proof.
+    out : pathlib.Path or str, optional
+        Folder to write.
+    progress : callable, optional
+        Told how far it is.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    SeqoptError
+        With one line that says what to change.
+
+    Examples
+    --------
+    >>> import seqopt
+    >>> plan = seqopt.optimize("wall:columns=2,courses=2", "free")
+    >>> replan(plan, at=2, lost=["rob3"], rules="rules="least_grips=1"").steps[0].number
+    3
+    """
+    words = {"plan": plan, "at": at, "lost": lost, "payload": payload, "grips": grips}
+    words |= {"robots": robots, "missing": missing, "measured": measured, "to": to, "rule": rules}
+    words |= {"durations": durations, "aim": aim, "criteria": criterion, "limit": limits}
+    words |= {"stands": stands, "time_limit": time_limit, "engine": engine, "out": out}
+    with _asked(_replan.Replan, words, progress) as asked:
+        found = _replan.find(asked)
+        if asked.out is not None:
+            _replan.answered(asked, found)
+        return found.new.plan
+
+
+def instance(
+    scene: Built = "arch25",
+    *,
+    schedule: Path | str | None = None,
+    criterion: Criterion | str | None = None,
+    formulation: str | None = None,
+    aim: Words | None = None,
+    limits: Limits = (),
+    budgets: Words = (),
+    stands: Stands | None = None,
+    rules: Rules | None = None,
+    robots: int | Words | None = None,
+    order: Words | None = None,
+    candidates: str | None = None,
+    durations: Words = (),
+    engine: str | None = None,
+    name: str | None = None,
+    below: float | None = None,
+    out: Path | str | None = None,
+    progress: Tell | None = None,
+) -> Instance:
+    """Return the graph of a problem, for any solver, as ``seqopt instance`` writes it.
+
+    Parameters
+    ----------
+    scene : Scene, ShownBuild, pathlib.Path or str
+        What is built.
+    schedule, criterion, formulation, aim, limits, budgets, stands, rules : optional
+        As of `optimize`.
+    robots, order, candidates, durations, engine : optional
+        As of `optimize`.
+    name : str, optional
+        What it is called.
+    below : float, optional
+        Leave out states of which the first aim, a worst step, takes more.
+    out : pathlib.Path or str, optional
+        File to write, or a folder for all formats.
+    progress : callable, optional
+        Told how far it is.
+
+    Returns
+    -------
+    Instance
+
+    Raises
+    ------
+    SeqoptError
+        With one line that says what to change.
+
+    Examples
+    --------
+    >>> instance("wall:columns=2,courses=2", schedule="free", aim="minmax").name
+    'wall 2 x 2'
+    """
+    words = {"scene": scene, "schedule": schedule, "criteria": criterion, "aim": aim}
+    words |= {"formulation": formulation, "limit": limits, "budget": budgets, "stands": stands}
+    words |= {"rule": rules, "robots": robots, "order": order, "candidates": candidates}
+    words |= {"durations": durations, "engine": engine, "name": name, "below": below, "out": out}
+    with _asked(_instance.Instance, words, progress) as asked:
+        found = _instance.find(asked)
+        if asked.out is not None:
+            _instance.write(asked, found, asked.out)
+        return found
+
+
+def export(
+    plan: Built,
+    format: str = "csv",  # noqa: A002  # as of the command
+    *,
+    source: Path | str | None = None,
+    distance: float | None = None,
+    cache: Path | str | None = None,
+    out: Path | str | None = None,
+    progress: Tell | None = None,
+) -> str:
+    """Return a plan in a format of others, as ``seqopt export`` writes it.
+
+    Parameters
+    ----------
+    plan : Plan, Scene, pathlib.Path or str
+        The plan or its folder; of a scene the usual steps are taken.
+    format : str
+        A name in `seqopt.exchange.formats.EXPORTS`.
+    source : pathlib.Path or str, optional
+        With a format of COMPAS: the file that was imported.
+    distance : float, optional
+        With tasks: from a grip to where the tool comes from, m.
+    cache : pathlib.Path or str, optional
+        Folder that keeps postures of arms.
+    out : pathlib.Path or str, optional
+        File to write.
+    progress : callable, optional
+        Told how far it is.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    SeqoptError
+        With one line that says what to change.
+
+    Examples
+    --------
+    >>> len(export("wall:columns=2,courses=2").splitlines())
+    29
+    """
+    words = {"folder": plan, "format": format, "source": source, "distance": distance}
+    with _asked(_export.Export, words | {"cache": cache, "out": out}, progress) as asked:
+        answer = _export.run(asked)
+        return answer.data if asked.out is None else asked.out.read_text(encoding="utf-8")
+
+
+def report(
+    plan: Built,
+    *,
+    engine: str | None = None,
+    mortar: Mortar | str | None = None,
+    stability: bool = True,
+    film: Path | str | None = None,
+    figures: Path | str | None = None,
+    cache: Path | str | None = None,
+    out: Path | str | None = None,
+    progress: Tell | None = None,
+) -> tuple[Path, ...]:
+    """Write a page that shows plans step by step, as ``seqopt report`` does.
+
+    Parameters
+    ----------
+    plan : Plan, Scene, pathlib.Path or str
+        A plan, a folder of plans, or a scene, whose usual steps are shown.
+    engine, mortar : optional
+        As of the command.
+    stability : bool
+        Whether it is proven which steps stand.
+    film, figures : pathlib.Path or str, optional
+        Also a film of the first plan, and a folder of figures.
+    cache : pathlib.Path or str, optional
+        Folder that keeps postures of arms.
+    out : pathlib.Path or str, optional
+        The page; by default in the folder of plans, or named by the scene.
+    progress : callable, optional
+        Told how far it is.
+
+    Returns
+    -------
+    tuple of pathlib.Path
+        What was written.
+
+    Raises
+    ------
+    SeqoptError
+        With one line that says what to change.
+    """
+    words = {"folder": plan, "engine": engine, "mortar": mortar, "no_stability": not stability}
+    words |= {"film": film, "figures": figures, "cache": cache, "out": out}
+    with _asked(_report.Report, words, progress) as asked:
+        return _report.run(asked).written
+
+
+@contextmanager
+def _asked(
+    kind: type[_Asked], words: Mapping[str, object], progress: Tell | None
+) -> Iterator[_Asked]:
+    """Yield what a command is asked, while it is shown how far it is."""
+    with Watcher(shows=progress is None) as shown:
+        yield given(kind, words, tell=progress or shown)
