@@ -12,10 +12,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import pandas as pd
 
+from seqopt._cli.answer import Answer
 from seqopt._cli.bare import instance as _instance
 from seqopt._cli.commands import analyze as _analyze
 from seqopt._cli.commands import assess as _assess
@@ -64,6 +65,13 @@ Limits: TypeAlias = Sequence[Limit | str] | Limit | str
 Rules: TypeAlias = FreeRules | Sequence[str] | str
 Stands: TypeAlias = Standing | Mortar | str
 _Asked = TypeVar("_Asked", bound=Asked)
+COMMAND_LINE = {  # what a parameter is called there
+    "criterion": "criteria",
+    "limits": "limit",
+    "budgets": "budget",
+    "rules": "rule",
+    "rounding": "round",
+}
 
 
 def compare(
@@ -115,10 +123,7 @@ def compare(
     >>> float(found.table.loc["sequential", "F_rob"].round(1))
     37.3
     """
-    words = {"criteria": criterion, "robots": robots, "order": order, "grips": grips}
-    words |= {"engine": engine, "mortar": mortar, "speed": speed, "no_stability": not stability}
-    words |= {"scene": scene, "cache": cache, "out": out}
-    with _asked(_compare.Compare, words, progress) as asked:
+    with _asked(_compare.Compare, locals()) as asked:
         found = _compare.find(asked)
         if asked.out is not None:
             _compare.answered(asked, found)
@@ -133,11 +138,11 @@ def pareto(
     rules: Rules | None = None,
     limits: Limits = (),
     stands: Stands | None = None,
-    rounding: Mapping[str, float] | Words = (),
     robots: int | Words | None = None,
     order: Words | None = None,
     engine: str | None = None,
     mortar: Mortar | str | None = None,
+    rounding: Mapping[str, float] | Words = (),
     seconds: float | None = None,
     stability: bool = True,
     out: Path | str | None = None,
@@ -176,12 +181,7 @@ def pareto(
     >>> pareto("wall:columns=2,courses=2", aim="F_largest,steps")
     <Front: 1 plans, complete; F_largest, steps, regrips>
     """
-    if isinstance(rounding, Mapping):
-        rounding = [f"{name}={step!r}" for name, step in rounding.items()]
-    words = {"schedule": schedule, "aim": aim, "rule": rules, "limit": limits, "stands": stands}
-    words |= {"round": rounding, "robots": robots, "order": order, "engine": engine}
-    words |= {"mortar": mortar, "seconds": seconds, "no_stability": not stability}
-    with _asked(_pareto.Pareto, words | {"scene": scene, "out": out}, progress) as asked:
+    with _asked(_pareto.Pareto, locals()) as asked:
         found = _pareto.find(asked)
         if asked.out is not None:
             _pareto.answered(asked, found)
@@ -197,9 +197,9 @@ def assess(
     mortar: Mortar | str | None = None,
     margins: Words | None = None,
     steps: str | None = None,
-    load_factor: bool = False,
     map: str | None = None,  # noqa: A002  # as of the command
     holds: Words | None = None,
+    load_factor: bool = False,
     workers: int = 1,
     cache: Path | str | None = None,
     out: Path | str | None = None,
@@ -240,16 +240,9 @@ def assess(
     >>> assess("wall:columns=2,courses=2", mortar="dry")["verdict"].value_counts().to_dict()
     {'stands': 7}
     """
-    words = {"scene": scene, "method": method, "plan": plan, "robots": robots, "mortar": mortar}
-    words |= {"margins": margins, "steps": steps, "load_factor": load_factor, "map": map}
-    words |= {"holds": holds, "workers": workers, "cache": cache, "out": out}
-    with _asked(_assess.Assess, words, progress) as asked:
+    with _asked(_assess.Assess, locals()) as asked:
         answer = _assess.run(asked)
-        found = answer.facts["steps" if asked.map is None else "cases"]
-        assert isinstance(found, pd.DataFrame | list)
-        table = found if isinstance(found, pd.DataFrame) else pd.DataFrame(found)
-        table.attrs["notes"] = [*answer.notes]
-        return table
+        return _table(answer, "steps" if asked.map is None else "cases")
 
 
 def analyze(
@@ -261,7 +254,7 @@ def analyze(
     engine: str | None = None,
     mortar: Mortar | str | None = None,
     staged: str | None = None,
-    tolerance: bool = False,
+    tolerance: str | None = None,
     cache: Path | str | None = None,
     out: Path | str | None = None,
     progress: Tell | None = None,
@@ -274,8 +267,9 @@ def analyze(
         What is built; of a scene a fixed method is taken.
     method, plan, robots, engine, mortar, staged : optional
         As of the command.
-    tolerance : bool
-        Find also how far every grip may be from where it should be, mm.
+    tolerance : str, optional
+        Find also how far every grip may be from where it should be, mm; of a length, as
+        ``"0.4mm"``, whether it is less.
     cache : pathlib.Path or str, optional
         Folder that keeps postures of arms.
     out : pathlib.Path or str, optional
@@ -299,13 +293,9 @@ def analyze(
     >>> analyze("wall:columns=2,courses=2", method="sequential").shape[0]
     7
     """
-    words = {"scene": scene, "method": method, "plan": plan, "robots": robots, "engine": engine}
-    words |= {"mortar": mortar, "staged": staged, "tolerance": "" if tolerance else None}
-    with _asked(_analyze.Analyze, words | {"cache": cache, "out": out}, progress) as asked:
+    with _asked(_analyze.Analyze, locals()) as asked:
         answer = _analyze.run(asked)
-        table = pd.DataFrame(answer.facts["steps"])
-        table.attrs |= {"notes": [*answer.notes], "failures": [*answer.failures]}
-        return table
+        return _table(answer, "steps", failures=[*answer.failures])
 
 
 def times(
@@ -315,9 +305,9 @@ def times(
     plan: ShownBuild | Path | str | None = None,
     robots: Words | None = None,
     durations: Words = (),
-    reassign: bool = False,
     stands: Stands | None = None,
     curing: Words = (),
+    reassign: bool = False,
     cache: Path | str | None = None,
     out: Path | str | None = None,
     progress: Tell | None = None,
@@ -354,13 +344,9 @@ def times(
     >>> float(times("wall:columns=2,courses=2", method="sequential")["end_s"].iloc[-1])
     185.0
     """
-    words = {"scene": scene, "method": method, "plan": plan, "robots": robots}
-    words |= {"durations": durations, "reassign": reassign, "stands": stands, "curing": curing}
-    with _asked(_times.Times, words | {"cache": cache, "out": out}, progress) as asked:
-        facts = _times.run(asked).facts
-        table = pd.DataFrame(facts["steps"])
-        table.attrs["robots"] = facts["robots"]
-        return table
+    with _asked(_times.Times, locals()) as asked:
+        answer = _times.run(asked)
+        return _table(answer, "steps", robots=answer.facts["robots"])
 
 
 def reach(
@@ -398,9 +384,8 @@ def reach(
     >>> bool(reach("wall:columns=2,courses=2")["reached"].all())
     True
     """
-    words = {"scene": scene, "cache": cache, "out": out}
-    with _asked(_reach.Reach, words, progress) as asked:
-        return pd.DataFrame(_reach.run(asked).facts["reach"])
+    with _asked(_reach.Reach, locals()) as asked:
+        return _table(_reach.run(asked), "reach")
 
 
 def replan(
@@ -420,8 +405,8 @@ def replan(
     criterion: Criterion | str | None = None,
     limits: Limits = (),
     stands: Stands | None = None,
-    time_limit: float | None = None,
     engine: str | None = None,
+    time_limit: float | None = None,
     out: Path | str | None = None,
     progress: Tell | None = None,
 ) -> Plan:
@@ -460,11 +445,7 @@ def replan(
     >>> replan(plan, at=2, lost=["rob3"], rules="rules="least_grips=1"").steps[0].number
     3
     """
-    words = {"plan": plan, "at": at, "lost": lost, "payload": payload, "grips": grips}
-    words |= {"robots": robots, "missing": missing, "measured": measured, "to": to, "rule": rules}
-    words |= {"durations": durations, "aim": aim, "criteria": criterion, "limit": limits}
-    words |= {"stands": stands, "time_limit": time_limit, "engine": engine, "out": out}
-    with _asked(_replan.Replan, words, progress) as asked:
+    with _asked(_replan.Replan, locals()) as asked:
         found = _replan.find(asked)
         if asked.out is not None:
             _replan.answered(asked, found)
@@ -525,11 +506,7 @@ def instance(
     >>> instance("wall:columns=2,courses=2", schedule="free", aim="minmax").name
     'wall 2 x 2'
     """
-    words = {"scene": scene, "schedule": schedule, "criteria": criterion, "aim": aim}
-    words |= {"formulation": formulation, "limit": limits, "budget": budgets, "stands": stands}
-    words |= {"rule": rules, "robots": robots, "order": order, "candidates": candidates}
-    words |= {"durations": durations, "engine": engine, "name": name, "below": below, "out": out}
-    with _asked(_instance.Instance, words, progress) as asked:
+    with _asked(_instance.Instance, locals()) as asked:
         found = _instance.find(asked)
         if asked.out is not None:
             _instance.write(asked, found, asked.out)
@@ -537,7 +514,7 @@ def instance(
 
 
 def export(
-    plan: Built,
+    folder: Built,
     format: str = "csv",  # noqa: A002  # as of the command
     *,
     source: Path | str | None = None,
@@ -550,7 +527,7 @@ def export(
 
     Parameters
     ----------
-    plan : Plan, Scene, pathlib.Path or str
+    folder : Plan, Scene, pathlib.Path or str
         The plan or its folder; of a scene the usual steps are taken.
     format : str
         A name in `seqopt.exchange.formats.EXPORTS`.
@@ -579,14 +556,13 @@ def export(
     >>> len(export("wall:columns=2,courses=2").splitlines())
     29
     """
-    words = {"folder": plan, "format": format, "source": source, "distance": distance}
-    with _asked(_export.Export, words | {"cache": cache, "out": out}, progress) as asked:
+    with _asked(_export.Export, locals()) as asked:
         answer = _export.run(asked)
         return answer.data if asked.out is None else asked.out.read_text(encoding="utf-8")
 
 
 def report(
-    plan: Built,
+    folder: Built,
     *,
     engine: str | None = None,
     mortar: Mortar | str | None = None,
@@ -601,7 +577,7 @@ def report(
 
     Parameters
     ----------
-    plan : Plan, Scene, pathlib.Path or str
+    folder : Plan, Scene, pathlib.Path or str
         A plan, a folder of plans, or a scene, whose usual steps are shown.
     engine, mortar : optional
         As of the command.
@@ -626,16 +602,22 @@ def report(
     SeqoptError
         With one line that says what to change.
     """
-    words = {"folder": plan, "engine": engine, "mortar": mortar, "no_stability": not stability}
-    words |= {"film": film, "figures": figures, "cache": cache, "out": out}
-    with _asked(_report.Report, words, progress) as asked:
+    with _asked(_report.Report, locals()) as asked:
         return _report.run(asked).written
 
 
+def _table(answer: Answer, name: str, **more: object) -> pd.DataFrame:
+    """Return a table of an answer, with its notes."""
+    found: Any = answer.facts[name]
+    table = found if isinstance(found, pd.DataFrame) else pd.DataFrame(found)
+    table.attrs |= {"notes": [*answer.notes], **more}
+    return table
+
+
 @contextmanager
-def _asked(
-    kind: type[_Asked], words: Mapping[str, object], progress: Tell | None
-) -> Iterator[_Asked]:
-    """Yield what a command is asked, while it is shown how far it is."""
+def _asked(kind: type[_Asked], parameters: Mapping[str, Any]) -> Iterator[_Asked]:
+    """Yield what a command is asked by the parameters of a function, while progress is shown."""
+    words = {COMMAND_LINE.get(name, name): value for name, value in parameters.items()}
+    progress, stability = words.pop("progress"), words.pop("stability", True)
     with Watcher(shows=progress is None) as shown:
-        yield given(kind, words, tell=progress or shown)
+        yield given(kind, words, no_stability=not stability, tell=progress or shown)

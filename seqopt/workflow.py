@@ -268,5 +268,5 @@ def _free_rules(
 ) -> FreeRules:
     """Return the rules of a free schedule."""
     found = parse_rules(() if rules is None else rules)
-    given = {"robots": robots, "candidates": candidates}
+    given: dict[str, Any] = {"robots": robots, "candidates": candidates}
     return replace(found, **{name: each for name, each in given.items() if each is not None})

@@ -67,8 +67,9 @@ def asked_scene(asked: Built, *, ranged: bool = False) -> Scene:
         scene = with_robots(scene, int(asked.robots))
     if asked.props is not None:
         scene = scene.with_props(*parse_props(asked.props, scene))
-    own = asked.grips is None or (ranged and ".." in asked.grips)
-    return scene if own else parse_grips(asked.grips, scene)
+    if asked.grips is None or (ranged and ".." in asked.grips):
+        return scene
+    return parse_grips(asked.grips, scene)
 
 
 def in_seconds(asked: Timed | Posed, scene: Scene) -> Scene:
@@ -196,7 +197,7 @@ def waits_said(build: ShownBuild) -> Iterator[str]:
 def asked_prover(asked: Judged, network: Network) -> BuildProver:
     """Return what says which steps of builds stand, with the mortars that a command shows."""
     demanded = asked_standing(asked) if isinstance(asked, Stands) else None
-    own = (demanded and asked.stands) or asked.mortar or "epoxy"
+    own = getattr(asked, "stands", None) or asked.mortar or "epoxy"
     mortar = mortar_word(own, "--mortar") if demanded is None else demanded.mortar
     name = own if isinstance(own, str) else _mortar_name(mortar)
     shown = {"dry": Mortar(friction=mortar.friction), name: mortar}

@@ -8,7 +8,7 @@ from typing import Any
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
 from seqopt._cli.options import Fixed
-from seqopt._cli.outputs import figure_notes, require_out, write_outputs
+from seqopt._cli.outputs import figure_notes, require_out, write_outputs, written_to
 from seqopt._cli.terminal import wrapped
 from seqopt._cli.values import count_word, mortar_word
 from seqopt._cli.words.given import given_plan
@@ -47,7 +47,7 @@ def answer_map(asked: Fixed, over: str, holds: Sequence[str]) -> Answer:
     written = write_outputs(asked, lambda: _files(scene, builds, found))
     blocks = ["\n".join(block) for block in (_table(scene, found), _cures(found)) if block]
     if written:
-        where = f"written to {asked.out}; {asked.out / PAGE} shows how steps fall"
+        where = written_to(asked.out, what="how steps fall")
         notes += [*figure_notes()]
     else:
         where = "--out DIR writes tables, a picture and a page that shows how steps fall"
@@ -98,7 +98,7 @@ def _over_bricks(
     try:
         if (plan := given_plan(asked)) is not None:
             raise SceneError(f"plan {plan}: it is for {now} bricks alone")
-        scene_of_bricks(asked.scene, now)
+        scene_of_bricks(str(asked.scene), now)
     except SceneError as error:
         note = f"{error}; this maps steps by how many bricks are placed"
         placed = [count for count in counts if count <= now]
@@ -107,7 +107,7 @@ def _over_bricks(
     scenes, notes = {now: (scene, builds)}, list[str]()
     for count in counts or [round(share * now) for share in SHARES]:
         try:
-            other = in_order(scene_of_bricks(asked.scene, int(count)), asked.order)
+            other = in_order(scene_of_bricks(str(asked.scene), int(count)), asked.order)
             if len(other.bricks) not in scenes:
                 scenes[len(other.bricks)] = other, _asked_builds(asked, other)[0]
         except SeqoptError as error:

@@ -7,7 +7,7 @@ that no docstring of a command describes has its default there, and is no option
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import MISSING, dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
@@ -24,7 +24,7 @@ from seqopt.stability.assessment import MARGINS
 from seqopt.study.published import CRITERIA, PUBLISHED
 from seqopt.work.progress import Tell
 
-NAMES = {  # what stands in braces in the help
+NAMES: dict[str, Callable[[], Iterable[str]]] = {  # what stands in braces in the help
     "criteria": lambda: CRITERIA,
     "engine": lambda: [DEFAULT],
     "formulations": formulation_names,
@@ -317,7 +317,7 @@ class Posed(Judged, Stands, Rules, Team):
     schedule: Any = None
     begin: str | None = word(None, flag="--from")
     to: str | None = None
-    direction: str | None = None
+    direction: Any = None
     keep: str | None = None
     # what optimize alone has
     durations: tuple[str, ...] = ()

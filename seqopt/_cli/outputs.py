@@ -185,11 +185,11 @@ def put_table(
     return {"text": f"{said} written to {path}", "written": (path,)}
 
 
-def written_to(folder: Path | None, *, page: bool = True) -> str:
-    """Return where a folder with a page was written, and what shows it, or how to have one."""
+def written_to(folder: Path | None, *, page: bool = True, what: str = "it step by step") -> str:
+    """Return where a folder with a page was written, and what that shows, or how to have one."""
     if folder is None:
         return "--out DIR writes the plan, its tables and a page that shows it step by step"
-    return f"written to {folder}" + f"; {folder / PAGE} shows it step by step" * page
+    return f"written to {folder}" + f"; {folder / PAGE} shows {what}" * page
 
 
 def write_outputs(asked: Asked, files: Callable[[], Mapping[str, bytes | str]]) -> tuple[Path, ...]:

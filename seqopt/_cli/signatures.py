@@ -67,7 +67,7 @@ def page_of(kind: type[Asked]) -> Page:
         page.read(part.__doc__ or "")
         if part in shared:  # a command may build on another one
             page.lines = {title: each for title, each in page.lines.items() if title[-1:] == "?"}
-    names = {name: ", ".join(made()) for name, made in NAMES.items()}
+    names = {name: ", ".join(NAMES[name]()) for name in NAMES}
     for name, (question, value, text) in page.options.items():
         choices = ", ".join(known[name].get("choices", ()))
         page.options[name] = question, value, text.format(**names, choices=choices)
@@ -122,18 +122,19 @@ def _add(takes: Any, known: Field[Any], value: str, text: str) -> None:
 
 def parsed(kind: type[_Asked], options: Mapping[str, Any], **more: Any) -> _Asked:
     """Return what a command is asked, from what a parser found."""
-    given = {name: tuple(v) if isinstance(v, list) else v for name, v in options.items()}
-    return kind(**given, **more)
+    told: dict[str, Any] = {n: tuple(v) if isinstance(v, list) else v for n, v in options.items()}
+    return kind(**told, **more)
 
 
 def given(kind: type[_Asked], values: Mapping[str, Any], **more: Any) -> _Asked:
     """Return what a command is asked, from values of Python; numbers and lists become words.
 
-    What is None is left to the command. Raises `ProblemError` if a word is none of a choice.
+    What is None is left to the command, and so is what ``more`` says that it has no field for.
+    Raises `ProblemError` if a word is none of a choice.
     """
     known = {each.name: each for each in fields(kind)}
     told = {name: _value(known[name], v) for name, v in values.items() if v is not None}
-    return kind(**told, **more)
+    return kind(**told, **{name: each for name, each in more.items() if name in known})
 
 
 def _value(known: Field[Any], value: Any) -> Any:
@@ -141,6 +142,8 @@ def _value(known: Field[Any], value: Any) -> Any:
     if isinstance(value, bool):
         return value
     if isinstance(known.default, tuple):
+        if isinstance(value, Mapping):
+            value = [f"{name}={_text(each)}" for name, each in value.items()]
         several = value if isinstance(value, Sequence) and not isinstance(value, str) else [value]
         return tuple(map(_text, several))
     if isinstance(known.default, float):

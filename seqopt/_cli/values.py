@@ -205,7 +205,7 @@ def asked_standing(asked: Stands) -> Standing | None:
     return Standing(replace(mortar, **given), tilt, cures)
 
 
-def asked_criterion(asked: Cost) -> Criterion:
+def asked_criterion(asked: Cost | Posed) -> Criterion:
     """Return the criterion that a command is asked for, with what it ranks among."""
     usual = DEFAULTS["any other"].criterion.name
     criterion = parse_criterion(asked.criteria or usual, asked.crown)

@@ -23,7 +23,7 @@ from seqopt._cli.asked import (
     scene_facts,
 )
 from seqopt._cli.options import Fixed
-from seqopt._cli.outputs import keep_apart, put_table, require_out, write_outputs
+from seqopt._cli.outputs import keep_apart, put_table, require_out, write_outputs, written_to
 from seqopt._cli.values import MOST_WORKERS, count_word, mortar_word
 from seqopt._files import csv_text, read_text
 from seqopt._showing import PAGE
@@ -138,7 +138,7 @@ def answer_load_factor(asked: Assess) -> Answer:
         return {"load_factors.csv": csv_text(table), PAGE: page}
 
     written = write_outputs(asked, files)
-    where = f"written to {asked.out}; {asked.out / PAGE} shows how steps give way"
+    where = written_to(asked.out, what="how steps give way")
     lines = [f"{_with_mortar(name)}: {text}" for name, text in said.items()]
     last = tables[-1]  # the mortar that the build counts on
     failing = (last["load_factor"] < 1) | (last["unloaded"] != Verdict.STANDS.value)

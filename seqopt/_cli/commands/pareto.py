@@ -201,7 +201,7 @@ def answered(asked: Pareto, found: Found) -> Answer:
         said += f"; picked row {chosen + 1}: {row}"
     written = write_outputs(asked, lambda: {**files, "scene.json": dump_scene(scene)})
     shown = "" if written else f"{_numbered(front).to_string(max_rows=MOST_ROWS)}\n"
-    if asked.out is not None and picked is not None:
+    if asked.out is not None and asked.pick and picked is not None:
         write = partial(_write_picked, asked.out / "pick", asked.pick, found, chosen, picked)
         clock.spare("the folder of the plan that is picked", write, None)
     points = {"points": shown_table(front.table), "picked": picked}

@@ -101,10 +101,9 @@ def run(asked: Times) -> Answer:
             raise
         where = "--durations" if "durations" in str(error) else "--curing"
         raise ProblemError(f"{where}: {error}") from None
-    least = None
     if asked.reassign:
         build = GivenSequence(build.engine, build.reassigned(), standing=standing)
-        least = build.times()["end_s"].iloc[-1]
+    least = build.times()["end_s"].iloc[-1] if asked.reassign else None
     aged = _aged(asked, build)
     files = {} if aged is None else {"aged.csv": csv_text(aged)}
     written = write_outputs(asked, lambda: time_files(build) | files)
