@@ -342,7 +342,7 @@ def times(
     Examples
     --------
     >>> float(times("wall:columns=2,courses=2", method="sequential")["end_s"].iloc[-1])
-    185.0
+    145.0
     """
     with _asked(_times.Times, locals()) as asked:
         answer = _times.run(asked)
@@ -554,7 +554,7 @@ def export(
     Examples
     --------
     >>> len(export("wall:columns=2,courses=2").splitlines())
-    29
+    8
     """
     with _asked(_export.Export, locals()) as asked:
         answer = _export.run(asked)
