@@ -442,7 +442,7 @@ def replan(
     --------
     >>> import seqopt
     >>> plan = seqopt.optimize("wall:columns=2,courses=2", "free")
-    >>> replan(plan, at=2, lost=["rob3"], rules="rules="least_grips=1"").steps[0].number
+    >>> replan(plan, at=2, lost=["rob3"], rules="least_grips=1").steps[0].number
     3
     """
     with _asked(_replan.Replan, locals()) as asked:
