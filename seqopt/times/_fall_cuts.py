@@ -7,7 +7,7 @@ bricks at once. Who has motions has a floor under every wait.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -131,3 +131,41 @@ class FallCuts:
 
     def _at(self, bricks: int, grips: tuple[Ints, Floats], placed: Floats, times: Floats) -> Bools:
         return self.fall(bricks, grips, self.joints.at(bricks, times, placed))
+
+
+class Floor(Protocol):
+    """What says how long states wait for mortar at least."""
+
+    def starts(
+        self, bricks: int, grips: tuple[Ints, Floats], placed: Floats, start: Floats
+    ) -> Floats:
+        """Return since when states are not known to fall; as of `FallCuts.starts`."""
+
+
+class CuringStates(NamedTuple):
+    """What states of a build in time ask of mortar that cures.
+
+    ``floor``: under waits; ``bricks`` (n,): that stand; ``held``, ``payload`` (n, r): the grips, as
+    of `FallCuts`; ``full`` (b,): at which age all joints that a brick closes have their full bond,
+    s; ``placed`` (b,): when bricks that stand at first were in their places, s, zero of others.
+    """
+
+    floor: Floor
+    bricks: Ints
+    held: Ints
+    payload: Floats
+    full: Floats
+    placed: Floats
+
+    def starts(self, state: Ints, placed: Floats, start: Floats) -> Floats:
+        """Return from when on, no sooner than times (k,), s, states may begin, for all known.
+
+        ``placed`` (k, b): when bricks were in their places; that which a step places counts then.
+        """
+        out = start.copy()
+        for bricks in np.unique(self.bricks[state]).tolist():
+            rows = np.flatnonzero(self.bricks[state] == bricks)
+            if bricks:
+                grips = self.held[state[rows]], self.payload[state[rows]]
+                out[rows] = self.floor.starts(bricks, grips, placed[rows], start[rows])
+        return out

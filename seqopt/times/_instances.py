@@ -86,7 +86,7 @@ def labels_prove(
     strict = np.array([True] + [False] * len(columns))
     limits = Limits(limit_below(value), most, strict)
     closed = Closed(moves, graph.amounts[:, columns], prices, limits)
-    return closed.is_proof(labels, lambda states: np.zeros(len(states), dtype=bool))[0]
+    return closed.is_proof(labels, lambda states: np.zeros(len(states), dtype=bool))
 
 
 def claimed_time(

@@ -19,7 +19,7 @@ from seqopt.arrays import Bools, Floats, Ints
 from seqopt.graph.duality import _to_go
 from seqopt.graph.graph import Graph
 from seqopt.graph.paths import TIED
-from seqopt.times._mortar_floors import CuredRows
+from seqopt.times._fall_cuts import CuringStates
 
 BETTER = 1e-9  # over a value: a build must be better by more than this
 BLOCK = 400_000  # acts that are looked at together
@@ -59,7 +59,7 @@ class TimedMoves:
     """
 
     def __init__(
-        self, graph: Graph, rows: Ints, places: Bools, team: Team, cured: CuredRows | None = None
+        self, graph: Graph, rows: Ints, places: Bools, team: Team, cured: CuringStates | None = None
     ) -> None:
         self.graph, self.rows, self._places, self.team = graph, rows, places, team
         self.cured = cured
@@ -189,10 +189,8 @@ class Closed:
         """What no build ends below, by prices alone, s."""
         return max((float(left[0]) for left in self._left), default=0.0)
 
-    def is_proof(
-        self, labels: tuple[Ints, Floats], excused: Callable[[Ints], Bools]
-    ) -> tuple[bool, int]:
-        """Return whether labels prove that nothing is within the limits, and how many there are.
+    def is_proof(self, labels: tuple[Ints, Floats], excused: Callable[[Ints], Bools]) -> bool:
+        """Return whether labels prove that nothing is within the limits.
 
         ``labels``: numbers of states (N,), and values (N, 1 + c + q); ``excused``: which states of
         some numbers need not be looked at, as they are proven to fall.
@@ -213,7 +211,7 @@ class Closed:
         for block in _blocks(known[0], graph):
             missing.append(self._leads_to(known, *block))
         left = np.unique(np.concatenate(missing))
-        return self._are_dead(left, excused), len(known[0])
+        return self._are_dead(left, excused)
 
     def _are_dead(self, states: Ints, excused: Callable[[Ints], Bools]) -> bool:
         """Return whether all ways from some states to an end pass one that is proven to fall."""
@@ -279,7 +277,7 @@ class Closed:
         cured = self._moves.cured
         if cured is not None:  # what has its full bond could as well be older
             last = 1 + columns + self._amounts.shape[1]
-            older = np.maximum(values[:, last:], values[:, [0]] - cured.floors.full)
+            older = np.maximum(values[:, last:], values[:, [0]] - cured.full)
             stands = np.arange(older.shape[1]) < cured.bricks[state][:, None]
             counted[:, last:] = np.where(stands, older, 0.0)
         out = self._open(state, counted)
