@@ -195,7 +195,7 @@ class Site:
         return cls(bricks, robots, tuple(sorted(scene.blocked_nodes)), scene.up)
 
     def alone(self, robot: int) -> Site:
-        """Return the same with one of the robots, whatever its name and the others."""
+        """Return the site of one of the robots alone, equal for robots that differ in name only."""
         own = self.robots[robot]
         arm = own.arm and replace(own.arm, keeps_apart=True)
         return replace(self, robots=(replace(own, name="alone", arm=arm),))

@@ -92,7 +92,7 @@ def read_urdf(path: Path) -> Urdf:
 def shape_notes(scene: Scene) -> tuple[str, ...]:
     """Return which links of arms have no shapes for collisions, a line for each arm with some.
 
-    Nothing is said of a model that cannot be read: who needs it does.
+    A model that cannot be read has no note: reading it for postures raises the error.
     """
     found = []
     for robot in scene.robots:

@@ -336,7 +336,7 @@ _DEEPEST = 50  # lists and groups within each other
 def is_meshes(document: Any) -> bool:
     """Return whether a document is a mesh of COMPAS, or a list or dictionary of such.
 
-    Lines and what else has no volume count, to be told so.
+    Lines and what else has no volume count, so that the error names them.
     """
     if isinstance(document, list):
         return True

@@ -130,8 +130,8 @@ def touching_faces(
     united and cut into convex pieces, each a face of its own, halfway between the two.
 
     ``shapes``: where they are in the scene; ``gap``: most that may lie between two faces, or by
-    which they may interpenetrate, m; ``progress``: told how far it is, once it takes longer than a
-    second. Raises `FileError` if shapely is not installed.
+    which they may interpenetrate, m; ``progress``: called with how far it is, once it takes longer
+    than a second. Raises `FileError` if shapely is not installed.
 
     Examples
     --------

@@ -310,7 +310,7 @@ def _form_of(path: Path, forms: set[str | None]) -> str:
 
 
 def _one_block(file: Path, content: Content, said: list[str]) -> FileBlock:
-    """Return the one block of a file. ``said``: gets how it was made of several pieces."""
+    """Return the one block of a file. ``said``: a list that gets how several pieces were joined."""
     if len(content.blocks) == 1:
         return replace(content.blocks[0], key=file.stem)
     try:

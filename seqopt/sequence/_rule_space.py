@@ -248,7 +248,7 @@ class FreeSpace(StateRows):
         return ok
 
     def _lawful(self, bricks: int, states: Ints, propped: Sequence[int]) -> Bools:
-        """Return the same with props at bricks, by place in build order from 0."""
+        """Return which states keep the rules with props at bricks, places in build order from 0."""
         held = states[:, : self.robots]
         least = self.rules.fewest_grips(self.network.scene) - len(propped) if bricks > 1 else 0
         ok = np.asarray(self.grips(states) >= least)

@@ -77,7 +77,7 @@ class WallShape:
             )
 
     def _count(self, name: str, extent: str, each: float) -> None:
-        """Set how many bricks there are where it is said how long they are together."""
+        """Set the number of bricks where their total length or height is given."""
         value = getattr(self, extent)
         if value is None and not getattr(self, name):
             raise SceneError(
