@@ -18,7 +18,8 @@ from seqopt.problem.problem import Measure
 from seqopt.sequence._durations import require_durations
 from seqopt.sequence.schedule import Schedule
 from seqopt.sequence.steps import StepKind
-from seqopt.times._label_proof import Closed, Limits, Team, TimedMoves, kept_below, limit_below
+from seqopt.times._acts import Acts, Team, acts_of_rows
+from seqopt.times._label_proof import Closed, Limits, kept_below, limit_below
 from seqopt.times._mortar_floors import cured_rows
 
 
@@ -57,14 +58,14 @@ class _TimedRows:
         at = [scene.node_position(node) for node in tables.nodes[1:].tolist()]
         self._team = Team(times, slow, tables.groups, np.array([(0.0,) * 3, *at]), problem.parks)
 
-    def moves(self, graph: Graph) -> TimedMoves:
-        """Return what moves of a graph of these states take of the time of robots."""
+    def acts(self, graph: Graph) -> Acts:
+        """Return who may act in the moves of a graph of these states, and for how long."""
         places = self.level[graph.target] > self.level[graph.source]
         rules = self.evaluator.problem.rules
         if isinstance(rules, Schedule):
             kinds = [False, *(step.kind is StepKind.PLACE for step in rules.steps)]
             places = np.array(kinds)[self.level[graph.target]]
-        return TimedMoves(graph, self.rows.astype(np.int64), places, self._team, self.cured)
+        return acts_of_rows(graph, self.rows.astype(np.int64), places, self._team, self.cured)
 
     def multipliers(self, proof: LabelProof) -> Floats:
         """Return multipliers (L, 1 + c) of the time of all and of robots, by columns."""
@@ -176,11 +177,11 @@ class _GoalProofs:
             columns, strict = [*columns, k], [*strict, True]
             caps.append(limit_below(claimed))
         limits = Limits(caps[0], np.array(caps[1:]), np.array(strict))
-        moves, multipliers = self._rows.moves(graph), self._rows.multipliers(proof)
-        closed = Closed(moves, graph.amounts[:, columns], multipliers, limits)
+        acts, multipliers = self._rows.acts(graph), self._rows.multipliers(proof)
+        closed = Closed(acts, graph.amounts[:, columns], multipliers, limits)
         labels, cured = self._rows.labels(proof), self._rows.cured
         bricks = 0 if cured is None else len(cured.full)
-        width = 1 + moves.rows.shape[1] + len(columns) + bricks
+        width = 1 + acts.entries.shape[1] + len(columns) + bricks
         if labels[1].shape[1] != width:
             labels = labels[0][:0], np.zeros((0, width))
         if closed.is_proof(labels, self._rows.fallen):
