@@ -22,7 +22,7 @@ from seqopt.engines.discrete._system import build_system
 from seqopt.engines.discrete.engine import _held_nodes
 from seqopt.engines.interface import SPACE, Fields, Want
 from seqopt.engines.rigid._growth import grow_tree
-from seqopt.engines.rigid._mechanism import rigid_structure, share, ungripped_system
+from seqopt.engines.rigid._mechanism import share, ungripped_system
 from seqopt.engines.rigid._mixed import Solution, mixed_system
 from seqopt.engines.rigid._operator import OperatorBuilder
 from seqopt.engines.rigid._response_maps import ResponseMaps, scene_maps
@@ -71,7 +71,7 @@ def values(arch25):
         *(network, network.springs, build_statics(network)),
         *(assembly, face_quadrature(assembly), find_elastic_limits(network, EPOXY)),
         *(SPACE, plane, tree, operator, operator.doubts, parts, share(network)),
-        *(mixed_system(parts, grips), rigid_structure(network, 2)),
+        mixed_system(parts, grips),
         *(Solution(np.zeros(6), np.zeros((1, 6)), np.zeros((0, 3))), system, system.points, held),
         *(settle(held), ComplianceEngine(network).solve(2, [[2]], Want.ALL)),
         *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, EPOXY)),
