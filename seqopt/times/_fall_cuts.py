@@ -133,7 +133,7 @@ class FallCuts:
         return self.fall(bricks, grips, self.joints.at(bricks, times, placed))
 
 
-class Floor(Protocol):
+class _Floor(Protocol):
     """What says how long states wait for mortar at least."""
 
     def starts(
@@ -150,7 +150,7 @@ class CuringStates(NamedTuple):
     s; ``placed`` (b,): when bricks that stand at first were in their places, s, zero of others.
     """
 
-    floor: Floor
+    floor: _Floor
     bricks: Ints
     held: Ints
     payload: Floats

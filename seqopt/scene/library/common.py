@@ -116,7 +116,7 @@ def joint_width(where: str, value: float) -> float:
     return 0.0 if as_float(value) == 0 else positive(where, value, "m, or 0")
 
 
-def running_bond(
+def _running_bond(
     courses: Iterable[tuple[Floats, Floats, Floats]],
     columns: int,
     dimensions: Vector,
@@ -147,7 +147,7 @@ def running_bond(
     return out
 
 
-def bond_pairs(columns: int, bricks: int) -> list[tuple[int, int]]:
+def _bond_pairs(columns: int, bricks: int) -> list[tuple[int, int]]:
     """Return which bricks of a running bond share a joint: with those below, and beside it."""
     out = []
     for i in range(bricks):
