@@ -1,6 +1,7 @@
 """How long builds take: robots that prepare, mortar that cures, and the proof of makespans.
 
-Robots prepare at the same time, and act one after the other:
+The room hands out nothing: others find what it offers in `seqopt._registry`. Robots prepare at the
+same time, and act one after the other:
 
 >>> import seqopt
 >>> from seqopt.times._steps import step_times
@@ -12,3 +13,5 @@ Robots prepare at the same time, and act one after the other:
 >>> times[-1].end
 1340.0
 """
+
+__all__: list[str] = []
