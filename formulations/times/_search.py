@@ -178,7 +178,7 @@ class _InTime(Terse):
 def _searched(
     problem: States, choose: Choose, watch: Watch, tell: Watching, progress: Tell
 ) -> StatePath:
-    """Return the best plan of states that stand as is demanded."""
+    """Return the best plan of states that are proven to stand, where that is demanded."""
     first, waits, best = None, Waits(problem), list[StatePath]()
     try:
         first = narrow(problem, WIDTH, tell)
@@ -238,7 +238,7 @@ def _staged(
 
 
 def _fell(problem: States, wide: Explorer, visited: Visited, path: Sequence[int]) -> bool:
-    """Leave out states of a path that do not stand as is demanded; return whether some do not."""
+    """Leave out states of a path that are not proven to stand; return whether there are any."""
     fell = False
     for level, part, state in visited.of(path) if problem.demands else ():
         if not problem.stand(level, state[None])[0]:

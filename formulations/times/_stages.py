@@ -1,7 +1,7 @@
 """What formulations of time share: states, goals one after the other, and plans from paths.
 
 A formulation of time is a function from a build in time to a `Chosen`: a path, its makespan and
-what no path stays below. Goals before the makespan leave moves out, as without time; where there
+a lower bound. Goals before the makespan leave moves out, as without time; where there
 are budgets, and after the makespan, they are sought by labels that keep all caps at once.
 """
 

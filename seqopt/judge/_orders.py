@@ -135,7 +135,7 @@ class _Orders(Space):
 
 
 def _bound_of_the_whole(problem: AllOrders) -> float:
-    """Return the lower bound from the finished structure, whoever holds it: every order ends so.
+    """Return the lower bound from the finished structure, in which every order ends.
 
     Minus infinity where there are too many grip sets to look at.
     """

@@ -29,7 +29,7 @@ def check_policy(
 
     ``levels`` (n,): of states (n, c), as of the search; ``values`` (n,): of the first goal;
     ``following`` (n,): rows of states, or -1. Raises `SolverError` where a move leads to less, or
-    the best one does not lead to what is said.
+    the best one does not lead to the value in the table.
     """
     if problem.demands:  # which states stand is known of those that were asked alone
         return 0

@@ -271,7 +271,7 @@ class StateEvaluator:
     def _computed(self, bricks: int, grips: Ints, asked: Filter, below: float) -> Floats:
         """Return values, forces and what is within limits of grip sets, side by side.
 
-        Six digits are enough of what is not close to a value or a payload that decides.
+        Six digits are enough where no value or payload that decides is close.
         """
         exact = asked.exact or self._exact or len(grips) <= FEW
         found: Floats = np.column_stack(ask(self.problem, bricks, grips, below, rough=not exact))

@@ -204,7 +204,7 @@ def plan_values(
     ``claimed``: the value of every goal; margins of stability are compared with these, and taken
     from them; ``starts``: where mortar cures, when steps start, s. Result: SI units. Over scenarios
     the largest, but ways, which are those of the scene itself. Raises `SolverError` if a step
-    exceeds a limit, does not stand as is demanded, or has less of a margin.
+    exceeds a limit, is not proven to stand, or has less of a margin.
     """
     if problem.each:
         found = [plan_values(each, steps, claimed) for each in problem.each]

@@ -1,4 +1,4 @@
-"""Motions in which states fall unless joints have bond enough: what no wait may be shorter than.
+"""Lower bounds of waits for mortar: motions in which states fall unless joints have bond enough.
 
 A motion of the blocks takes up work in joints in proportion to their bonds, and in grips. Where
 loads do more, the state falls: an inequality on the bonds of its joints, of all states with as many

@@ -20,9 +20,9 @@ CLOSE = 1e-9  # of a time: what rounding may take from an age
 
 
 class Floors:
-    """How long states wait for mortar at least, by motions in which they fall; each is checked.
+    """Lower bounds of waits for mortar, by motions in which states fall; each is checked.
 
-    ``motions``: as told, (b, 6) in m and rad.
+    ``motions``: that are claimed, (b, 6) in m and rad.
     """
 
     def __init__(self, network: Network, standing: Standing, motions: Sequence[Floats]) -> None:

@@ -209,7 +209,7 @@ def reassigned_steps(
 def _successors(
     team: _Team, label: _Label, step: Step, every: Sequence[Hold], may: May
 ) -> Iterator[_Label]:
-    """Yield the labels after a step, by whoever may act in it."""
+    """Yield the labels after a step, one for every robot that may act in it."""
     ended = [i for i, hold in enumerate(every) if hold.last == step.number - 1]
     begun = [i for i, hold in enumerate(every) if hold.first == step.number]
     choices = (
