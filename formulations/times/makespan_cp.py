@@ -12,8 +12,8 @@ can be step :math:`i`, which takes :math:`p_a` to be prepared and :math:`d_a` to
    & r \text{ stays free} \Rightarrow \rho_{i r} \ge \rho_{i-1, r}, \qquad
    r \text{ lets go} \Rightarrow \rho_{i r} \ge T_i .
 
-That no robot does two things at once follows, and is a constraint as well, since it bounds what is left to
-decide: over the robots of a kind,
+That no robot does two things at once follows, and is a constraint as well, since it bounds what is
+left to decide: over the robots of a kind,
 
 .. math::
 

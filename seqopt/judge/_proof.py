@@ -150,8 +150,7 @@ class Proof:
     def bounds(self, values: Sequence[float]) -> tuple[float, ...]:
         """Return lower bounds, goal by goal, those before it being at their values.
 
-        ``values``: of every goal; bounds of margins mean nothing. Result: infinite where there is no
-        plan.
+        ``values``: of every goal; bounds of margins mean nothing. Infinite where there is no plan.
         """
         least = self.evaluator.least()
         if not self._leaves_room(values, least):
