@@ -296,6 +296,9 @@ class RuleTables(_Tables):
     def fault(self, bricks: int, state: Ints) -> str:
         """Return which rule a state (1, c) breaks, in a few words; empty if none."""
         every = self._broken(bricks, state) if bricks else []
+        if not self._postures.allow(bricks, state)[0]:
+            held = [self.nodes[place].item() for place in state[0, : self.robots] if place > 0]
+            every = [*every, (np.ones(1, dtype=bool), f"arms cannot hold {held} together")]
         return next((words for broken, words in every if broken[0]), "")
 
     def row(self, grips: Grips) -> Ints:

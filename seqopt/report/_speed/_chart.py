@@ -236,7 +236,8 @@ def _points(axes: Axes, speed: SpeedTable, name: str) -> Iterator[tuple[Axes, fl
 
 def _named(axes: Axes, speed: SpeedTable, name: str) -> Iterator[Label]:
     """Yield words for points: above for formulations, each once a level; below for engines."""
-    seen, took, named = _seen(speed, name).sort_values("seconds"), speed.take.name, set[str]()
+    seen, named = _seen(speed, name).sort_values("seconds"), set[str]()
+    took: Any = speed.take.name  # where in the table the row to take is
     for height, level in seen.groupby("height"):
         level = level.sort_values("kept", ascending=False, kind="stable")  # noqa: PLW2901
         if name == "error":
