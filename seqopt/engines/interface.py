@@ -267,7 +267,7 @@ def _couples(grips: int) -> Ints:
     return frozen(np.array([*combinations(range(grips), 2)], dtype=np.int64).reshape(-1, 2).T)
 
 
-def failing_in_a_line(function: Callable[_Asked, _Answer]) -> Callable[_Asked, _Answer]:
+def _failing_in_a_line(function: Callable[_Asked, _Answer]) -> Callable[_Asked, _Answer]:
     """Let numerical failures of a function be a `SolverError`."""
 
     @wraps(function)
@@ -288,7 +288,7 @@ def failing_in_a_line(function: Callable[_Asked, _Answer]) -> Callable[_Asked, _
 
 def no_sets(network: Network, bricks: int, held: int) -> Fields:
     """Return the fields of no grip set at all that would hold some nodes: their shapes."""
-    counts = counts_of_fields(network, bricks)
+    counts = _counts_of_fields(network, bricks)
     empty = {name: np.empty((0, count, *SHAPES[name])) for name, count in counts.items()}
     return Fields(grip_force=np.empty((0, held, 3)), **empty)
 
@@ -299,7 +299,7 @@ def _empty_site(network: Network) -> Fields:
     return Fields(**{n: np.zeros((1, *getattr(empty, n).shape[1:])) for n in _NAMES})
 
 
-def counts_of_fields(network: Network, bricks: int) -> dict[str, int]:
+def _counts_of_fields(network: Network, bricks: int) -> dict[str, int]:
     """Return of how many edges, nodes, ends, springs or bricks each field tells."""
     edges, nodes = network.count_edges(bricks), network.count_nodes(bricks)
     ends, springs = len(network.springs.support), len(network.springs.since)
@@ -344,7 +344,7 @@ class SerialEngine(NamedEngine, ABC):
     All fields are evaluated whatever is asked: the solution dominates the cost.
     """
 
-    @failing_in_a_line
+    @_failing_in_a_line
     def solve(
         self,
         bricks: int,

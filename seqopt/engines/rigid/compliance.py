@@ -29,7 +29,7 @@ from seqopt.engines.interface import (
     Fields,
     NamedEngine,
     Want,
-    failing_in_a_line,
+    _failing_in_a_line,
     grip_columns,
     keep_wanted,
     names_wanted,
@@ -215,7 +215,7 @@ class ComplianceEngine(NamedEngine):
         self._bytes: dict[int, int] = {}  # of them, when they were counted last
         self._asked: set[int] = set()  # brick counts since then
 
-    @failing_in_a_line
+    @_failing_in_a_line
     def solve(
         self,
         bricks: int,
@@ -257,7 +257,7 @@ class ComplianceEngine(NamedEngine):
                 values[wrong] = getattr(better, name)
         return Fields(**found)
 
-    @failing_in_a_line
+    @_failing_in_a_line
     def _extremes(
         self, bricks: int, grips: ArrayLike, want: Want, *, compiled: bool = False
     ) -> Extremes:
