@@ -8,7 +8,7 @@ import numpy as np
 from scipy import linalg
 
 from seqopt.arrays import Floats, Ints
-from seqopt.engines._hands import Hands
+from seqopt.engines._grip_compliance import GripCompliance
 from seqopt.engines.interface import Fields, join_sets, no_sets
 from seqopt.engines.rigid._mechanism import require_resistance
 from seqopt.engines.rigid._mixed import Solution, respond
@@ -20,16 +20,18 @@ _ROUNDING = 1e-13  # a smaller eigenvalue of the assembled stiffness may be roun
 _BACKWARD = 1e-10  # largest backward error of an accepted solution
 
 
-def solve_dense(network: Network, bricks: int, columns: Ints, hands: Hands | None = None) -> Fields:
+def solve_dense(
+    network: Network, bricks: int, columns: Ints, compliance: GripCompliance | None = None
+) -> Fields:
     """Return the fields of grip sets from the stiffness matrix of each.
 
     Raises `MechanismError` if nothing resists a motion; `SolverError` if a motion is resisted too
     little for the assembled stiffness to tell, or the backward error is larger than `_BACKWARD`.
     """
     parts = rigid_structure(network, bricks)
-    if hands is not None and hands.give is not None:
+    if compliance is not None and compliance.matrix is not None:
         raise SolverError("direct solve: it holds rigidly; take another engine for soft grips")
-    far = (hands or Hands()).far(*columns.shape)
+    far = (compliance or GripCompliance()).offsets(*columns.shape)
     each = zip(columns, far, strict=True)
     answers = [_solve_one_dense(network, parts, *one) for one in each]
     return join_sets([no_sets(network, bricks, columns.shape[1]), *answers])

@@ -14,7 +14,7 @@ from seqopt.arrays import Floats, FrozenValue
 from seqopt.contact._elastic_limits import face_quadrature, find_elastic_limits
 from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import DRY, EPOXY
-from seqopt.engines._hands import read_hands
+from seqopt.engines._grip_compliance import read_compliance
 from seqopt.engines._planar import _Plane
 from seqopt.engines.diagnosis import diagnose
 from seqopt.engines.discrete._equilibrium_path import settle
@@ -77,7 +77,7 @@ def values(arch25):
         *(diagnose(network, 2, [2]), proven, proven.answer, assess(assembly, EPOXY)),
         *(load_factor(assembly, EPOXY), arch25.grip_kinds),
         HeldPostures(np.array([0]), np.array([1]), np.array([[0]]), (np.ones((1, 6, 2)),)),
-        read_hands(network, grips[None], [[2]], np.ones((1, 1, 3))),
+        read_compliance(network, grips[None], [[2]], np.ones((1, 1, 3))),
         *_Known(assembly, bonded(assembly, DRY)).motions_of(-np.ones((2, 6))),
         _HoldingForces(0.0, np.zeros(1)),
         *each_verdict(network, sequential(network)[:1], EPOXY),

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy import linalg
 
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints, frozen
-from seqopt.engines._hands import Hands, read_hands
+from seqopt.engines._grip_compliance import GripCompliance, read_compliance
 from seqopt.errors import GripError, SolverError
 from seqopt.network.build import network_of
 from seqopt.network.network import Network
@@ -354,11 +354,13 @@ class SerialEngine(NamedEngine, ABC):
     ) -> Fields:
         """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self.network, bricks, grips)
-        hands = read_hands(self.network, columns, grips, moved)
+        compliance = read_compliance(self.network, columns, grips, moved)
         none = no_sets(self.network, bricks, columns.shape[1])
-        answer = join_sets([none, *self._answers(bricks, columns, hands)])
+        answer = join_sets([none, *self._answers(bricks, columns, compliance)])
         return require_finite(answer, bricks, grips)
 
     @abstractmethod
-    def _answers(self, bricks: int, columns: Ints, hands: Hands | None) -> Iterable[Fields]:
+    def _answers(
+        self, bricks: int, columns: Ints, compliance: GripCompliance | None
+    ) -> Iterable[Fields]:
         """Return the fields of every grip set by itself."""

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from seqopt.arrays import Floats, FrozenValue, Ints, frozen
-from seqopt.engines._hands import Hands
+from seqopt.engines._grip_compliance import GripCompliance
 from seqopt.errors import MechanismError
 from seqopt.network._mechanics import (
     Statics,
@@ -148,11 +148,11 @@ def _side_by_side(gap: sparse.csr_array, stiffness: Floats) -> sparse.csc_array:
 _UNTIED = 1e-13  # share of the largest deformation of ties that is rounding: nothing is tied
 
 
-def _kept_from_turning(columns: Ints, bricks: int, hands: Hands | None) -> Floats:
-    """Return the turns (n, 6b) of bricks that hands of one set resist."""
+def _kept_from_turning(columns: Ints, bricks: int, compliance: GripCompliance | None) -> Floats:
+    """Return the turns (n, 6b) of bricks that grips of one set resist."""
     turns = np.zeros(len(columns), dtype=bool)
-    if hands is not None:
-        turns = hands.each_turns(1, len(columns))[0]
+    if compliance is not None:
+        turns = compliance.transmit_moments(1, len(columns))[0]
     out = np.zeros((3 * int(turns.sum()), 6 * bricks))
     for n, brick in enumerate(columns[turns] // 2):
         out[3 * n : 3 * n + 3, 6 * brick + 3 : 6 * brick + 6] = np.eye(3)
@@ -160,7 +160,7 @@ def _kept_from_turning(columns: Ints, bricks: int, hands: Hands | None) -> Float
 
 
 def free_motion(
-    network: Network, bricks: int, columns: Ints, hands: Hands | None = None
+    network: Network, bricks: int, columns: Ints, compliance: GripCompliance | None = None
 ) -> Floats | None:
     """Return a motion that deforms no spring with any stiffness and moves no held node.
 
@@ -172,7 +172,7 @@ def free_motion(
     parts = ungripped_system(network, bricks)
     node = 3 * network.inner.ravel()[columns][:, None] + np.arange(3)
     held = parts.motion[node.ravel()].toarray()
-    held = np.vstack([held, _kept_from_turning(columns, bricks, hands)]) * parts.twist_unit
+    held = np.vstack([held, _kept_from_turning(columns, bricks, compliance)]) * parts.twist_unit
     ties = np.vstack([parts.deformation[parts.stiffness > 0].toarray(), held])
     with one_thread():
         _, sizes, motions = np.linalg.svd(ties, full_matrices=len(ties) < ties.shape[1])
@@ -183,13 +183,13 @@ def free_motion(
 
 
 def require_resistance(
-    network: Network, bricks: int, columns: Ints, hands: Hands | None = None
+    network: Network, bricks: int, columns: Ints, compliance: GripCompliance | None = None
 ) -> None:
     """Raise `MechanismError` if one grip set leaves a motion that nothing resists.
 
-    A soft grip resists as a rigid one does. ``hands``: of this set.
+    A soft grip resists as a rigid one does. ``compliance``: of this set.
     """
-    motion = free_motion(network, bricks, columns, hands)
+    motion = free_motion(network, bricks, columns, compliance)
     if motion is not None:
         ends = network.node_position[network.inner[:bricks]]
         length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max()
