@@ -23,6 +23,7 @@ from seqopt.judge._states import Filter, Reachable, StateEvaluator, ask
 from seqopt.network.build import build_network
 from seqopt.problem.problem import Measure
 from seqopt.problem.standing import slack
+from seqopt.scene._armed import can_hold
 from seqopt.scene.scene import Order, in_order
 from seqopt.sequence._robot_kinds import node_numbers
 from seqopt.sequence._rule_check import RuleBook
@@ -140,18 +141,27 @@ def _bound_of_the_whole(problem: AllOrders) -> float:
     Minus infinity where there are too many grip sets to look at.
     """
     free, scene = problem.judging(problem.scene.build_order), problem.scene
+    rules, kinds = free.free_rules, scene.grip_kinds
     taken = {*scene.blocked_nodes, *(prop.node for prop in scene.props)}
-    nodes = [n for n in node_numbers(free.network) if n not in taken]
-    rules = free.free_rules
+    nodes = [node for node in node_numbers(free.network) if node not in taken]
+    grips = [  # numbers, of robots of every kind
+        node + kind * kinds.span
+        for kind in np.unique(kinds.of_robot[: len(scene.robots)]).tolist()
+        for node in nodes
+        if can_hold(scene, kind, node)
+    ]
     fewest = max(1, rules.fewest_grips(scene) - len(scene.props))
     held, least = range(fewest, free.space.robots + 1), -np.inf
-    if sum(comb(len(nodes), count) for count in held) <= MOST_SETS:
-        least = min((_least(free, nodes, count) for count in held), default=np.inf)
-    return least if rules.how_it_ends is Ending.HELD else max(least, _least(free, nodes, 0))
+    if sum(comb(len(grips), count) for count in held) <= MOST_SETS:
+        least = min((_least(free, grips, count) for count in held), default=np.inf)
+    return least if rules.how_it_ends is Ending.HELD else max(least, _least(free, grips, 0))
 
 
-def _least(free: States, nodes: list[int], count: int) -> float:
+def _least(free: States, grips: list[int], count: int) -> float:
     """Return the least value of the whole structure with so many grips; infinite if none fits."""
-    grips = np.array([*combinations(nodes, count)], dtype=np.int64)
-    found = ask(free, len(free.network.inner), grips.reshape(comb(len(nodes), count), count))
+    sets = np.array([*combinations(grips, count)], dtype=np.int64)
+    sets = sets.reshape(comb(len(grips), count), count)
+    nodes = np.sort(free.network.scene.grip_kinds.split(sets)[0], axis=1)
+    sets = sets[(np.diff(nodes, axis=1) > 0).all(axis=1)]  # nobody holds what another one holds
+    found = ask(free, len(free.network.inner), sets)
     return float(found.values[found.fit, 0].min(initial=np.inf))

@@ -16,7 +16,7 @@ from seqopt.graph import Explorer
 from seqopt.graph.layers._partial_costs import PartialCosts
 from seqopt.graph.layers.costs import Budget, LayeredCosts
 from seqopt.graph.layers.interface import CostProblem
-from seqopt.graph.orders import AllOrders, OrderStates
+from seqopt.graph.orders import AllOrders, OrderStates, whole_bound
 from seqopt.graph.paths import keep_best, least_peak
 from seqopt.graph.solution import Selection
 from seqopt.graph.states._visits import explore, floors_of_goals
@@ -184,6 +184,18 @@ def test_what_was_left_out_for_a_threshold_bounds_all_orders():
     assert finds_better_order(problem, best) is False
     assert finds_better_order(problem, best * 1.01)
     assert finds_better_order(problem, best * 1.01, most=3) is None  # the whole arch is below that
+
+
+def test_a_soft_first_robot_does_not_raise_the_bound_of_the_whole():
+    """The judge took all grips for those of the first robot; stiffer ones hold better."""
+    scene, held = small_arch(3), FreeRules(ending=Ending.HELD)
+    soft = replace(scene.robots[0], stiffness=(1e5,) * 3)
+    softer = replace(scene, robots=(soft, *scene.robots[1:]))
+    problem, alike = (AllOrders(posed("D_max", each, rules=held)) for each in (softer, scene))
+    best = seqopt.solve(problem).order.selection.objective
+    assert finds_better_order(problem, best) is False
+    assert finds_better_order(problem, best * 1.01)
+    assert whole_bound(problem) == pytest.approx(whole_bound(alike))  # two can hold it alone
 
 
 def test_a_plan_with_more_regrips_is_found_within_the_same_peak():
