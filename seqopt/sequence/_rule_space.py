@@ -71,9 +71,12 @@ class StateRows(Terse):
 
     def for_arms(self, bricks: int, states: Ints) -> Bools:
         """Return which states (n, c) arms can be in while so many bricks stand, (n,)."""
-        held = np.zeros((len(states), len(self.network.scene.robots)), dtype=np.int64)
+        scene = self.network.scene
+        if not scene.has_arms:  # nothing is copied for nobody: this is asked of all states
+            return np.ones(len(states), dtype=bool)
+        held = np.zeros((len(states), len(scene.robots)), dtype=np.int64)
         held[:, [r for kind in self.kinds for r in kind.robots]] = states[:, : self.robots]
-        return go_together(self.network.scene, bricks, held)
+        return go_together(scene, bricks, held)
 
     def codes(self, states: Ints) -> Ints:
         """Return a number (n,) for every state (n, c) that no other one of its level has."""
