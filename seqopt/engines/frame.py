@@ -9,7 +9,7 @@ to check it and to show what that generality costs.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -47,15 +47,8 @@ class FrameEngine(SerialEngine):
         super().__init__(network)
         self._contrast = contrast
 
-    def _answers(
-        self, bricks: int, columns: Ints, compliance: GripCompliance | None
-    ) -> Iterable[Fields]:
-        every = [
-            None if compliance is None else compliance.select(slice(i, i + 1))
-            for i in range(len(columns))
-        ]
-        pairs = zip(columns, every, strict=True)
-        return [_solve_one(self.network, bricks, *each, self._contrast) for each in pairs]
+    def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance | None) -> Fields:
+        return _solve_one(self.network, bricks, columns, compliance, self._contrast)
 
 
 def _solve_one(

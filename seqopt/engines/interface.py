@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import Flag, auto
 from functools import cache, cached_property, wraps
@@ -248,7 +248,7 @@ def grip_columns(network: Network, bricks: int, grips: ArrayLike) -> Ints:
 
 
 def _searched(network: Network, bricks: int, numbers: Ints) -> Ints:
-    """Return the same of numbers of nodes, some of which are wrong or far from all others."""
+    """Return columns by a search: some numbers are wrong or far from all others."""
     known, index = network.index_of_grip
     at = np.searchsorted(known, numbers)
     columns = index.take(at, mode="clip")
@@ -355,12 +355,12 @@ class SerialEngine(NamedEngine, ABC):
         """Return the fields of a partial structure for grip sets (S, r)."""
         columns = grip_columns(self.network, bricks, grips)
         compliance = read_compliance(self.network, columns, grips, moved)
-        none = no_sets(self.network, bricks, columns.shape[1])
-        answer = join_sets([none, *self._answers(bricks, columns, compliance)])
-        return require_finite(answer, bricks, grips)
+        answers = [no_sets(self.network, bricks, columns.shape[1])]
+        for i, held in enumerate(columns):
+            own = None if compliance is None else compliance.select(slice(i, i + 1))
+            answers.append(self._answer(bricks, held, own))
+        return require_finite(join_sets(answers), bricks, grips)
 
     @abstractmethod
-    def _answers(
-        self, bricks: int, columns: Ints, compliance: GripCompliance | None
-    ) -> Iterable[Fields]:
-        """Return the fields of every grip set by itself."""
+    def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance | None) -> Fields:
+        """Return the fields of one grip set, whose columns are (r,)."""

@@ -168,7 +168,7 @@ class LinearRange:
         return {name: left for name, each in tables.items() if (left := self.departures(each))}
 
     def of_steps(self, builds: Mapping[str, Sequence[Step]]) -> dict[str, tuple[Departure, ...]]:
-        """Return the same of builds by their steps: of all states no more is computed."""
+        """Return the limits that builds leave, by their steps: each state is computed once."""
         states, shift = _distinct(builds.values()), RESPONSES["D_max"]
         fields = _each_fields(self.engine, states.values(), Want.DISPLACEMENTS)
         moved = {

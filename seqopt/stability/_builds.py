@@ -92,8 +92,8 @@ class BuildProver:
     """Says which steps of builds stand; what was asked once is known.
 
     ``network``: of the scene in the order in which the builds place bricks; ``mortars``: by what
-    they are called, that of the scene last; without any, nothing is asked; ``progress``: told how
-    far it is; ``refusal``: why nothing can be said, where bricks do not touch; empty otherwise.
+    they are called, that of the scene last; without any, nothing is asked; ``progress``: called
+    with the progress; ``refusal``: why no verdict is found, where bricks do not touch; else empty.
     """
 
     def __init__(

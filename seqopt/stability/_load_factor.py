@@ -75,7 +75,7 @@ class LoadFactor(FrozenValue):
 def load_factor(
     assembly: Assembly, mortar: Mortar, compiled: Compile = compile_equilibrium
 ) -> LoadFactor:
-    """Return the largest multiple of what is applied to an assembly with which it stands."""
+    """Return the largest multiple of its applied loads with which an assembly stands."""
     size = float(np.abs(assembly.applied_load).max())  # over the force scale
     force = float(np.linalg.norm(assembly.applied[:, :3], axis=1).sum())
     scaled = replace(assembly, applied=assembly.applied / (size or 1.0))  # so that z is no share

@@ -53,8 +53,8 @@ class Proven(FrozenValue):
 class Prover:
     """Solves cases of one assembly and proves the answers; counts what the solver claims.
 
-    ``claims``: how the solver said it ended, over all cases; ``unproven``: cases of which nothing
-    was proven.
+    ``claims``: how the solver ended by its own account, over all cases; ``unproven``: cases of
+    which nothing was proven.
     """
 
     def __init__(self, assembly: Assembly, compiled: Compile) -> None:

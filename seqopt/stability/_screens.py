@@ -110,7 +110,7 @@ class Screen:
     def recalled(
         self, bricks: int, held: ArrayLike, payload: ArrayLike | None = None
     ) -> NDArray[np.int8]:
-        """Return the same by what is known already: no program is solved."""
+        """Return verdicts by known proofs alone: no program is solved."""
         return self._found(bricks, held, payload, solve=False)
 
     def _found(

@@ -86,7 +86,7 @@ class TiltedStates:
         return out
 
     def _ask(self, way: int, pull: float, places: Ints, payload: Floats) -> Floats:
-        """Return the brackets (S, 2) of what is survived in a direction."""
+        """Return brackets (S, 2) of the critical pull in a direction."""
         if way not in self._states:
             case = self._cases[way]
             self._states[way] = HeldStates(self._assembly, case, self._compile)
@@ -105,7 +105,7 @@ class TiltedStates:
 
 
 def _settled(pull: float, bracket: Floats) -> Bools:
-    """Return which brackets (S, 2) of what is survived are narrow enough, or far from a pull."""
+    """Return converged brackets (S, 2) of the critical pull, and those far from a given pull."""
     low, high = bracket.T
     narrow = high - low <= GAP * np.maximum(1e-2, high)
     return np.asarray((high < pull) | (low >= _FAR * pull) | narrow | (low >= CAP))

@@ -78,7 +78,7 @@ class Stability(Shown, FrozenValue):
         contact forces that nothing makes develop. Do not trust that it stands. None if the friction
         is not asked for, or it does not stand.
     claims : mapping of Claim to int
-        How the solver said it ended, over all cases that were solved.
+        How the solver ended by its own account, over all cases that were solved.
     unproven : int
         Cases whose answers proved nothing.
 

@@ -62,11 +62,10 @@ class FailureMap:
     steps : pandas.DataFrame
         The ``verdict`` of every ``step`` of these, and of how many ``bricks`` it is.
     motions : mapping of str to (steps, B, 6) float
-        By build, how its steps fall with what is first said to hold, at the ``usual`` value; zero
+        By build, how its steps fall with the first of what holds, at the ``usual`` value; zero
         for those that stand.
     usual : float
-        The value that is nearest to what is taken where nothing is said: the friction of `DRY`, no
-        tilt, or all bricks.
+        The value nearest to the default: the friction of `DRY`, no tilt, or all bricks.
     """
 
     cases: pd.DataFrame

@@ -13,7 +13,6 @@ react. `seqopt.stability` asks less: that forces exist, whatever brings them abo
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -53,24 +52,12 @@ class DiscreteEngine(OpeningEngine):
         self._mortar, self._bed = mortar, bed
         self._systems: dict[int, System] = {}
 
-    def _answers(
-        self, bricks: int, columns: Ints, compliance: GripCompliance | None
-    ) -> Iterable[Fields]:
-        every = [
-            None if compliance is None else compliance.select(slice(i, i + 1))
-            for i in range(len(columns))
-        ]
-        for row, own in zip(columns, every, strict=True):
-            require_resistance(self.network, bricks, row, own)
-        if bricks not in self._systems:
-            self._systems[bricks] = build_system(self.network, bricks, self._mortar, self._bed)
-        each = zip(columns, every, strict=True)
-        return [self._solve_one(self._systems[bricks], *one) for one in each]
-
-    def _solve_one(
-        self, system: System, columns: Ints, compliance: GripCompliance | None
-    ) -> Fields:
+    def _answer(self, bricks: int, columns: Ints, compliance: GripCompliance | None) -> Fields:
         network = self._network
+        require_resistance(network, bricks, columns, compliance)
+        if bricks not in self._systems:
+            self._systems[bricks] = build_system(network, bricks, self._mortar, self._bed)
+        system = self._systems[bricks]
         springs = _springs(network, system, columns, compliance)
         held = self._hold(system, columns, compliance, springs)
         found = settle(held)

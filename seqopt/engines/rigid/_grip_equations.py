@@ -145,7 +145,7 @@ def _solve_positive(system: Floats, negative: int = 0, scale: float = 1.0) -> tu
 
 
 def _solve_few(system: Floats) -> tuple[Floats, Floats] | None:
-    """Return the same of a few systems by LAPACK, one by one; None if one is not definite."""
+    """Solve a few systems by LAPACK, one by one; None if one is not definite."""
     size = system.shape[1]
     answer, pivot = np.empty(system.shape[1:]), np.empty(system.shape[1:])
     for s in range(system.shape[2]):
@@ -380,10 +380,10 @@ def _soften(
     """Add the compliance of grips to equations (k + 1, k, S), as of `_solve_positive`, in place.
 
     Two grips on one brick, of which one is soft, share what acts along it by their stiffness.
-    Where they are nearly rigid that is told apart from what both bear, so that it stays accurate.
+    Where they are nearly rigid, what one bears for the other is an unknown apart, to stay accurate.
 
-    ``off`` (n, S): by how much grips already let their nodes move. Result: the sets in which pairs
-    are told apart, if there are any.
+    ``off`` (n, S): by how much grips already let their nodes move. Result: the sets with such
+    unknowns, if there are any.
     """
     count, sets = system.shape[1:]
     grips = _count_grips(operator, count)
@@ -467,7 +467,7 @@ def _release_moments(
 class _Apart(NamedTuple):
     """Equations of sets in which two grips share a brick and one is soft.
 
-    What both bear along the brick, and what one bears for the other, are told apart.
+    What both bear along the brick, and what one bears for the other, are unknowns apart.
     """
 
     sets: Ints  # (n,)
