@@ -69,24 +69,11 @@ _KEY = "_contacts"
 _SLIVER = 1e-6  # smallest overlap of two faces, as a share of the smaller one
 
 
-class Contacts(dict[int, tuple[str, Floats, Floats]]):
-    """Names, normals (3,) and corners (m, 3) of contacts by springs, found when first asked for.
-
-    They stay with the network: all that are made for it share them.
-    """
-
-    def __init__(self, network: Network) -> None:
-        self._network = network
-        self._kept: dict[int, tuple[str, Floats, Floats]] = vars(network).setdefault(_KEY, {})
-
-    def __missing__(self, spring: int) -> tuple[str, Floats, Floats]:
-        if spring not in self._kept:
-            self._kept[spring] = self._found(spring)
-        self[spring] = self._kept[spring]
-        return self[spring]
-
-    def _found(self, spring: int) -> tuple[str, Floats, Floats]:
-        springs, placed = self._network.springs, self._network.scene.placed
+def contact_at(network: Network, spring: int) -> tuple[str, Floats, Floats]:
+    """Return name, normal (3,) and corners (m, 3) of a spring's contact; the network keeps it."""
+    kept: dict[int, tuple[str, Floats, Floats]] = vars(network).setdefault(_KEY, {})
+    if spring not in kept:
+        springs, placed = network.springs, network.scene.placed
         first, second = springs.bodies[spring]
         name = f"{'ground' if first == GROUND else placed[first].name}-{placed[second].name}"
         axes, corners = springs.axes[spring], springs.face[spring]
@@ -94,12 +81,11 @@ class Contacts(dict[int, tuple[str, Floats, Floats]]):
             between = [placed[b] for b in (first, second) if b != GROUND]
             where, thickness = springs.position[spring], float(springs.thickness[spring])
             axes, corners = _contact(name, between, axes, where, thickness)
-        return frozen((name, axes[0], corners))
+        kept[spring] = frozen((name, axes[0], corners))
+    return kept[spring]
 
 
-def step_assembly(
-    network: Network, bricks: int, grips: Sequence[int | None], known: Contacts | None = None
-) -> Assembly:
+def step_assembly(network: Network, bricks: int, grips: Sequence[int | None]) -> Assembly:
     """Return a partial structure with the grips that hold it: blocks and their contacts.
 
     A joint is a contact over the face that it says. If it says none, its bricks are boxes, and the
@@ -112,8 +98,6 @@ def step_assembly(
     bricks : int
     grips : sequence of (int or None)
         Node that each of the scene's robots holds.
-    known : Contacts, optional
-        Those found for other steps; what is missing joins them.
 
     Returns
     -------
@@ -126,7 +110,7 @@ def step_assembly(
     """
     pairs = zip(grips, network.scene.robots, strict=True)
     held = [(node, robot.payload) for node, robot in pairs if node is not None]
-    bare = bare_assembly(network, bricks, known)
+    bare = bare_assembly(network, bricks)
     props = prop_grips(network, bricks, held=bool(held))
     block = {node: i for i, brick in enumerate(network.scene.placed) for node in brick.nodes}
     nodes = [*(node for node, _ in held), *props.nodes]
@@ -146,15 +130,13 @@ def _applied_rows(network: Network, bricks: int) -> Floats:
     return applied if applied.any() else np.zeros((0, 6))
 
 
-def bare_assembly(network: Network, bricks: int, known: Contacts | None = None) -> Assembly:
+def bare_assembly(network: Network, bricks: int) -> Assembly:
     """Return a partial structure that nobody holds.
 
     Parameters
     ----------
     network : Network
     bricks : int
-    known : Contacts, optional
-        As of `step_assembly`.
 
     Returns
     -------
@@ -166,7 +148,7 @@ def bare_assembly(network: Network, bricks: int, known: Contacts | None = None) 
         If the bricks of a joint do not touch there: see `seqopt.contact.faces`.
     """
     placed, acting = network.scene.placed, network.springs.acting(bricks)
-    contacts = [*map((Contacts(network) if known is None else known).__getitem__, acting.tolist())]
+    contacts = [contact_at(network, spring) for spring in acting.tolist()]
     return Assembly(
         block_name=tuple(brick.name for brick in placed[:bricks]),
         # of the boxes, as their faces: means of inner nodes differ from them by rounding

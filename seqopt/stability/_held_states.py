@@ -15,7 +15,7 @@ import numpy as np
 from seqopt.arrays import Bools, Floats, FrozenValue, Ints
 from seqopt.contact._prop_grips import added, prop_grips
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import Contacts, bare_assembly
+from seqopt.contact.faces import bare_assembly
 from seqopt.errors import plugins
 from seqopt.network.network import Network
 from seqopt.stability.limit_analysis import (
@@ -189,14 +189,12 @@ _Settled = Callable[[Floats], Bools]
 """Says which brackets (S, 2) are narrow enough."""
 
 
-def node_assembly(
-    network: Network, bricks: int, known: Contacts | None = None, *, held: bool = True
-) -> Assembly:
+def node_assembly(network: Network, bricks: int, *, held: bool = True) -> Assembly:
     """Return a partial structure with a grip without payload at every inner node.
 
     ``held``: whether a robot holds any of these, so that props hold.
     """
-    bare = bare_assembly(network, bricks, known)
+    bare = bare_assembly(network, bricks)
     nodes, props = network.inner[:bricks].ravel(), prop_grips(network, bricks, held=held)
     line = np.zeros((len(nodes) if props.line.any() else 0, 3))
     if len(line):

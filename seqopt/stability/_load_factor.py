@@ -14,7 +14,7 @@ import pandas as pd
 
 from seqopt.arrays import Floats, FrozenValue
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import Contacts, step_assembly
+from seqopt.contact.faces import step_assembly
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.errors import SceneError
 from seqopt.network.build import network_of
@@ -139,9 +139,8 @@ def load_factors(
             f"scene {network.scene.name}: load factors know no props that only push; leave out "
             "their directions"
         )
-    known = Contacts(network)
     return tuple(
-        load_factor(step_assembly(network, step.bricks, step.grips, known), mortar)
+        load_factor(step_assembly(network, step.bricks, step.grips), mortar)
         for step in with_progress("finding load factors", require_steps(steps), progress)
     )
 

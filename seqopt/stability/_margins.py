@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.errors import SceneError
 from seqopt.network.build import network_of
@@ -61,7 +60,7 @@ class Margins:
         self, network: Network | Scene, mortar: Mortar | str, compiled: CompileHeld = compile_held
     ) -> None:
         self.network, self.mortar = network_of(network), find_mortar(mortar)
-        self._compile, self._contacts = compiled, Contacts(self.network)
+        self._compile = compiled
         self._levels: dict[tuple[str, Part], tuple[HeldStates, ...]] = {}
         self.screens = {self.mortar.friction: Screen(self.network, self.mortar, 0.0, compiled)}
 
@@ -178,7 +177,7 @@ class Margins:
         out: list[Floats] = []
         for rows, part, places, loads in held_parts(self.network, bricks, *grips):
             if (name, part) not in self._levels:
-                assembly = node_assembly(self.network, bricks, self._contacts, held=part[1])
+                assembly = node_assembly(self.network, bricks, held=part[1])
                 self._levels[name, part] = tuple(
                     HeldStates(assembly, case, self._compile) for case in cases(assembly)
                 )

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 from seqopt.arrays import Bools, Floats, Ints
 from seqopt.contact._prop_grips import prop_grips
 from seqopt.contact.assembly import Assembly
-from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar, find_mortar
 from seqopt.errors import GripError
 from seqopt.network.build import network_of
@@ -37,13 +36,11 @@ Part = tuple[int, bool]  # how many bricks stand, and whether the props hold tha
 class Proofs:
     """What screens of one scene share: what one proves, another need not ask.
 
-    ``contacts``: of the scene; by brick count and mortar ``upright``, by these ``tilted``: what is
-    known of structures; ``answers``: by brick count, what the programs of all mortars found, if
-    they are kept.
+    ``upright``, ``tilted``: what is known of structures by brick count and mortar; ``answers``: by
+    brick count, what the programs of all mortars found, if they are kept.
     """
 
-    def __init__(self, network: Network) -> None:
-        self.contacts = Contacts(network)
+    def __init__(self) -> None:
         self.upright: dict[tuple[Part, Mortar], HeldStates] = {}
         self.tilted: dict[tuple[Part, Mortar], TiltedStates] = {}
         self.keeps = False
@@ -85,7 +82,7 @@ class Screen:
     ) -> None:
         self.network, self.mortar = network_of(network), find_mortar(mortar)
         self.tilt = tilt
-        self._compile, self._proofs = compiled, proofs or Proofs(self.network)
+        self._compile, self._proofs = compiled, proofs or Proofs()
         self._assemblies: dict[Part, Assembly] = {}
 
     @property
@@ -147,8 +144,7 @@ class Screen:
     def _assembly(self, part: Part) -> Assembly:
         if part not in self._assemblies:
             bricks, propped = part
-            contacts = self._proofs.contacts
-            self._assemblies[part] = node_assembly(self.network, bricks, contacts, held=propped)
+            self._assemblies[part] = node_assembly(self.network, bricks, held=propped)
         return self._assemblies[part]
 
 

@@ -12,7 +12,6 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from seqopt.arrays import Bools, Floats, Ints
-from seqopt.contact.faces import Contacts
 from seqopt.contact.mortar import Mortar
 from seqopt.network.network import Network
 from seqopt.stability._held_states import node_assembly
@@ -43,7 +42,6 @@ class FallCuts:
 
     def __init__(self, network: Network, mortar: Mortar, joints: JointsInTime) -> None:
         self._network, self._mortar, self.joints = network, mortar, joints
-        self._contacts = Contacts(network)
         self._cuts: dict[int, list[_Cut]] = {}
         self._loads: dict[int, tuple[float, float]] = {}  # a force, and the sum of loads over it
         self._known: dict[bytes, Floats] = {}
@@ -66,7 +64,7 @@ class FallCuts:
 
     def _cut(self, motion: Floats) -> _Cut:
         bricks = len(motion)
-        assembly = node_assembly(self._network, bricks, self._contacts)
+        assembly = node_assembly(self._network, bricks)
         case = bonded(assembly, self._mortar)
         flat = (motion * np.repeat([1.0, assembly.scales[1]], 3)).ravel()
         flat = np.ldexp(flat, -np.frexp(np.abs(flat).max())[1])
