@@ -9,8 +9,10 @@ the same is written as by the command. Progress is shown in a notebook and at a 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from inspect import Parameter, getdoc, signature
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
@@ -28,7 +30,7 @@ from seqopt._cli.commands import replan as _replan
 from seqopt._cli.commands import report as _report
 from seqopt._cli.commands import times as _times
 from seqopt._cli.options import Asked
-from seqopt._cli.signatures import given
+from seqopt._cli.signatures import given, page_of
 from seqopt._cli.watcher import Watcher
 from seqopt.contact.mortar import Mortar
 from seqopt.graph.instances.instance import Instance
@@ -64,6 +66,7 @@ Words: TypeAlias = Sequence[str] | str
 Limits: TypeAlias = Sequence[Limit | str] | Limit | str
 Rules: TypeAlias = FreeRules | Sequence[str] | str
 Stands: TypeAlias = Standing | Mortar | str
+FLAG = re.compile(r"--([a-z][a-z-]*)")
 _Asked = TypeVar("_Asked", bound=Asked)
 COMMAND_LINE = {  # what a parameter is called there
     "criterion": "criteria",
@@ -72,8 +75,36 @@ COMMAND_LINE = {  # what a parameter is called there
     "rules": "rule",
     "rounding": "round",
 }
+PYTHON = {
+    "stability": "Whether it is proven which steps stand.",
+    "progress": "Told how far it is; by default a notebook or a terminal shows it.",
+}  # what a parameter is that the command line has in another way
+RAISES = "Raises\n------\nSeqoptError\n    With one line that says what to change."
+_Door = TypeVar("_Door", bound=Callable[..., object])
 
 
+def documented(kind: type[Asked]) -> Callable[[_Door], _Door]:
+    """Give a function the parameters that the help of its command describes, each in brief."""
+    options = page_of(kind).options
+
+    def with_parameters(door: _Door) -> _Door:
+        lines = ["Parameters", "----------"]
+        for each in signature(door).parameters.values():
+            help_text = options.get(COMMAND_LINE.get(each.name, each.name), ("", "", ""))[2]
+            about = PYTHON.get(
+                each.name, f"{help_text[:1].upper()}{help_text[1:].partition('; ')[0]}"
+            )
+            about = FLAG.sub(lambda flag: f"``{flag[1].replace('-', '_')}``", about)
+            needed = "" if each.default is Parameter.empty else ", optional"
+            lines += [f"{each.name} : {each.annotation}{needed}", f"    {about}"]
+        head, returns, examples = re.split(r"(?=\nReturns\n)|(?=\nExamples\n)", f"{getdoc(door)}\n")
+        door.__doc__ = "\n".join([head, *lines, returns, RAISES, examples])
+        return door
+
+    return with_parameters
+
+
+@documented(_compare.Compare)
 def compare(
     scene: Built = "arch25",
     *,
@@ -91,31 +122,9 @@ def compare(
 ) -> Comparison:
     """Build a scene in every way that seqopt knows, side by side, as ``seqopt compare`` does.
 
-    Parameters
-    ----------
-    scene : Scene, ShownBuild, pathlib.Path or str
-        What is built.
-    criterion, robots, order, grips, engine, mortar : optional
-        As of the command.
-    speed : float, optional
-        Also chart speed against accuracy, so many seconds for each engine and formulation.
-    stability : bool
-        Whether it is proven which steps stand.
-    cache : pathlib.Path or str, optional
-        Folder that keeps postures of arms.
-    out : pathlib.Path or str, optional
-        Folder to write tables, figures and a page to.
-    progress : callable, optional
-        Told how far it is.
-
     Returns
     -------
     Comparison
-
-    Raises
-    ------
-    SeqoptError
-        With one line that says what to change.
 
     Examples
     --------
@@ -130,6 +139,7 @@ def compare(
         return found.result
 
 
+@documented(_pareto.Pareto)
 def pareto(
     scene: Built = "arch25",
     *,
@@ -150,31 +160,9 @@ def pareto(
 ) -> Front:
     """Find all plans that no other one beats in every aim, as ``seqopt pareto`` does.
 
-    Parameters
-    ----------
-    scene : Scene, ShownBuild, pathlib.Path or str
-        What is built.
-    schedule, aim, rules, limits, stands, robots, order, engine, mortar : optional
-        As of the command.
-    rounding : mapping of str to float, or words
-        Steps to multiples of which numbers are rounded up, SI units.
-    seconds : float, optional
-        Limit of all, after which the points are those that were found.
-    stability : bool
-        Whether it is proven which steps stand, where a folder is written.
-    out : pathlib.Path or str, optional
-        Folder to write.
-    progress : callable, optional
-        Told how far it is.
-
     Returns
     -------
     Front
-
-    Raises
-    ------
-    SeqoptError
-        With one line that says what to change.
 
     Examples
     --------
@@ -188,6 +176,7 @@ def pareto(
         return found.front
 
 
+@documented(_assess.Assess)
 def assess(
     scene: Built = "arch25",
     *,
@@ -207,33 +196,11 @@ def assess(
 ) -> pd.DataFrame:
     """Prove of every step that it stands, or that it does not, as ``seqopt assess`` does.
 
-    Parameters
-    ----------
-    scene : Scene, ShownBuild, pathlib.Path or str
-        What is built; of a scene a fixed method is taken.
-    method, plan, robots, mortar, margins, steps, map, holds : optional
-        As of the command: ``margins="bond,tilt"``, ``steps="40:60"``, ``map="friction"``.
-    load_factor : bool
-        Find how much of the loads every step bears.
-    workers : int
-        Processes to share the steps among.
-    cache : pathlib.Path or str, optional
-        Folder that keeps postures of arms.
-    out : pathlib.Path or str, optional
-        CSV file to write; with ``map`` or ``load_factor`` a folder.
-    progress : callable, optional
-        Told how far it is.
-
     Returns
     -------
     pandas.DataFrame
         A row per mortar and step: dry, then with epoxy, if no ``mortar`` is named; with ``map`` a
         row per build, mortar and value. ``attrs["notes"]`` says what verdicts leave out.
-
-    Raises
-    ------
-    SeqoptError
-        With one line that says what to change.
 
     Examples
     --------
@@ -245,6 +212,7 @@ def assess(
         return _table(answer, "steps" if asked.map is None else "cases")
 
 
+@documented(_analyze.Analyze)
 def analyze(
     scene: Built = "arch25",
     *,
@@ -261,32 +229,11 @@ def analyze(
 ) -> pd.DataFrame:
     """Compute how a structure responds in every step, as ``seqopt analyze`` does.
 
-    Parameters
-    ----------
-    scene : Scene, ShownBuild, pathlib.Path or str
-        What is built; of a scene a fixed method is taken.
-    method, plan, robots, engine, mortar, staged : optional
-        As of the command.
-    tolerance : str, optional
-        Find also how far every grip may be from where it should be, mm; of a length, as
-        ``"0.4mm"``, whether it is less.
-    cache : pathlib.Path or str, optional
-        Folder that keeps postures of arms.
-    out : pathlib.Path or str, optional
-        CSV file to write.
-    progress : callable, optional
-        Told how far it is.
-
     Returns
     -------
     pandas.DataFrame
         A row per step, units in the names of columns. ``attrs["notes"]`` says what is worth
         knowing, ``attrs["failures"]`` which steps are mechanisms, or were not solved.
-
-    Raises
-    ------
-    SeqoptError
-        With one line that says what to change.
 
     Examples
     --------
@@ -298,6 +245,7 @@ def analyze(
         return _table(answer, "steps", failures=[*answer.failures])
 
 
+@documented(_times.Times)
 def times(
     scene: Built = "arch25",
     *,
@@ -314,30 +262,10 @@ def times(
 ) -> pd.DataFrame:
     """Say who does what when in a build, as ``seqopt times`` does.
 
-    Parameters
-    ----------
-    scene : Scene, ShownBuild, pathlib.Path or str
-        What is built; of a scene a fixed method is taken.
-    method, plan, robots, durations, stands, curing : optional
-        As of the command.
-    reassign : bool
-        Give the same grips to the robots with which the build ends first.
-    cache : pathlib.Path or str, optional
-        Folder that keeps postures of arms.
-    out : pathlib.Path or str, optional
-        Folder to write.
-    progress : callable, optional
-        Told how far it is.
-
     Returns
     -------
     pandas.DataFrame
         A row per step, s; ``attrs["robots"]`` is how long each robot does what.
-
-    Raises
-    ------
-    SeqoptError
-        With one line that says what to change.
 
     Examples
     --------
@@ -349,6 +277,7 @@ def times(
         return _table(answer, "steps", robots=answer.facts["robots"])
 
 
+@documented(_reach.Reach)
 def reach(
     scene: Built = "arch25",
     *,
@@ -358,26 +287,10 @@ def reach(
 ) -> pd.DataFrame:
     """Say which robots reach which nodes, as ``seqopt reach`` does.
 
-    Parameters
-    ----------
-    scene : Scene, ShownBuild, pathlib.Path or str
-        What is built.
-    cache : pathlib.Path or str, optional
-        Folder that keeps postures of arms.
-    out : pathlib.Path or str, optional
-        Folder to write.
-    progress : callable, optional
-        Told how far it is.
-
     Returns
     -------
     pandas.DataFrame
         A row per robot and node.
-
-    Raises
-    ------
-    SeqoptError
-        With one line that says what to change.
 
     Examples
     --------
@@ -388,6 +301,7 @@ def reach(
         return _table(_reach.run(asked), "reach")
 
 
+@documented(_replan.Replan)
 def replan(
     plan: Built = "arch25",
     at: int = 1,
@@ -412,31 +326,9 @@ def replan(
 ) -> Plan:
     """Plan the rest of a build after something has changed, as ``seqopt replan`` does.
 
-    Parameters
-    ----------
-    plan : Plan, Scene, pathlib.Path or str
-        The plan or its folder; of a scene the best free schedule is planned first.
-    at : int
-        Number of the last step that was done.
-    lost, payload, grips, robots, missing, measured : optional
-        What has changed, as of the command.
-    to, rules, durations, aim, criterion, limits, stands, engine : optional
-        As of the command; if nothing is said, as of the plan.
-    time_limit : float, optional
-        Seconds of choosing and proof.
-    out : pathlib.Path or str, optional
-        Folder to write.
-    progress : callable, optional
-        Told how far it is.
-
     Returns
     -------
     Plan
-
-    Raises
-    ------
-    SeqoptError
-        With one line that says what to change.
 
     Examples
     --------
@@ -452,6 +344,7 @@ def replan(
         return found.new.plan
 
 
+@documented(_instance.Instance)
 def instance(
     scene: Built = "arch25",
     *,
@@ -475,31 +368,9 @@ def instance(
 ) -> Instance:
     """Return the graph of a problem, for any solver, as ``seqopt instance`` writes it.
 
-    Parameters
-    ----------
-    scene : Scene, ShownBuild, pathlib.Path or str
-        What is built.
-    schedule, criterion, formulation, aim, limits, budgets, stands, rules : optional
-        As of `optimize`.
-    robots, order, candidates, durations, engine : optional
-        As of `optimize`.
-    name : str, optional
-        What it is called.
-    below : float, optional
-        Leave out states of which the first aim, a worst step, takes more.
-    out : pathlib.Path or str, optional
-        File to write, or a folder for all formats.
-    progress : callable, optional
-        Told how far it is.
-
     Returns
     -------
     Instance
-
-    Raises
-    ------
-    SeqoptError
-        With one line that says what to change.
 
     Examples
     --------
@@ -513,6 +384,7 @@ def instance(
         return found
 
 
+@documented(_export.Export)
 def export(
     folder: Built,
     format: str = "csv",  # noqa: A002  # as of the command
@@ -525,31 +397,9 @@ def export(
 ) -> str:
     """Return a plan in a format of others, as ``seqopt export`` writes it.
 
-    Parameters
-    ----------
-    folder : Plan, Scene, pathlib.Path or str
-        The plan or its folder; of a scene the usual steps are taken.
-    format : str
-        A name in `seqopt.exchange.formats.EXPORTS`.
-    source : pathlib.Path or str, optional
-        With a format of COMPAS: the file that was imported.
-    distance : float, optional
-        With tasks: from a grip to where the tool comes from, m.
-    cache : pathlib.Path or str, optional
-        Folder that keeps postures of arms.
-    out : pathlib.Path or str, optional
-        File to write.
-    progress : callable, optional
-        Told how far it is.
-
     Returns
     -------
     str
-
-    Raises
-    ------
-    SeqoptError
-        With one line that says what to change.
 
     Examples
     --------
@@ -561,6 +411,7 @@ def export(
         return answer.data if asked.out is None else asked.out.read_text(encoding="utf-8")
 
 
+@documented(_report.Report)
 def report(
     folder: Built,
     *,
@@ -575,32 +426,15 @@ def report(
 ) -> tuple[Path, ...]:
     """Write a page that shows plans step by step, as ``seqopt report`` does.
 
-    Parameters
-    ----------
-    folder : Plan, Scene, pathlib.Path or str
-        A plan, a folder of plans, or a scene, whose usual steps are shown.
-    engine, mortar : optional
-        As of the command.
-    stability : bool
-        Whether it is proven which steps stand.
-    film, figures : pathlib.Path or str, optional
-        Also a film of the first plan, and a folder of figures.
-    cache : pathlib.Path or str, optional
-        Folder that keeps postures of arms.
-    out : pathlib.Path or str, optional
-        The page; by default in the folder of plans, or named by the scene.
-    progress : callable, optional
-        Told how far it is.
-
     Returns
     -------
     tuple of pathlib.Path
         What was written.
 
-    Raises
-    ------
-    SeqoptError
-        With one line that says what to change.
+    Examples
+    --------
+    >>> report("wall:columns=2,courses=2", out="wall.html")  # doctest: +SKIP
+    (PosixPath('wall.html'),)
     """
     with _asked(_report.Report, locals()) as asked:
         return _report.run(asked).written

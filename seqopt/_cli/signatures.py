@@ -62,15 +62,16 @@ class Page:
 def page_of(kind: type[Asked]) -> Page:
     """Return what docstrings say of a command: first of what it shares with others."""
     own, *shared, root, _ = kind.__mro__
-    page, known = Page(), {each.name: each.metadata for each in fields(kind)}
+    page, known = Page(), {each.name: each for each in fields(kind)}
     for part in (*reversed(shared), own, root):
         page.read(part.__doc__ or "")
         if part in shared:  # a command may build on another one
             page.lines = {title: each for title, each in page.lines.items() if title[-1:] == "?"}
     names = {name: ", ".join(NAMES[name]()) for name in NAMES}
     for name, (question, value, text) in page.options.items():
-        choices = ", ".join(known[name].get("choices", ()))
-        page.options[name] = question, value, text.format(**names, choices=choices)
+        choices = ", ".join(known[name].metadata.get("choices", ()))
+        text = text.format(**names, choices=choices, default=known[name].default)
+        page.options[name] = question, value, text
     return page
 
 

@@ -32,7 +32,7 @@ class Export(options.Postures):
     folder : PLAN_DIR|SCENE
         folder of a plan; of a scene, in its place, the usual steps are taken
     format : NAME
-        what to write: {choices} (default: %(default)s)
+        what to write: {choices} (default: {default})
     source : FILE
         with a format of COMPAS: the file that was imported, to name its elements or to write the
         plan into

@@ -160,7 +160,7 @@ class Optimize(Timed, Cured, Strict, Cost, Aimed, Posed):
         within:1.5 for those at most 1.5 m from them; makes any formulation a heuristic (free: of
         grips on bricks that stand; what is proven holds among these)
     workers : N
-        processes to share the work among; pays from about ten seconds (default: %(default)s)
+        processes to share the work among; pays from about ten seconds (default: {default})
     cache : DIR
         keep answers there and use what is there: a run that was ended goes on
     max_memory : SIZE

@@ -76,7 +76,7 @@ class Pareto(Posed):
 
     aim : NAME,NAME
         what is to be small: responses and, of the free schedule, steps and regrips (default:
-        %(default)s)
+        {default})
     pick : NAME
         also write a folder, pick, of the plan with the least of a column
     round : NAME=STEP

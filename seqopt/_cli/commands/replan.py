@@ -48,7 +48,7 @@ class Replan(Strict, Postures, Judged, Timed, Cured, Cost, Aimed, Rules):
         folder that optimize wrote: its plan, scene and summary; in place of it a scene, for which
         the best free schedule is planned first
     at : STEP
-        number of the last step that was done (default: %(default)s)
+        number of the last step that was done (default: {default})
 
     What has changed?
     lost : ROBOT
