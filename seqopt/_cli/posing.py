@@ -14,7 +14,6 @@ from seqopt._cli.values import (
     asked_resources,
     asked_standing,
     count_word,
-    parse_criterion,
     parse_numbers,
     parse_robots,
 )
@@ -34,7 +33,6 @@ from seqopt.problem.problem import (
     parse_caps,
     parse_robust,
 )
-from seqopt.problem.requirements import Criterion
 from seqopt.scene._props import Prop
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
@@ -44,7 +42,7 @@ from seqopt.sequence.schedule_file import find_schedule
 from seqopt.sequence.steps import StepKind
 from seqopt.times._curing import CuringBuilds
 from seqopt.times._steps import step_times
-from seqopt.workflow import SEARCH, posed
+from seqopt.workflow import DEFAULTS, SEARCH, posed
 
 ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone
 COUNT = 30
@@ -88,7 +86,7 @@ def asked_problem(asked: Posed, change: Change | None = None) -> PosedProblem:
     _require_known(asked, of_states=of_states)
     sought = asked.order == SEARCH
     asked = replace(asked, order=None) if sought else asked
-    criterion = _criterion(asked, of_states=of_states)
+    criterion = asked_criterion(asked, DEFAULTS[FREE if of_states else "any other"].criterion)
     scene = asked_scene(asked)
     if asked.bases is not None:
         if asked.schedule != FREE or asked.order is not None or sought:
@@ -175,15 +173,6 @@ def _wants_states(asked: Posed) -> bool:
         return True
     named = asked.formulation
     return named is not None and find_formulation(named).on in (On.STATES, On.ORDERS, On.TIMES)
-
-
-def _criterion(asked: Posed, *, of_states: bool) -> Criterion | None:
-    """Return the criterion that is asked for; None leaves it to what is posed."""
-    if of_states:
-        named = asked.criteria is not None
-        return parse_criterion(asked.criteria, asked.crown) if named else None
-    said = (asked.criteria, asked.crown, asked.ranked, asked.among)
-    return None if said == (None,) * 4 else asked_criterion(asked)
 
 
 def _asked_moves(asked: Posed, robots: str, network: Network) -> Schedule | FreeRules:

@@ -14,21 +14,19 @@ from seqopt.contact.curing import _find_curing
 from seqopt.contact.mortar import MORTARS, Mortar, find_mortar
 from seqopt.errors import ProblemError, SceneError, StepError, did_you_mean
 from seqopt.graph.formulation import Formulation, as_formulation
-from seqopt.problem._limit_words import LARGEST, NAMES, number_word, split_word
+from seqopt.problem._limit_words import LARGEST, number_word, split_word
 from seqopt.problem.criteria import Among, Ranked, RankSum
 from seqopt.problem.requirements import NEVER, Criterion
 from seqopt.problem.standing import Standing
-from seqopt.responses._choices import CHOICE_RESPONSES
 from seqopt.responses.resources import Resources
 from seqopt.scene._checks import short
 from seqopt.scene.scene import Scene
-from seqopt.study.published import CRITERIA
+from seqopt.study.published import CRITERIA, find_criterion
 from seqopt.work.progress import Tell
-from seqopt.workflow import DEFAULTS
 
-BETWEEN = re.compile(r",(?![^\[]*\])")  # a comma that is not in brackets
 SIZE = re.compile(r"([0-9]*\.?[0-9]+(?:e[0-9]+)?) *((?:[kmgt]i?)?b?)", re.IGNORECASE)
 MOST_WORKERS = 1024
+NAMED = (None, *CRITERIA)
 
 
 def speed_seconds(text: str | None) -> float:
@@ -51,15 +49,6 @@ def count_word(text: str | None, where: str, most: int, least: int = 1, usual: i
     if not (text.isascii() and text.isdecimal()) or not least <= int(text[:12]) <= most:
         raise ProblemError(f"{where} {text}: give a whole number from {least} to {most}")
     return int(text)
-
-
-def _response_word(name: str) -> str:
-    if name not in (*NAMES, "F_each") and not name.startswith("F_"):
-        names = (*CRITERIA, *CHOICE_RESPONSES, "F_each")
-        hint = did_you_mean(name, names)
-        known = ", ".join(names)
-        raise ProblemError(f"--criteria {name} does not exist{hint}; give {known}, F_ROBOT")
-    return name
 
 
 def parse_robots(text: str) -> tuple[str, ...]:
@@ -205,39 +194,26 @@ def asked_standing(asked: Stands) -> Standing | None:
     return Standing(replace(mortar, **given), tilt, cures)
 
 
-def asked_criterion(asked: Cost | Posed) -> Criterion:
-    """Return the criterion that a command is asked for, with what it ranks among."""
-    usual = DEFAULTS["any other"].criterion.name
-    criterion = parse_criterion(asked.criteria or usual, asked.crown)
-    kinds: dict[str, Any] = {"ranked": Ranked, "among": Among}
-    for name, kind in kinds.items():
-        if (text := getattr(asked, name)) is not None:
-            if not isinstance(criterion, RankSum):
-                raise ProblemError(f"--{name} {text}: {criterion.name} has no ranks; leave it out")
-            criterion = replace(criterion, **{name: kind(text)})
+def asked_criterion(asked: Cost | Posed, usual: Criterion) -> Criterion | None:
+    """Return the criterion that a command is asked for, with what it ranks among; None of nothing.
+
+    ``usual``: of what ranks are said if no criterion is named.
+    """
+    said = {"crown": asked.crown, "ranked": asked.ranked, "among": asked.among}
+    given = {name: text for name, text in said.items() if text is not None}
+    if asked.criteria is None and not given:
+        return None
+    criterion = usual if asked.criteria is None else find_criterion(asked.criteria, "--criteria")
+    for name, text in given.items():
+        if not isinstance(criterion, RankSum) or (name == "crown" and asked.criteria not in NAMED):
+            raise ProblemError(f"--{name} {text}: {criterion.name} has no ranks; leave it out")
+        kinds: dict[str, Any] = {"crown": _crown, "ranked": Ranked, "among": Among}
+        criterion = replace(criterion, **{name: kinds[name](text)})
     return criterion
 
 
-def parse_criterion(text: str | Criterion, crown: str | None = None) -> Criterion:
-    """Return a criterion by name, or a rank sum of responses, as ``T_max,M_sup=2``.
-
-    A weight is 1 by default; ``crown`` has the bricks placed at the crown, or ``none``.
-    """
-    if not isinstance(text, str):  # of Python
-        return text
-    if crown is not None:
-        named = CRITERIA.get(text)
-        if not isinstance(named, RankSum):
-            raise ProblemError(f"--crown {crown}: {text} has none; leave it out")
-        return replace(named, crown=NEVER if crown == "none" else number_word(crown, "--crown"))
-    if text in CRITERIA:
-        return CRITERIA[text]
-    terms = []
-    for part in BETWEEN.split(text):
-        name, weight = split_word(part)
-        response = _response_word(name)
-        terms.append((response, number_word(weight or "1", f"--criteria {part}")))
-    return RankSum(text, tuple(terms), tuple(terms))
+def _crown(text: str) -> float:
+    return NEVER if text == "none" else number_word(text, "--crown")
 
 
 def asked_resources(asked: Posed, progress: Tell | None = None) -> Resources:

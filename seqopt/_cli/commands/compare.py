@@ -51,6 +51,7 @@ from seqopt.sequence.rules import FREE
 from seqopt.stability._builds import BuildProver, BuildVerdicts
 from seqopt.stability.assessment import Verdict
 from seqopt.study.published import PUBLISHED
+from seqopt.workflow import DEFAULTS
 
 ABOUT_STANDING = (
     "Proven as rigid bricks whose joints may open and slide, robots within their payload. First: "
@@ -130,7 +131,8 @@ def find(asked: Compare) -> Found:
     scene = asked_scene(asked, ranged=True)
     find_postures(scene, asked.cache, asked.tell)
     engine = asked_engine(asked, build_network(scene))
-    criterion = asked_criterion(asked)
+    usual = DEFAULTS["any other"].criterion
+    criterion = asked_criterion(asked, usual) or usual
     require_out(asked)
     prover = asked_prover(asked, engine.network)
     robots = parse_robots(asked.robots)
