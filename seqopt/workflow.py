@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from seqopt.contact.mortar import Mortar
-from seqopt.engines.interface import Engine
 from seqopt.engines.registry import DEFAULT, make_engine
 from seqopt.errors import ProblemError
 from seqopt.graph.formulation import On, find_formulation
@@ -20,10 +19,10 @@ from seqopt.network.network import Network
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import in_layers, pose, solve
 from seqopt.problem.criteria import WORST_OVER_METHODS
-from seqopt.problem.problem import WORST_PEAK, Orders, Problem, RobustAim
+from seqopt.problem.problem import WORST_PEAK, Orders, RobustAim
 from seqopt.problem.requirements import Criterion, Limit
 from seqopt.problem.standing import Standing
-from seqopt.responses.resources import HERE, Resources
+from seqopt.responses.resources import Resources
 from seqopt.scene._armed import find_postures
 from seqopt.scene._checks import short
 from seqopt.scene.scenarios import Scenarios
@@ -162,25 +161,19 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
         found, robots = with_robots(found, robots), None
     find_postures(found, search.cache, progress)
     own = make_engine(engine, build_network(found), mortar)
-    moves: Schedule | FreeRules
-    if free:
-        moves = _free_rules(rules, robots, candidates)
-    else:
-        moves = _open(own.network, schedule, robots, candidates, rules)
+    moves = find_moves(own.network, schedule, robots, candidates, rules)
     shared = Resources(search.workers, search.executor, search.cache)
     options, tell = dict(search.options), progress
-    states = _of_states(moves, bool(aim or stands or sought), formulation)
+    states = chooses_states(moves, formulation, others=(aim, stands, sought))
     if not states:
         shared, tell = replace(shared, max_memory=search.max_memory, progress=progress), None
     elif search.max_memory is not None:
         options["max_memory"] = search.max_memory
-    problem = posed(
+    problem = pose(
         own,
         moves,
-        criterion,
-        aim,
-        formulation=formulation,
-        limits=limits,
+        *with_defaults(criterion, aim, over, states=states),
+        limits,
         budgets=budgets,
         stands=stands,
         scenarios=scenarios,
@@ -202,71 +195,44 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
 
 
-def posed(  # noqa: PLR0913  # every question is a word of its own
-    engine: Engine,
-    moves: Schedule | FreeRules,
-    criterion: Criterion | str | None = None,
-    aim: str | None = None,
-    *,
-    formulation: str | None = None,
-    limits: Sequence[Limit | str] | str = (),
-    budgets: Sequence[str] | str = (),
-    stands: Standing | Mortar | str | None = None,
-    scenarios: Scenarios | Sequence[Scene] = (),
-    over: RobustAim | str = WORST_PEAK,
-    orders: Orders | str | None = None,
-    also: Sequence[str] = (),
-    resources: Resources = HERE,
-) -> Problem:
-    """Return the problem of a build, by what people say of it: as of `optimize`, `seqopt.pose`."""
-    states = _of_states(moves, bool(aim or stands or orders), formulation)
+def with_defaults(
+    criterion: Criterion | str | None, aim: str | None, over: RobustAim | str, *, states: bool
+) -> tuple[Criterion, str | tuple[()]]:
+    """Return criterion and aims of a problem, those by default where nothing is said."""
     usual = DEFAULTS[FREE if states else "any other"]
     of_totals = str(over) != str(WORST_PEAK)  # they are of sums
-    return pose(
-        engine,
-        moves,
-        find_criterion(criterion or usual.criterion),
-        aim or (not of_totals and usual.aim) or (),
-        limits,
-        budgets=budgets,
-        stands=stands,
-        scenarios=scenarios,
-        over=over,
-        orders=orders,
-        also=also,
-        resources=resources,
-    )
+    return find_criterion(criterion or usual.criterion), aim or (not of_totals and usual.aim) or ()
 
 
-def _of_states(moves: Schedule | FreeRules, said: bool, formulation: str | None) -> bool:  # noqa: FBT001
-    """Return whether states are chosen, and not candidates of moves; ``said``: by another word."""
-    if said or not in_layers(moves) or formulation is None:
-        return said or not in_layers(moves)
-    return find_formulation(formulation).on in (On.STATES, On.TIMES)
+def chooses_states(
+    moves: Schedule | FreeRules, formulation: str | None, others: Sequence[object] = ()
+) -> bool:
+    """Return whether states are chosen, and not candidates; ``others``: what also asks for it."""
+    if any(others) or not in_layers(moves):
+        return True
+    named = None if formulation is None else find_formulation(formulation)
+    return named is not None and named.on in (On.STATES, On.TIMES)
 
 
-def _open(
+def find_moves(
     network: Network,
     schedule: Schedule | Path | str | None,
     robots: int | Sequence[str] | None,
     candidates: str | None,
-    rules: object,
-) -> Schedule:
-    """Return the schedule with open grips."""
+    rules: FreeRules | Sequence[str] | str | None,
+    where: str = "rules",
+) -> Schedule | FreeRules:
+    """Return the open grips of a schedule, or the rules of the free one, in words or as values.
+
+    ``where``: rules, for messages.
+    """
+    if isinstance(schedule, str) and schedule == FREE:
+        found = parse_rules(() if rules is None else rules, where=where)
+        given: dict[str, Any] = {"robots": robots, "candidates": candidates}
+        return replace(found, **{name: each for name, each in given.items() if each is not None})
     if rules is not None:
-        raise ProblemError(f"rules: only the free schedule has them; give schedule={FREE!r}")
+        raise ProblemError(f"{where}: only the free schedule has them; give schedule={FREE!r}")
     if isinstance(robots, str) or not isinstance(robots, Sequence | None):
         raise ProblemError(f"robots {short(robots)}: give names, as ['rob1', 'rob2']")
-    found = find_schedule(network, schedule, robots or ())
-    return found if candidates is None else thin(found, candidates)
-
-
-def _free_rules(
-    rules: FreeRules | Sequence[str] | str | None,
-    robots: int | Sequence[str] | None,
-    candidates: str | None,
-) -> FreeRules:
-    """Return the rules of a free schedule."""
-    found = parse_rules(() if rules is None else rules)
-    given: dict[str, Any] = {"robots": robots, "candidates": candidates}
-    return replace(found, **{name: each for name, each in given.items() if each is not None})
+    opened = find_schedule(network, schedule, robots or ())
+    return opened if candidates is None else thin(opened, candidates)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import asked_scene, asked_steps, scene_facts
@@ -18,7 +17,7 @@ from seqopt.engines.registry import USUAL, make_engine, versions
 from seqopt.errors import ProblemError, SceneError, SeqoptError
 from seqopt.network.build import build_network
 from seqopt.problem._limit_words import number_word
-from seqopt.report._failures import AXIS_WORDS, Builds, cure_words, failure_page, usual_builds
+from seqopt.report._failures import Builds, failure_blocks, failure_page, usual_builds
 from seqopt.scene._checks import MOST_BRICKS
 from seqopt.scene._counts import scene_of_bricks
 from seqopt.scene.scene import Scene, in_order
@@ -28,7 +27,6 @@ BRICKS = "bricks"
 WAYS = ("friction", "tilt")
 SHARES = (0.5, 0.75, 1.0, 1.25, 1.5)  # of the bricks of a scene, by default
 STEEPEST = 45.0  # degrees
-NAME = 26  # columns of a build with what holds it
 
 
 def answer_map(asked: Fixed, over: str, holds: Sequence[str]) -> Answer:
@@ -45,7 +43,7 @@ def answer_map(asked: Fixed, over: str, holds: Sequence[str]) -> Answer:
     else:
         found = failure_map(scene, builds, holds, axis, values, asked.tell)
     written = write_outputs(asked, lambda: _files(scene, builds, found))
-    blocks = ["\n".join(block) for block in (_table(scene, found), _cures(found)) if block]
+    blocks = failure_blocks(scene, found, wrapped)
     if written:
         where = written_to(asked.out, what="how steps fall")
         notes += [*figure_notes()]
@@ -142,43 +140,3 @@ def _files(scene: Scene, builds: Builds, found: FailureMap) -> dict[str, bytes |
     from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
 
     return files | picture_files("map", failure_figure(found))
-
-
-def _table(scene: Scene, found: FailureMap) -> Iterator[str]:
-    """Yield how many steps fall, a line for every build and what holds it."""
-    cases = found.cases
-    axis = AXIS_WORDS[str(cases["axis"].iloc[0])]
-    yield f"{scene.name}: steps that fall, by {axis}"
-    values = sorted(cases["value"].unique())
-    yield f"{'':{NAME}}{'steps':>5}" + "".join(f"{value:8.3g}" for value in values)
-    for (build, holds), rows in cases.groupby(["build", "holds"], sort=False):
-        steps = rows["steps"].unique()
-        counts = {
-            case["value"]: _count(case, differ=len(steps) > 1) for case in rows.to_dict("records")
-        }
-        cells = "".join(f"{counts.get(value, ''):>8}" for value in values)
-        yield f"{f'{build}, {holds}':{NAME}}{steps[0] if len(steps) == 1 else '':5}{cells}"
-
-
-def _count(case: Mapping[Any, Any], *, differ: bool) -> str:
-    """Return how many steps of a case fall, and of how many where numbers of steps differ."""
-    of = f"/{case['steps']}" if differ else ""
-    open_ = f" ({case['undecided']}?)" if case["undecided"] else ""
-    return f"{case['fall']}{of}{open_}"
-
-
-def _cures(found: FailureMap) -> Sequence[str]:
-    """Return what fails first in every build, and what would cure it."""
-    value = found.usual
-    axis = AXIS_WORDS[str(found.cases["axis"].iloc[0])]
-    here = found.cases[(found.cases["value"] == value) & (found.cases["fall"] > 0)]
-    lines = [wrapped(_first_words(case)) for case in here.to_dict(orient="records")]
-    title = f"What falls first, {axis} {value:.3g}, and what would cure it"
-    return [title, *lines] if lines else []
-
-
-def _first_words(case: Mapping[Any, Any]) -> str:
-    """Return what falls first in a case, and what would cure it."""
-    joint = f", joint {case['joint']} {case['motion']}" if case["joint"] else ""
-    where = f"step {case['first_step']}, brick {case['brick']}{joint}"
-    return f"{case['build']}, {case['holds']}: {where}; {cure_words(case)}"

@@ -29,7 +29,6 @@ from seqopt.scene.scene_file import builtin_scenes, dump_scene
 from seqopt.stability._builds import BuildProver
 
 if TYPE_CHECKING:
-    from seqopt.report._speed._table import SpeedTable
     from seqopt.report.comparison import Comparison
 
 ALWAYS = ("plan.csv", "summary.json", "scene.json", PAGE)  # names in the folder of any plan
@@ -42,47 +41,31 @@ def figure_notes() -> tuple[str, ...]:
     return ("figures are left out, they need matplotlib: pip install 'seqopt[plot]'",)
 
 
-def comparison_files(result: Comparison) -> dict[str, bytes | str]:
-    """Return the tables of a comparison by file name, and its figures if they can be drawn."""
+def comparison_files(result: Comparison, softly: pd.DataFrame) -> dict[str, bytes | str]:
+    """Return the tables of a comparison by file name, and its figures if they can be drawn.
+
+    ``softly``: what builds come to for grips of several stiffnesses, if that is asked.
+    """
+    loop, speed = result.loop, result.speed
     files: dict[str, bytes | str] = {
         "comparison.csv": result.table.to_csv(float_format="%.6g"),
         **{f"steps_{name}.csv": csv_text(table) for name, table in result.tables.items()},
     }
-    if result.loop is not None and result.loop.ranks is not None:
-        files["published_ranks.csv"] = result.loop.ranks.to_csv(index=False)
-    if figure_notes() or result.loop is None:
-        return files
-    from seqopt.report._style import picture_files  # noqa: PLC0415
-    from seqopt.report.charts import comparison_figures  # noqa: PLC0415  # matplotlib is an extra
-
-    for name, figure in comparison_figures(result).items():
-        files |= picture_files(name, figure)
-    return files
-
-
-def softness_files(table: pd.DataFrame) -> dict[str, bytes | str]:
-    """Return what builds come to for grips of several stiffnesses, as table and picture."""
-    if table.empty:
-        return {}
-    files: dict[str, bytes | str] = {"grips.csv": csv_text(table)}
-    if figure_notes():
-        return files
-    from seqopt.report._style import picture_files  # noqa: PLC0415
-    from seqopt.report.charts import _softness_chart  # noqa: PLC0415  # matplotlib is an extra
-
-    return files | picture_files("grips", _softness_chart(table, [*dict.fromkeys(table["build"])]))
-
-
-def speed_files(table: SpeedTable | None) -> dict[str, bytes | str]:
-    """Return speed against accuracy by file name: as table, and as picture where one is drawn."""
-    if table is None:
-        return {}
-    files: dict[str, bytes | str] = {"speed.csv": csv_text(table.table)}
+    files |= {} if softly.empty else {"grips.csv": csv_text(softly)}
+    files |= {} if speed is None else {"speed.csv": csv_text(speed.table)}
+    if loop is not None and loop.ranks is not None:
+        files["published_ranks.csv"] = loop.ranks.to_csv(index=False)
     if figure_notes():
         return files
     from seqopt.report._style import picture_files  # noqa: PLC0415  # matplotlib is an extra
+    from seqopt.report.charts import _softness_chart, comparison_figures  # noqa: PLC0415
 
-    return files | picture_files("speed", table.plot())
+    drawn = {} if loop is None else comparison_figures(result)
+    drawn |= {} if softly.empty else {"grips": _softness_chart(softly, [*softly["build"].unique()])}
+    drawn |= {} if speed is None else {"speed": speed.plot()}
+    for name, figure in drawn.items():
+        files |= picture_files(name, figure)
+    return files
 
 
 def _steps_table(plan: ShownBuild) -> pd.DataFrame:

@@ -23,9 +23,10 @@ from seqopt.arms.reach import find_postures
 from seqopt.errors import ProblemError, StepError
 from seqopt.graph.formulation import On, find_formulation
 from seqopt.network.build import build_network
-from seqopt.network.network import Network
+from seqopt.plan.solving import pose
 from seqopt.problem._limit_words import parse_limits
 from seqopt.problem.problem import (
+    WORST_PEAK,
     Orders,
     Problem,
     RobustAim,
@@ -36,13 +37,11 @@ from seqopt.problem.problem import (
 from seqopt.scene._props import Prop
 from seqopt.scene.scenarios import MOST, Scenarios, scenarios
 from seqopt.scene.scene import Scene
-from seqopt.sequence.rules import FREE, Direction, FreeRules, parse_rules
-from seqopt.sequence.schedule import Schedule, thin
-from seqopt.sequence.schedule_file import find_schedule
+from seqopt.sequence.rules import FREE, Direction, FreeRules
 from seqopt.sequence.steps import StepKind
 from seqopt.times._curing import CuringBuilds
 from seqopt.times._steps import step_times
-from seqopt.workflow import DEFAULTS, SEARCH, posed
+from seqopt.workflow import DEFAULTS, SEARCH, chooses_states, find_moves, with_defaults
 
 ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone
 COUNT = 30
@@ -102,20 +101,28 @@ def asked_problem(asked: Posed, change: Change | None = None) -> PosedProblem:
     words: dict[str, Any] = {"limits": parse_limits(asked.limit, scene, "--limit")}
     (parse_caps if of_states else parse_budgets)(asked.budget)  # said before anything is built
     words["resources"] = asked_resources(asked, None if of_states else asked.tell)
-    words["formulation"] = asked.formulation
     aim = None if asked.robust is None else _asked_aim(asked.robust)
     known, unseen = (None, None) if aim is None else _asked_scenarios(asked, scene)
     words |= {} if aim is None else {"scenarios": known, "over": aim}
     require_out(asked)
     engine = asked_engine(asked, build_network(scene))
-    every = _asked_moves(asked, robots, engine.network)
+    rules = asked.rule if asked.schedule == FREE else None
+    names = parse_robots(robots) or None
+    every = find_moves(engine.network, asked.schedule, names, asked.candidates, rules, "--rule")
+    if isinstance(every, FreeRules) and asked.direction is not None:
+        every = replace(every, direction=asked.direction)
     words |= {"stands": asked_standing(asked), "budgets": asked.budget}
     words |= {"orders": Orders.TIED} if sought else {}
-    problem = posed(engine, between(every, begin, end), criterion, goals, **words)
-    whole = None
-    if begin.site is not None and change is None:
-        whole = posed(engine, between(every, Place(), end), criterion, goals, **words)
-    return PosedProblem(problem, whole, aim, known, unseen, fewest)
+    others = (goals, words["stands"], sought)
+
+    def posed(begin: Place) -> Problem:
+        moves = between(every, begin, end)
+        states = chooses_states(moves, asked.formulation, others)
+        what = with_defaults(criterion, goals, aim or WORST_PEAK, states=states)
+        return pose(engine, moves, *what, **words)
+
+    whole = posed(Place()) if begin.site is not None and change is None else None
+    return PosedProblem(posed(begin), whole, aim, known, unseen, fewest)
 
 
 def _fewest_asked(asked: Posed, scene: Scene) -> tuple[tuple[Prop, ...] | None, str | None]:
@@ -173,18 +180,6 @@ def _wants_states(asked: Posed) -> bool:
         return True
     named = asked.formulation
     return named is not None and find_formulation(named).on in (On.STATES, On.ORDERS, On.TIMES)
-
-
-def _asked_moves(asked: Posed, robots: str, network: Network) -> Schedule | FreeRules:
-    """Return the open grips or the rules that a command is asked for."""
-    rule, names = asked.candidates, parse_robots(robots)
-    if asked.schedule != FREE:
-        schedule = find_schedule(network, asked.schedule, names)
-        return schedule if rule is None else thin(schedule, rule)
-    rules = replace(
-        parse_rules(asked.rule, names, "--rule"), direction=asked.direction or Direction.BUILD
-    )
-    return replace(rules, candidates=rule) if rule else rules
 
 
 def _require_known(asked: Posed, *, of_states: bool) -> None:

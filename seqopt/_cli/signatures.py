@@ -70,8 +70,8 @@ def page_of(kind: type[Asked]) -> Page:
     names = {name: ", ".join(NAMES[name]()) for name in NAMES}
     for name, (question, value, text) in page.options.items():
         choices = ", ".join(known[name].metadata.get("choices", ()))
-        text = text.format(**names, choices=choices, default=known[name].default)
-        page.options[name] = question, value, text
+        more = names | {"choices": choices, "default": known[name].default}
+        page.options[name] = question, value, text.format(**more)
     return page
 
 

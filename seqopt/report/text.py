@@ -13,7 +13,7 @@ import pandas as pd
 from seqopt.arrays import Floats
 from seqopt.problem.criteria import RankSum
 from seqopt.problem.requirements import Criterion, Excess, _prop_faults, _response_along, overloads
-from seqopt.report.comparison import LARGEST, Comparison, LoopFacts
+from seqopt.report.comparison import Comparison
 from seqopt.responses.quantities import RESPONSES, _plain, length_text, robot_response
 from seqopt.responses.table import OUTSIDE, Departure, _Columns, force_column
 from seqopt.scene.scene import Scene
@@ -233,30 +233,6 @@ WORDS = {
 }
 
 
-def format_comparison(comparison: Comparison, scene: Scene, criterion: Criterion) -> str:
-    """Return methods, notes and formulations, one after the other.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        What to tell.
-    scene : Scene
-        Which was compared.
-    criterion : Criterion
-        With which the formulations were compared.
-
-    Returns
-    -------
-    str
-        Of many lines.
-    """
-    notes = "\n".join(["Notes", *(_wrapped(f"- {note}") for note in comparison.notes or ["none"])])
-    plans = f"Loop of robots: not possible here; {comparison.refusal}"
-    if comparison.loop is not None:
-        plans = _formulations(comparison.table, comparison.loop, criterion)
-    return "\n\n".join([_methods(comparison, scene), notes, plans, *_expert(comparison)])
-
-
 def format_details(comparison: Comparison, scene: Scene) -> str:
     """Return forces of robots, plans under both objectives of ranks, and published ranks."""
     return "\n\n".join([_methods(comparison, scene), *_expert(comparison)])
@@ -285,43 +261,6 @@ def _methods(comparison: Comparison, scene: Scene) -> str:
             cells = [f"{_number(own):>13}{_number(beside):>8}" for own, beside in pairs]
         lines.append(f"{str(quantity).replace('1e-3 mm', 'µm'):16}{''.join(cells)}")
     return "\n".join(lines)
-
-
-def _formulations(table: pd.DataFrame, loop: LoopFacts, criterion: Criterion) -> str:
-    """Return a line for every method and formulation, those of one problem under its name."""
-    title = f"{loop.method.capitalize()} loop, criterion {criterion.name}; models"
-    lines = [f"{title}: the different ones that each looks at"]
-    if loop.paper_models is not None:
-        cascading, overlap = loop.paper_models
-        lines = [
-            f"{title} counted as in the paper: {cascading:,} cascading,",
-            f"{overlap:,} with the full overlap; below, the different ones that each looks at",
-        ]
-    names = "".join(f"{name:>8}" for name in LARGEST)
-    lines += ["", f"{'':22}{'objective':>11}{'gap':>8}{names}{'models':>8}{'seconds':>9}"]
-    for problem, rows in table.groupby("problem", sort=False):
-        lines += [f"{problem}:", *(_line(f"  {name}", row) for name, row in rows.iterrows())]
-    lines += [
-        "(N, N m, N, µm; ! a payload is exceeded; gap to the exact optimum of the same aim:",
-        "minimax has its own, free the worst step over what the fixed methods reach; seconds to",
-        "choose and to check: all formulations of the loop share",
-        f"{loop.seconds['respond']:.4f} s for the responses of all choices, "
-        f"{loop.seconds['rank']:.4f} s for ranking them)",
-    ]
-    return "\n".join(lines)
-
-
-def _line(name: str, row: pd.Series[float]) -> str:
-    def cell(value: float, width: int, form: str) -> str:
-        return f"{format(value, form) if np.isfinite(value) else '-':>{width}}"
-
-    return (
-        f"{name:22}{cell(row['objective'], 11, '.2f')}{cell(row['gap'], 8, '.2%')}"
-        f"{_number(row['F_rob']):>7}{'!' if row['overloaded'] else ' '}"
-        + "".join(f"{_number(row[column]):>8}" for column in LARGEST if column != "F_rob")
-        + cell(row["models"], 8, ",.0f")
-        + cell(row["seconds"], 9, ".4f")
-    )
 
 
 def _objectives(table: pd.DataFrame) -> str:
