@@ -83,7 +83,7 @@ RAISES = "Raises\n------\nSeqoptError\n    With one line that says what to chang
 _Door = TypeVar("_Door", bound=Callable[..., object])
 
 
-def documented(kind: type[Asked]) -> Callable[[_Door], _Door]:
+def _documented(kind: type[Asked]) -> Callable[[_Door], _Door]:
     """Give a function the parameters that the help of its command describes, each in brief."""
     options = page_of(kind).options
 
@@ -104,7 +104,7 @@ def documented(kind: type[Asked]) -> Callable[[_Door], _Door]:
     return with_parameters
 
 
-@documented(_compare.Compare)
+@_documented(_compare.Compare)
 def compare(
     scene: Built = "arch25",
     *,
@@ -139,7 +139,7 @@ def compare(
         return found.result
 
 
-@documented(_pareto.Pareto)
+@_documented(_pareto.Pareto)
 def pareto(
     scene: Built = "arch25",
     *,
@@ -176,7 +176,7 @@ def pareto(
         return found.front
 
 
-@documented(_assess.Assess)
+@_documented(_assess.Assess)
 def assess(
     scene: Built = "arch25",
     *,
@@ -212,7 +212,7 @@ def assess(
         return _table(answer, "steps" if asked.map is None else "cases")
 
 
-@documented(_analyze.Analyze)
+@_documented(_analyze.Analyze)
 def analyze(
     scene: Built = "arch25",
     *,
@@ -245,7 +245,7 @@ def analyze(
         return _table(answer, "steps", failures=[*answer.failures])
 
 
-@documented(_times.Times)
+@_documented(_times.Times)
 def times(
     scene: Built = "arch25",
     *,
@@ -277,7 +277,7 @@ def times(
         return _table(answer, "steps", robots=answer.facts["robots"])
 
 
-@documented(_reach.Reach)
+@_documented(_reach.Reach)
 def reach(
     scene: Built = "arch25",
     *,
@@ -301,7 +301,7 @@ def reach(
         return _table(_reach.run(asked), "reach")
 
 
-@documented(_replan.Replan)
+@_documented(_replan.Replan)
 def replan(
     plan: Built = "arch25",
     at: int = 1,
@@ -344,7 +344,7 @@ def replan(
         return found.new.plan
 
 
-@documented(_instance.Instance)
+@_documented(_instance.Instance)
 def instance(
     scene: Built = "arch25",
     *,
@@ -384,7 +384,7 @@ def instance(
         return found
 
 
-@documented(_export.Export)
+@_documented(_export.Export)
 def export(
     folder: Built,
     format: str = "csv",  # noqa: A002  # as of the command
@@ -411,7 +411,7 @@ def export(
         return answer.data if asked.out is None else asked.out.read_text(encoding="utf-8")
 
 
-@documented(_report.Report)
+@_documented(_report.Report)
 def report(
     folder: Built,
     *,

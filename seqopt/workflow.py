@@ -161,10 +161,10 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
         found, robots = with_robots(found, robots), None
     find_postures(found, search.cache, progress)
     own = make_engine(engine, build_network(found), mortar)
-    moves = find_moves(own.network, schedule, robots, candidates, rules)
+    moves = _find_moves(own.network, schedule, robots, candidates, rules)
     shared = Resources(search.workers, search.executor, search.cache)
     options, tell = dict(search.options), progress
-    states = chooses_states(moves, formulation, others=(aim, stands, sought))
+    states = _chooses_states(moves, formulation, others=(aim, stands, sought))
     if not states:
         shared, tell = replace(shared, max_memory=search.max_memory, progress=progress), None
     elif search.max_memory is not None:
@@ -172,7 +172,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     problem = pose(
         own,
         moves,
-        *with_defaults(criterion, aim, over, states=states),
+        *_with_defaults(criterion, aim, over, states=states),
         limits,
         budgets=budgets,
         stands=stands,
@@ -195,7 +195,7 @@ def optimize(  # noqa: PLR0913  # every question is a word of its own
     return replace(plan, seconds={"assemble": assemble, **plan.seconds})
 
 
-def with_defaults(
+def _with_defaults(
     criterion: Criterion | str | None, aim: str | None, over: RobustAim | str, *, states: bool
 ) -> tuple[Criterion, str | tuple[()]]:
     """Return criterion and aims of a problem, those by default where nothing is said."""
@@ -204,7 +204,7 @@ def with_defaults(
     return find_criterion(criterion or usual.criterion), aim or (not of_totals and usual.aim) or ()
 
 
-def chooses_states(
+def _chooses_states(
     moves: Schedule | FreeRules, formulation: str | None, others: Sequence[object] = ()
 ) -> bool:
     """Return whether states are chosen, and not candidates; ``others``: what also asks for it."""
@@ -214,7 +214,7 @@ def chooses_states(
     return named is not None and named.on in (On.STATES, On.TIMES)
 
 
-def find_moves(
+def _find_moves(
     network: Network,
     schedule: Schedule | Path | str | None,
     robots: int | Sequence[str] | None,

@@ -41,7 +41,7 @@ from seqopt.sequence.rules import FREE, Direction, FreeRules
 from seqopt.sequence.steps import StepKind
 from seqopt.times._curing import CuringBuilds
 from seqopt.times._steps import step_times
-from seqopt.workflow import DEFAULTS, SEARCH, chooses_states, find_moves, with_defaults
+from seqopt.workflow import DEFAULTS, SEARCH, _chooses_states, _find_moves, _with_defaults
 
 ALONE = ("scenarios", "unseen", "seed", "vary")  # options that mean something with --robust alone
 COUNT = 30
@@ -108,7 +108,7 @@ def asked_problem(asked: Posed, change: Change | None = None) -> PosedProblem:
     engine = asked_engine(asked, build_network(scene))
     rules = asked.rule if asked.schedule == FREE else None
     names = parse_robots(robots) or None
-    every = find_moves(engine.network, asked.schedule, names, asked.candidates, rules, "--rule")
+    every = _find_moves(engine.network, asked.schedule, names, asked.candidates, rules, "--rule")
     if isinstance(every, FreeRules) and asked.direction is not None:
         every = replace(every, direction=asked.direction)
     words |= {"stands": asked_standing(asked), "budgets": asked.budget}
@@ -117,8 +117,8 @@ def asked_problem(asked: Posed, change: Change | None = None) -> PosedProblem:
 
     def posed(begin: Place) -> Problem:
         moves = between(every, begin, end)
-        states = chooses_states(moves, asked.formulation, others)
-        what = with_defaults(criterion, goals, aim or WORST_PEAK, states=states)
+        states = _chooses_states(moves, asked.formulation, others)
+        what = _with_defaults(criterion, goals, aim or WORST_PEAK, states=states)
         return pose(engine, moves, *what, **words)
 
     whole = posed(Place()) if begin.site is not None and change is None else None
