@@ -90,7 +90,9 @@ class ArmModel:
         self.fixed = [body for body in bodies if body.joint == 0]
         self.moving = [body for body in bodies if body.joint > 0]
         lower, upper = self.model.lowerPositionLimit, self.model.upperPositionLimit
-        turns = np.array([joint.shortname().startswith("JointModelR") for joint in _joints(self)])
+        turns = np.array(
+            [joint.shortname().startswith("JointModelR") for joint in [*self.model.joints][1:]]
+        )
         self.turns: Bools = turns
         self.above = sum(body.joint == 1 for body in self.moving)  # what turns about the base
         self.low: Floats = np.where(turns, np.maximum(lower, -np.pi), lower)
@@ -250,10 +252,6 @@ def flange_of(model: Any, arm: Arm) -> str:
     return name
 
 
-def _joints(model: ArmModel) -> list[Any]:
-    return [*model.model.joints][1:]
-
-
 def _read(pin: Any, path: Path, arm: Arm) -> tuple[Any, Any]:
     """Return the model of a URDF, joints locked that do not move the flange, and its bodies."""
     folders = [str(folder) for folder in [*path.resolve().parents][:UP]]
@@ -347,7 +345,9 @@ class PosedArm:
         pin.forwardKinematics(model.model, data, self._own)
         joints = [model.base.act(data.oMi[j].translation) for j in range(1, model.model.njoints)]
         points = [root, *joints, flange, flange + self.arm.tool_length * axes[:, 2]]
-        apart = (p for i, p in enumerate(points) if not i or not _close(p, points[i - 1]))
+        apart = (
+            p for i, p in enumerate(points) if not i or np.linalg.norm(p - points[i - 1]) > _SAME
+        )
         found = np.array([*apart])
         return found if self.holds else found[[0, 1, 1]]
 
@@ -376,10 +376,6 @@ class PosedArm:
     @property
     def _own(self) -> Floats:
         return np.asarray(self.joints)[: _model(self.arm).joints]
-
-
-def _close(one: Floats, two: Floats) -> bool:
-    return bool(np.linalg.norm(one - two) <= _SAME)
 
 
 def idle_arm(arm: Arm) -> PosedArm:

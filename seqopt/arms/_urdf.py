@@ -78,13 +78,14 @@ def read_urdf(path: Path) -> Urdf:
         name = str(link.get("name"))
         if link.find("collision/geometry") is not None:
             continue
+        mass = link.find("inertial/mass")
         shown = [each for each in link.findall("visual") if each.find("geometry") is not None]
         for each in shown:
             shape = ElementTree.SubElement(link, "collision")
             shape.extend(deepcopy(part) for part in each if part.tag in ("origin", "geometry"))
         if shown:
             visual.append(name)
-        elif name in bodies or _has_mass(link):
+        elif name in bodies or (mass is not None and _number(str(mass.get("value"))) > 0):
             bare.append(name)
     return Urdf(ElementTree.tostring(robot, encoding="unicode"), tuple(visual), tuple(bare))
 
@@ -114,11 +115,6 @@ def _followed(robot: _Link) -> list[str]:
         if name in moved and any(_number(part) for part in shift.split()):
             out.append(name)
     return out
-
-
-def _has_mass(link: _Link) -> bool:
-    mass = link.find("inertial/mass")
-    return mass is not None and _number(str(mass.get("value"))) > 0
 
 
 def _number(text: str) -> float:

@@ -364,12 +364,8 @@ def _points(where: str, rows: Sequence[Any]) -> Floats:
     return found
 
 
-def _mesh(where: str, shape: Any) -> _Solid:
-    return _joined(where, [shape])
-
-
 _READERS: dict[str, Callable[[str, Any], _Solid]] = {
-    "Mesh": _mesh,
+    "Mesh": lambda where, shape: _joined(where, [shape]),
     "Extrusion": _extrusion,
     "Brep": _polysurface,
 }

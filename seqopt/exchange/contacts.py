@@ -375,13 +375,16 @@ def _on_ground(pair: tuple[int, int], face: _FlatFace, bricks: Mapping[int, Bric
 def _off_blocks(content: Content, facets: Sequence[Surface], gap: float) -> list[str]:
     """Say how far faces of a file lie off the blocks that they join; too far is an error."""
     shapely, farthest = import_module("shapely"), 0.0
-    sides = {i: [*_sides(facets[i])] for i in {i for face in content.faces for i in face.blocks}}
+    sides = {
+        i: [flat_face(facets[i].points[list(face)]) for face in facets[i].faces]
+        for i in {i for face in content.faces for i in face.blocks}
+    }
     for held in content.faces:
         for i in held.blocks:
             away = np.full(len(held.corners), np.inf)
-            for side, polygon in sides[i]:
+            for side in sides[i]:
                 seen = (held.corners - side.center) @ side.axes.T
-                beside = shapely.distance(polygon, shapely.points(seen[:, 1:]))
+                beside = shapely.distance(_valid(side.corners), shapely.points(seen[:, 1:]))
                 away = np.minimum(away, np.hypot(seen[:, 0], beside))
             off = float(away.max(initial=0.0))
             if off > max(gap, _OFF * float(np.ptp(facets[i].points, axis=0).max())):
@@ -394,13 +397,6 @@ def _off_blocks(content: Content, facets: Sequence[Surface], gap: float) -> list
     if farthest <= gap:
         return []
     return [f"faces of the file lie up to {1e3 * farthest:.3g} mm off their blocks"]
-
-
-def _sides(solid: Surface) -> Iterator[tuple[_FlatFace, Any]]:
-    """Yield the sides of a block in their mean planes, and as polygons there."""
-    for face in solid.faces:
-        flat = flat_face(solid.points[list(face)])
-        yield flat, _valid(flat.corners)
 
 
 def _file_faces(content: Content, solids: Sequence[_Shape]) -> Iterator[_Held]:
