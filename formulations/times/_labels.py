@@ -90,11 +90,12 @@ def _cheapest(graph: Graph, work: Floats, prices: Floats) -> tuple[Floats, tuple
         tight = costs + left[graph.target] <= left[graph.source] + slack
     tight &= np.isfinite(left[graph.target])
     path = fewest_moves(graph.only(tight))
-    moves = _moves_of(graph, path)
+    moves = moves_of(graph, path)
     return left, path, work[moves].sum(axis=0)
 
 
-def _moves_of(graph: Graph, path: tuple[int, ...]) -> Ints:
+def moves_of(graph: Graph, path: Sequence[int]) -> Ints:
+    """Return the moves (k,) of a path, its start left out: the first of those side by side."""
     codes = graph.source.astype(np.int64) * graph.states + graph.target
     wanted = np.array((0, *path[:-1])) * graph.states + np.array(path)
     return np.asarray(np.searchsorted(codes, wanted))
