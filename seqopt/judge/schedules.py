@@ -65,15 +65,19 @@ def judge_schedule(
         gap = _gap(problem.aims, values, bounds)
         return Certificate(values, bounds, gap, gap)
     proof, claimed = Proof(_weighed(problem, selection), hint), selection.bound
+    margins = _margin_bounds(problem, proof, values)
     if twin is not None:
-        bounds = _timed_bounds(problem, proof, twin, selection, values)
-    elif problem.totals:
-        bounds = proof.bounds(values)
+        found = proof.timed_bounds(twin, values, selection)
     elif problem.budgets:
-        bounds = claimed = _budget_bounds(problem, proof, selection, values)
+        found = proof.budget_bounds(values, claimed, _multipliers(problem, selection))
     else:
-        bounds = claimed = _bounds(problem, proof, values, values if exact else selection.bound)
-    bounds = _closed(values, bounds)
+        found = proof.bounds(values) if len(margins) < len(values) else margins
+    bounds = _closed(values, (*margins, *found[len(margins) :]))
+    if twin is not None:
+        bounds = _with_counts(problem, twin, values, bounds)
+    elif not problem.totals:
+        _require_promised(problem, bounds, values if exact and not problem.budgets else claimed)
+        claimed = bounds
     claimed = _closed(values, tuple(map(max, bounds, claimed)))
     gap, left = (_gap(problem.goals, values, each) for each in (bounds, claimed))
     return Certificate(values, (*bounds, *values[aims:]), gap, left, {}, proof.states)
@@ -103,18 +107,6 @@ def _weighed(problem: States, selection: StatePath) -> States:
     return replace(problem, weights=tuple(weights.tolist()))
 
 
-def _bounds(problem: States, proof: Proof, values: Bounds, promised: Sequence[float]) -> Bounds:
-    """Return lower bounds, goal by goal; none may be below what is promised as the least."""
-    margins = _margin_bounds(problem, proof, values)
-    if len(margins) == len(values):
-        return margins
-    bounds = (*margins, *proof.bounds(values)[len(margins) :])
-    for goal, value, bound in zip(problem.goals, promised, bounds, strict=True):
-        if not goal.of_margins and not bound >= value - BELOW * abs(value):
-            raise SolverError(f"{goal}: {value:.9g} is promised as the least; a plan has less")
-    return bounds
-
-
 def _margin_bounds(problem: States, proof: Proof, values: Bounds) -> Bounds:
     """Return lower bounds of margins, up to their proven width."""
     out: list[float] = []
@@ -127,26 +119,22 @@ def _margin_bounds(problem: States, proof: Proof, values: Bounds) -> Bounds:
     return tuple(out)
 
 
-def _budget_bounds(problem: States, proof: Proof, selection: StatePath, values: Bounds) -> Bounds:
-    """Return Lagrangian bounds of a plan within budgets; none may be below the claimed one."""
-    aims, claimed, multipliers = len(problem.aims), selection.bound, selection.prices
-    if len(multipliers) < aims or any(len(m) < len(problem.budgets) for m in multipliers):
+def _multipliers(problem: States, selection: StatePath) -> Sequence[Sequence[float]]:
+    """Return the multipliers that are claimed of budgets, goal by goal."""
+    found, budgets = selection.prices, len(problem.budgets)
+    if len(found) < len(problem.aims) or any(len(each) < budgets for each in found):
         raise SolverError("there is no price for every budget and goal")
-    margins = _margin_bounds(problem, proof, values)
-    bounds = (*margins, *proof.budget_bounds(values, claimed, multipliers)[len(margins) :])
-    for goal, bound, said in zip(problem.aims, bounds, claimed, strict=False):
-        if not goal.of_margins and not bound >= said - TOLERANCE * abs(said):
-            raise SolverError(f"{goal}: no plan within budgets is promised below {said:.9g}")
-    return bounds
+    return found
 
 
-def _timed_bounds(
-    problem: States, proof: Proof, twin: Twin, selection: StatePath, values: Bounds
-) -> Bounds:
-    """Return lower bounds of a build of which a measure of the whole path counts."""
-    margins = _margin_bounds(problem, proof, values)
-    bounds = (*margins, *proof.timed_bounds(twin, values, selection)[len(margins) :])
-    return _with_counts(problem, twin, values, _closed(values, bounds))
+def _require_promised(problem: States, bounds: Bounds, promised: Sequence[float]) -> None:
+    """Raise a `SolverError` if a bound, not of a margin, is below what is promised."""
+    for goal, bound, least in zip(problem.aims, bounds, promised, strict=False):
+        if not goal.of_margins and not bound >= least - BELOW * abs(least):
+            if not problem.budgets:
+                raise SolverError(f"{goal}: {least:.9g} is promised as the least; a plan has less")
+            if not bound >= least - TOLERANCE * abs(least):
+                raise SolverError(f"{goal}: no plan within budgets is promised below {least:.9g}")
 
 
 def _with_counts(problem: States, twin: Twin | None, values: Bounds, bounds: Bounds) -> Bounds:
