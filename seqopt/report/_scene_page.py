@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from html import escape
 from itertools import cycle
@@ -17,7 +16,15 @@ from seqopt.engines.registry import USUAL, make_engine
 from seqopt.errors import ExtraError, SceneError
 from seqopt.network.build import build_network
 from seqopt.report._robots import ROBOT_COLORS, Cell, _known_arms
-from seqopt.report.page import Build, _build_data, _filled, _part, _rounded, _structure_data
+from seqopt.report.page import (
+    Build,
+    _as_json,
+    _build_data,
+    _filled,
+    _part,
+    _rounded,
+    _structure_data,
+)
 from seqopt.responses.table import force_column
 from seqopt.scene.parts import Side, Sphere
 from seqopt.scene.scene import Scene
@@ -55,7 +62,7 @@ def scene_page(scene: Scene) -> str:
         sentence=f"{len(scene.bricks)} bricks, {ends}, {robots}. seqopt optimize looks for a plan."
         + "".join(f" {escape(doubt)}" for doubt in doubts),
         tables="".join(_part(caption, part) for caption, part in tables.items()),
-        data=json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
+        data=_as_json(data),
     )
 
 
