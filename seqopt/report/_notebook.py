@@ -23,9 +23,8 @@ from seqopt.network.network import Network
 from seqopt.plan.build import ShownBuild
 from seqopt.plan.plan import Plan
 from seqopt.problem.problem import Problem
-from seqopt.report._pages import WORDS
 from seqopt.report.comparison import largest
-from seqopt.report.text import typed
+from seqopt.report.text import IN_UNITS, typed
 from seqopt.responses.quantities import _number_text
 from seqopt.responses.table import OUTSIDE, REMEDY
 from seqopt.scene.boxes import boxes
@@ -219,7 +218,7 @@ def _standing(value: ShownBuild) -> Rows:
 def _worst(value: ShownBuild) -> Rows:
     """Return the largest responses of any step."""
     found = largest(value.engine.network.scene, value.responses())
-    rows = {f"largest {said}": _number_text(found[name]) for name, said in WORDS.items()}
+    rows = {f"largest {said}": _number_text(found[name]) for name, said in IN_UNITS.items()}
     grips = value.grips()
     row = grips.iloc[int(grips["largest_force_N"].argmax())]
     where = f"{row['robot']} at node {row['node']} of brick {row['brick']}, step {row['at_step']}"

@@ -28,9 +28,9 @@ from seqopt.report._style import (
     plain,
     styled,
 )
-from seqopt.report.comparison import LARGEST, Comparison, _in_shown_unit, _worst_of
+from seqopt.report.comparison import Comparison, _in_shown_unit, _worst_of
 from seqopt.report.page import Build
-from seqopt.report.text import in_words, typed
+from seqopt.report.text import UNITS, in_words, typed
 from seqopt.study.published import PUBLISHED
 
 EXACT = 1e-7  # %: gaps below are rounding
@@ -45,7 +45,6 @@ TITLES = {
     "T_max": "edge tension",
     "D_max": "node displacement",
 }
-UNITS = {name: unit.replace("1e-3 mm", "µm") for name, unit in LARGEST.items()}
 COLUMNS = {
     "M_sup_Nm": "support moment\nM_sup [N m]",
     "F_max_N": "largest tension\nT_max [N]",

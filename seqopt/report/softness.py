@@ -17,6 +17,7 @@ from seqopt.engines.interface import Engine
 from seqopt.errors import SceneError
 from seqopt.graph.scenarios import engine_for
 from seqopt.report.comparison import LARGEST
+from seqopt.report.text import IN_UNITS, QUANTITIES
 from seqopt.responses._blocks import Block
 from seqopt.responses._grip_sets import solve_sets
 from seqopt.responses.quantities import CHOSEN_BY
@@ -28,12 +29,6 @@ SHARE = "payload_share"  # column: the largest force of a grip over its robot's 
 _CLEAR = 0.01  # by how much one must be less than another to be said to be
 _HALF = 0.5
 _BETWEEN = 4  # stiffnesses that are looked at in each decade
-WORDS = {
-    "F_rob": "grip force",
-    "M_sup": "support moment",
-    "T_max": "tension",
-    "D_max": "displacement",
-}
 
 
 def _grip_range(softest: float, stiffest: float) -> tuple[float, ...]:
@@ -141,7 +136,7 @@ def turning_points(table: pd.DataFrame, fixed: Sequence[str] = ()) -> tuple[str,
     ("displacement: below about 2.6e+06 N/m a has more than half of b's",)
     """
     lines: list[str] = []
-    for response, word in WORDS.items():
+    for response, word in QUANTITIES.items():
         wide = _from_stiffest(table, response)
         best = str(wide.iloc[0].idxmin())
         less = wide.min(axis=1) < (1 - _CLEAR) * wide[best]
@@ -190,10 +185,9 @@ def _softness_lines(table: pd.DataFrame, builds: Sequence[str]) -> list[str]:
     heads = [f"{k:.0e}".replace("e+0", "e").replace("e+", "e") for k in shown]  # as 3e6
     heads = ["rigid" if k == np.inf else head for k, head in zip(shown, heads, strict=True)]
     lines = []
-    for response, unit in LARGEST.items():
+    for response, words in IN_UNITS.items():
         wide = table.pivot_table(response, "build", "stiffness", sort=False)
-        said = f"{WORDS[response]}, {unit}".replace("1e-3 mm", "µm")
-        lines.append(f"{said:<24}" + "".join(f"{head:>8}" for head in heads))
+        lines.append(f"{words:<24}" + "".join(f"{head:>8}" for head in heads))
         for name in builds:
             values = wide.loc[name, list(shown)].to_numpy(float)
             cells = (f"{v:.0f}" if 100 <= abs(v) < 1e7 else f"{v:.3g}" for v in values)

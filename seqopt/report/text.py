@@ -187,6 +187,14 @@ def _far_off(length: float) -> str:
 
 
 WIDTH = 80  # columns
+QUANTITIES = {
+    "F_rob": "grip force",
+    "M_sup": "support moment",
+    "T_max": "tension",
+    "D_max": "displacement",
+}
+UNITS = {"F_rob": "N", "M_sup": "N m", "T_max": "N", "D_max": "µm"}  # in which people read these
+IN_UNITS = {name: f"{words}, {UNITS[name]}" for name, words in QUANTITIES.items()}
 WORDS = {
     "sequential": "sequential",
     "cantilever": "cantilever",
