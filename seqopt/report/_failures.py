@@ -69,7 +69,7 @@ def failure_page(engine: Engine, builds: Builds, found: FailureMap) -> str:
 
     ``engine``: of the scene; ``builds``: those mapped.
     """
-    scene, value = engine.network.scene, found.usual
+    value, axis = found.usual, AXIS_WORDS[str(found.cases["axis"].iloc[0])]
     shown = [
         Build(
             name,
@@ -80,14 +80,14 @@ def failure_page(engine: Engine, builds: Builds, found: FailureMap) -> str:
         )
         for name, steps in builds.items()
     ]
-    axis = AXIS_WORDS[str(found.cases["axis"].iloc[0])]
     fall = found.cases["fall"].gt(0).groupby(found.cases["build"], sort=False).any()
-    ways = f"{len(shown)} way{'s' * (len(shown) != 1)} to build {scene.name}"
+    ways = f"{len(shown)} way{'s' * (len(shown) != 1)} to build {engine.network.scene.name}"
     sentence = (
         f"Where {ways} fail{'s' * (len(shown) == 1)}: {int(fall.sum())} of them somewhere on the "
         f"map. Step by step, with {axis} {value:.3g}: a step that falls can be shown as it falls."
     )
-    return report_page(engine, shown, sentence, [(_caption(axis), cases_shown(found, axis))])
+    caption = f"Steps that fall, by what holds the joints and by {axis}; a click shows the build"
+    return report_page(engine, shown, sentence, [(caption, _cases_shown(found, axis))])
 
 
 def load_page(
@@ -115,19 +115,15 @@ def load_page(
     return report_page(engine, builds, sentence, tables)
 
 
-def _caption(axis: str) -> str:
-    return f"Steps that fall, by what holds the joints and by {axis}; a click shows the build"
-
-
-def cases_shown(found: FailureMap, axis: str) -> pd.DataFrame:
+def _cases_shown(found: FailureMap, axis: str) -> pd.DataFrame:
     """Return the cases of a map as people read them: only what is known."""
     table = found.cases.assign(bond_needed_Pa=found.cases["bond_needed_Pa"] / 1e3)
     falls = table["fall"] > 0
     for name in ("bond_needed_Pa", "friction_needed"):
         table[name] = table[name].where(falls & np.isfinite(table[name]))
     table["first_step"] = table["first_step"].where(falls)
-    undecided = ["undecided"] * int(not table["undecided"].any())
-    table = table.drop(columns=["axis", "bricks", *undecided])
+    none = [] if table["undecided"].any() else ["undecided"]
+    table = table.drop(columns=["axis", "bricks", *none])
     return table.rename(columns={**SHOWN, "value": axis})
 
 
