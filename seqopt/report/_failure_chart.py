@@ -65,8 +65,8 @@ def _draw_along(axes: Axes, steps: pd.DataFrame, rows: list[tuple[str, str]]) ->
     rank = steps["verdict"].map({verdict: i for i, verdict in enumerate(_COLORS)})
     most = int(steps["bricks"].max())
     picture = np.zeros((len(rows), most))
-    worst = rank.groupby([steps["build"], steps["holds"], steps["bricks"]]).max()
-    for (build, holds, bricks), verdict in worst.items():
+    worst = rank.groupby([steps["build"], steps["holds"], steps["bricks"]]).max().reset_index()
+    for build, holds, bricks, verdict in worst.to_numpy().tolist():
         picture[rows.index((build, holds)), bricks - 1] = verdict
     edges = np.arange(most + 1) + 0.5, np.arange(len(rows) + 1)
     how: Any = {"cmap": ListedColormap([*_COLORS.values()]), "vmin": -0.5, "vmax": 3.5}

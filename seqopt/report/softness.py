@@ -141,7 +141,7 @@ def turning_points(table: pd.DataFrame, fixed: Sequence[str] = ()) -> tuple[str,
         best = str(wide.iloc[0].idxmin())
         less = wide.min(axis=1) < (1 - _CLEAR) * wide[best]
         if less.any():
-            other = str(wide.loc[less.idxmax()].idxmin())
+            other = str(wide.iloc[int(less.argmax())].idxmin())
             at = _crossing(wide[best] / wide[other], 1.0, less)
             lines.append(f"{word}: below about {at} N/m {other} has the least, not {best}")
         for one, more in permutations([best, *(name for name in fixed if name != best)], 2):

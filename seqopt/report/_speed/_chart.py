@@ -75,7 +75,7 @@ def place(
         before = np.select([SPOTS > 1, SPOTS < -1], [0.0, 1.0], 0.5)  # share before the anchor
         low = label.axes.transData.transform(label.at) + SPOTS * scale - size * before
         spots, air = np.hstack([low, low + size]), AIR * scale * np.array([-1, -1, 1, 1])
-        inside = label.axes.get_window_extent().extents[None]
+        inside = np.array([label.axes.get_window_extent().extents])
         outside = (spots[:, 2:] - spots[:, :2]).prod(axis=1) - _shared(spots, inside)
         covered = outside + _shared(spots + air, boxes)
         best = int(covered.argmin())
@@ -178,7 +178,8 @@ def _points(
         at = float(row["seconds"]), float(row["height"])
         axes.plot(*at, **how)
         yield axes, *at
-    took = seen.loc[speed.take.name]
+    name: Any = speed.take.name  # of the row to take
+    took: pd.Series[float] = seen.loc[name]
     at = float(took["seconds"]), float(took["height"])
     axes.plot(*at, "o", ms=14, mfc="none", mec=INK, mew=1.1, zorder=4, clip_on=False)
 
@@ -190,7 +191,7 @@ def _named(axes: Axes, seen: pd.DataFrame, took: Any, *, engines: bool) -> Itera
         level = rows.sort_values("kept", ascending=False, kind="stable")
         times, kept = level["seconds"].to_numpy(float), level["kept"].to_numpy(bool)
         apart = (times[1:] > NEAR * times[:-1]) | (kept[1:] != kept[:-1])
-        ends = [] if engines else np.flatnonzero(apart) + 1  # of those close in time and alike
+        ends = np.flatnonzero(apart & (not engines)) + 1  # of those close in time and alike
         said = set[str]()
         for places in np.split(np.arange(len(times)), ends):
             own = level.iloc[places]
