@@ -20,7 +20,13 @@ from seqopt.engines.registry import DEFAULT, LIMITED, _chooser_of, make_engine, 
 from seqopt.errors import ExtraError, ProblemError, SceneError, StepError
 from seqopt.network.network import Network
 from seqopt.plan.build import ShownBuild
-from seqopt.problem.requirements import _carrying_excesses, _prop_faults, overloads
+from seqopt.problem.requirements import (
+    LIFTED,
+    LINEAR_RANGE,
+    _carrying_excesses,
+    _prop_faults,
+    overloads,
+)
 from seqopt.responses.table import OUTSIDE, REMEDY, _Columns
 from seqopt.scene.scene import Scene, in_order
 from seqopt.sequence.rules import MOST_ROBOTS, FreeRules, _usual_grips, with_robots
@@ -236,6 +242,14 @@ def marked(answer: Answer, outside: Sequence[object]) -> Answer:
     if not answer.text:
         return replace(answer, notes=(*lines, *answer.notes))
     return replace(answer, text="\n".join([*map(wrapped, lines), answer.text]))
+
+
+def kept_range(answer: Answer, beyond: str | None) -> Answer:
+    """Return an answer whose status says it if a plan leaves the limit of the linear range."""
+    if beyond is None or answer.status is not Status.DONE:
+        return answer
+    said = f"seqopt: {OUTSIDE}: {beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
+    return replace(answer, failures=(*answer.failures, said), status=Status.DOES_NOT_HOLD)
 
 
 def strictly(

@@ -21,6 +21,7 @@ from seqopt._cli.asked import (
     exceeded,
     idle_notes,
     in_seconds,
+    kept_range,
     level_notes,
     refused,
     rule_notes,
@@ -53,7 +54,7 @@ from seqopt.plan._status import faults_in_words
 from seqopt.plan.plan import Plan
 from seqopt.plan.solving import _solve_run, usual
 from seqopt.problem.problem import Problem
-from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, OWN, overloads
+from seqopt.problem.requirements import OWN, overloads
 from seqopt.responses._tolerance import value_text
 from seqopt.responses.table import OUTSIDE
 from seqopt.sequence.schedule import Schedule
@@ -404,7 +405,7 @@ def _bases(
     """Return the best plan over the bases that are asked for."""
     if asked.no_proof:
         raise ProblemError("--no-proof: bases are compared by proven plans; leave it out")
-    from seqopt._cli.words.bases import asked_places  # noqa: PLC0415  # few ask for it
+    from seqopt.arms._base_words import asked_places  # noqa: PLC0415  # few ask for it
     from seqopt.arms._bases import choose_bases  # noqa: PLC0415
 
     scene = in_seconds(asked, asked_scene(asked))
@@ -431,8 +432,8 @@ def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
     early = plan.ended is End.INTERRUPTED
     over = exceeded(scene, plan._columns) if found.analyzed and not early else ()
     enough = _enough_payload(plan) if over else ()
-    page = found.analyzed and PAGE not in clock.left_out
     lines = [_value(found) if not found.analyzed else f"{_held(plan)}; {_value(found)}"]
+    page = found.analyzed and PAGE not in clock.left_out
     lines += [f"{_search(plan)}; {written_to(asked.out, page=page)}"]
     lines += map(wrapped, waits_said(plan) if plan.certificate is not None else ())
     lines += [f"stability, {each}" for each in found.own]
@@ -443,13 +444,10 @@ def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
         "summary": lambda: found.report,
         "proof": _proof(plan),
     }
-    if found.bases is not None:
-        facts["bases"] = found.bases.tried
-    if found.props is not None:
-        facts["fewest_props"] = found.props.tried
+    outer = {"bases": found.bases, "fewest_props": found.props}
+    facts |= {name: each.tried for name, each in outer.items() if each is not None}
     if plan.order is not None:
-        order = plan.order.selection.order
-        facts["order"] = order
+        facts["order"] = order = plan.order.selection.order
         lines.append(wrapped(", ".join(map(str, order)), first="order: "))
     said = (*(plan.enough.lines if found.analyzed else ()), f"proof: {_proof(plan)}")
     answer = Answer(
@@ -473,15 +471,8 @@ def _answer(asked: Optimize, found: Found, written: tuple[Any, ...]) -> Answer:
     unreached = () if plan.arms is None else faults_in_words(plan.arms.postures)
     left = plan.departures if found.analyzed else ()
     answer = strictly(answer, asked, over, left, found.verdicts, unreached)
-    return answer if found.posed.problem.lifts_range else _in_range(answer, plan)
-
-
-def _in_range(answer: Answer, plan: Plan) -> Answer:
-    """Return an answer whose status says it if a plan leaves the limit of the linear range."""
-    if not plan.is_far or answer.status is not Status.DONE:
-        return answer
-    said = f"seqopt: {OUTSIDE}: {plan.beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
-    return replace(answer, failures=(*answer.failures, said), status=Status.DOES_NOT_HOLD)
+    far = plan.is_far and not found.posed.problem.lifts_range
+    return kept_range(answer, plan.beyond if far else None)
 
 
 def _held(plan: Plan) -> str:

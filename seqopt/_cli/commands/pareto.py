@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from math import inf
 from pathlib import Path
@@ -17,6 +17,7 @@ from seqopt._cli.answer import Answer, Status
 from seqopt._cli.asked import (
     _not_done,
     asked_prover,
+    kept_range,
     level_notes,
     marked,
     refused,
@@ -37,11 +38,11 @@ from seqopt.plan.build import GivenSequence
 from seqopt.plan.front import Front, find_front, pick
 from seqopt.plan.solving import states_of
 from seqopt.problem.problem import Problem, judged_by
-from seqopt.problem.requirements import LIFTED, LINEAR_RANGE, _said_limits
+from seqopt.problem.requirements import _said_limits
 from seqopt.report._pages import front_page
 from seqopt.report.comparison import _worst_of, fixed_methods, shown_table
 from seqopt.responses._tolerance import value_text
-from seqopt.responses.table import OUTSIDE, Departure, LinearRange, _analyze_builds, builds_in_words
+from seqopt.responses.table import Departure, LinearRange, _analyze_builds, builds_in_words
 from seqopt.scene.scene_file import dump_scene
 from seqopt.sequence.rules import FREE
 from seqopt.sequence.steps import Step
@@ -219,11 +220,7 @@ def answered(asked: Pareto, found: Found) -> Answer:
         failures=(INTERRUPTED,) if clock.interrupted else (),
         status=Status.INTERRUPTED if clock.interrupted else Status.DONE,
     )
-    answer = marked(answer, builds_in_words(found.departures))
-    if not front.beyond or clock.interrupted:
-        return answer
-    said = f"seqopt: {OUTSIDE}: {front.beyond}; --limit {LINEAR_RANGE}={LIFTED} lifts this limit"
-    return replace(answer, failures=(said,), status=Status.DOES_NOT_HOLD)
+    return kept_range(marked(answer, builds_in_words(found.departures)), front.beyond or None)
 
 
 def _chosen(asked: Pareto, name: str, found: Found) -> tuple[int, dict[str, object], str]:

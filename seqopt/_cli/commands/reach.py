@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import pandas as pd
@@ -13,7 +12,13 @@ from seqopt._cli.options import Built, Postures
 from seqopt._cli.outputs import figure_notes, require_out, write_outputs
 from seqopt._cli.terminal import wrapped
 from seqopt._files import csv_text
-from seqopt.arms._permits import find_table, reach_table
+from seqopt.arms._permits import (
+    find_table,
+    reach_covered,
+    reach_described,
+    reach_table,
+    reach_without_arms,
+)
 from seqopt.arms.reach import find_postures
 from seqopt.scene.scene import Scene
 
@@ -41,9 +46,9 @@ def run(asked: Reach) -> Answer:
     scene = asked_scene(asked)
     require_out(asked)
     find_postures(scene, asked.cache, asked.tell)
-    table = reach_table(scene) if scene.has_arms else _without_arms(scene)
+    table = reach_table(scene) if scene.has_arms else reach_without_arms(scene)
     written = write_outputs(asked, lambda: _files(scene, table))
-    lines = [*(_described if scene.has_arms else _covered)(scene, table)]
+    lines = [*(reach_described if scene.has_arms else reach_covered)(scene, table)]
     if written:
         names = "reach.csv, postures.csv" if scene.has_arms else "reach.csv"
         lines.append(f"written to {asked.out}: {names}")
@@ -69,50 +74,3 @@ def _files(scene: Scene, table: pd.DataFrame) -> dict[str, bytes | str]:
     from seqopt.report._style import picture_files  # noqa: PLC0415
 
     return files | picture_files("reach", reach_picture(table))
-
-
-def _without_arms(scene: Scene) -> pd.DataFrame:
-    """Return which nodes lie within the reach of each robot, a row for each."""
-    rows = (
-        {"robot": robot.name, "brick": brick.name, "node": node, "reached": node in reached}
-        for robot in scene.robots
-        for brick, reached in zip(scene.placed, scene.within_reach(robot), strict=True)
-        for node in brick.nodes
-        if node not in scene.blocked_nodes
-    )
-    return pd.DataFrame(rows)
-
-
-def _covered(scene: Scene, table: pd.DataFrame) -> Iterator[str]:
-    """Yield how much lies within the reach of each robot, none of which has an arm."""
-    yield f"no robot of {scene.name} has an arm: this is the reach that the scene gives them"
-    for robot, (_, rows) in zip(scene.robots, table.groupby("robot", sort=False), strict=True):
-        yield f"{robot.name}: reach {robot.reach}, {rows['reached'].sum()} of {len(rows)} nodes"
-        lacking = [str(node) for node in rows["node"][~rows["reached"]]]
-        if lacking:
-            yield f"  never: {_listed(lacking)}"
-
-
-def _described(scene: Scene, table: pd.DataFrame) -> Iterator[str]:
-    """Yield what each robot reaches, in words."""
-    free = [node for node in table["node"].unique() if node not in scene.blocked_nodes]
-    last = len(scene.bricks)
-    for name, rows in table[table["node"].isin(free)].groupby("robot", sort=False):
-        able = rows[rows["to_bricks"] > 0]
-        to_end = able[able["to_bricks"] == last]
-        yield (
-            f"{name}: reaches {len(able)} of {len(free)} nodes when their bricks are placed, "
-            f"{len(to_end)} of them up to the last brick; "
-            f"{able['postures'].median() if len(able) else 0:g} postures at a node, by the median"
-        )
-        for why, lacking in rows[rows["to_bricks"] == 0].groupby("why", sort=False):
-            yield f"  never: {_listed([*map(str, lacking['node'])])} ({why})"
-        early = able[able["to_bricks"] < last]
-        if len(early):
-            pairs = zip(early["node"], early["to_bricks"], strict=True)
-            yield f"  up to fewer bricks: {_listed([f'{n} ({to})' for n, to in pairs])}"
-
-
-def _listed(names: list[str], most: int = 30) -> str:
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more

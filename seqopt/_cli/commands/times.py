@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import pandas as pd
@@ -31,13 +31,12 @@ from seqopt.errors import ProblemError, SceneError, StepError
 from seqopt.network.build import build_network
 from seqopt.plan.build import GivenSequence
 from seqopt.problem.standing import Standing
-from seqopt.responses.table import force_column
 from seqopt.scene.scene import Scene
 from seqopt.sequence._durations import has_durations
 from seqopt.sequence.steps import Step
 from seqopt.times._step_check import check_cured
 from seqopt.times._steps import step_times
-from seqopt.times._tables import SHARE, aged_table, busy_table
+from seqopt.times._tables import aged_table, busy_table, softer_lines, spent_lines, total_lines
 
 USUAL_SECONDS = "fetch=30,place=10,approach=10,grip=5,release=5"
 
@@ -111,15 +110,15 @@ def run(asked: Times) -> Answer:
     if build.standing is not None:
         starts = build.times()["start_s"].tolist()
         check_cured(build.engine.network, build.steps, build.standing, starts)
-    total = _said(scene.name, len(steps), float(given), least)
-    lines = [*total, *waits_said(build), *_spent(busy)]
-    lines += [] if aged is None else _softer(scene, build.responses(), aged)
+    total = total_lines(scene.name, len(steps), float(given), least)
+    lines = [*total, *waits_said(build), *spent_lines(busy)]
+    if aged is not None:
+        lines += softer_lines(scene, build.responses(), aged, exceeded(scene, aged))
     kept = f"written to {asked.out}: {', '.join(('plan.csv', 'times.csv', *files))}"
     lines.append(kept if written else "--out DIR writes when every step happens, and a chart of it")
-    facts = {"makespan_s": given, "reassigned_s": least, "robots": busy, "steps": build.times()}
     cannot = _arms_cannot(asked, scene, build.steps)
-    facts |= {} if aged is None else {"aged": aged}
-    facts |= {"arms_cannot": cannot} if cannot else {}
+    facts = {"makespan_s": given, "reassigned_s": least, "robots": busy, "steps": build.times()}
+    facts |= ({} if aged is None else {"aged": aged}) | ({"arms_cannot": cannot} if cannot else {})
     return Answer(
         facts={"scene": scene_facts(scene), **facts},
         text="\n".join(map(wrapped, lines)),
@@ -157,40 +156,3 @@ def _aged(asked: Times, build: GivenSequence) -> pd.DataFrame | None:
         return aged_table(network, build.steps, times, _find_curing(asked.stiffens))
     except SceneError as error:
         raise SceneError(f"--stiffens: {error}") from None
-
-
-def _softer(scene: Scene, full: pd.DataFrame, aged: pd.DataFrame) -> Iterator[str]:
-    """Yield what a build comes to with joints as stiff as they are, beside full stiffness."""
-    softest = 100 * aged[SHARE].min()
-    yield (
-        f"with joints as stiff as they are when each step begins, from {softest:.3g} % on, beside "
-        "full stiffness:"
-    )
-    columns = {"D_max_1e-3mm": "displacements up to", "F_max_N": "tension up to"}
-    columns |= {force_column(robot): f"{robot.name} holds up to" for robot in scene.robots}
-    for column, what in columns.items():
-        was, now = (table.set_index("step")[column].abs() for table in (full, aged))
-        if now.notna().any():
-            unit = "µm" if column.startswith("D_") else "N"
-            most = f"{now.max():.4g} {unit} in step {now.idxmax()}"
-            yield f"  {what} {most}, not {was.max():.4g} {unit}"
-    over = exceeded(scene, aged)
-    yield from (f"  payload exceeded: {each}" for each in over)
-    if not over:
-        yield "  no payload is exceeded"
-
-
-def _spent(busy: pd.DataFrame) -> Iterator[str]:
-    """Yield how long each robot does what."""
-    for row in busy.to_dict("records"):
-        spent = (
-            f"{what} {row[f'{what}_s']:.6g} s" for what in ("prepares", "acts", "holds", "idle")
-        )
-        yield f"  {row['robot']}: {', '.join(spent)}"
-
-
-def _said(name: str, steps: int, given: float, least: float | None) -> Iterator[str]:
-    """Yield how long a build takes."""
-    yield f"{name}: {steps} steps take {given:.6g} s"
-    if least is not None:
-        yield f"the same grips by other robots: {least:.6g} s, the least"
